@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.ros import RosConfig
 
-DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
-
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
@@ -54,15 +52,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--fleet",
     )
     _add_room(parser)
-    parser.add_argument(
-        "--serve",
-        type=address,
-        nargs="?",
-        const=(DEFAULT_HOST, DEFAULT_PORT),
-        metavar="[HOST:]PORT",
-        help="also serve live viewers: `rerun rerun+http://HOST:PORT/proxy`; anybody who can "
-        f"connect to the port may watch (default: {DEFAULT_HOST}:{DEFAULT_PORT})",
-    )
     add_robot_on_bus(parser, config=False)
 
 
@@ -77,14 +66,6 @@ def ros_config(text: str) -> RosConfig:
     for fault in config.faults():
         raise argparse.ArgumentTypeError(f"ros2: {fault}")
     return config
-
-
-def address(text: str) -> tuple[str, int]:
-    """Read ``HOST:PORT`` or ``PORT``; an IPv6 host is in brackets."""
-    host, _, port = text.rpartition(":")
-    if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise argparse.ArgumentTypeError(f"must be [HOST:]PORT, got {text!r}")
-    return host.strip("[]") or DEFAULT_HOST, int(port)
 
 
 def _add_room(parser: argparse.ArgumentParser) -> None:
@@ -155,8 +136,8 @@ def _record(args: argparse.Namespace) -> int:
         from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
 
         budget = budget_of(config, file_name(args.fleet))
-        return run_fleet_recorder(config, bus, args.fleet, Output(args.out, budget, args.serve))
-    return run_recorder(config, bus, Output(args.out, budget_of(config), args.serve))
+        return run_fleet_recorder(config, bus, args.fleet, Output(args.out, budget))
+    return run_recorder(config, bus, Output(args.out, budget_of(config)))
 
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:

@@ -9,8 +9,7 @@ from typing import TypeGuard
 import msgspec
 
 from fasaco_edge.judge.floor import swept_words
-from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.document import MILESTONES, ReviewDocument
 from fasaco_edge.review.wording import NOT_KNOWN, clock, count
 
 # Keys of the configuration by the name of a setting.
@@ -45,10 +44,6 @@ NUMBERS = (
     ("floor swept, by the daemon", "ledger_swept_m2", "m2"),
     ("covered again", "recovered_cells", "cells"),
     ("out of reach", "unreachable_cells", "cells"),
-    ("steps", "steps", ""),
-    ("revisits", "revisits", ""),
-    ("quarter-turns", "turns_90", ""),
-    ("about-turns", "turns_180", ""),
     ("driven", "driven_m", "m"),
     ("paths published", "paths", ""),
     ("replans", "replans", ""),

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from fasaco_edge.wire.documents.path_documents import Rectangle
 
 
+MILESTONES = (50, 90, 99, 100)
+"""Shares of the cells that can be covered at the end [percent]."""
+
+
 class RecordedFile(msgspec.Struct):
     """A file of a recording."""
 
@@ -80,14 +84,6 @@ class Charge(msgspec.Struct, frozen=True):
     level_to: float | None
 
 
-class PheromoneFigures(msgspec.Struct, frozen=True):
-    """The recorded pheromone; None if unknown."""
-
-    fields: int
-    cells_share: float | None
-    branching: float | None
-
-
 class ReviewDocument(msgspec.Struct):
     """All figures of a review; None where a recording does not hold them.
 
@@ -117,7 +113,8 @@ class ReviewDocument(msgspec.Struct):
             none did), skip (whether orders for everything leave it out).
         complete: of the last order: whether the mission reached `done` with every reachable cell
             (of its zones) covered.
-        covered_cells, coverable_cells: at the end: covered cells, and all reachable cells.
+        covered_cells, coverable_cells: at the end, by the daemon's last recorded count: covered
+            cells, and all reachable cells.
         recovered_cells: cells covered more than once.
         unreachable_cells: cells where the robot would fit, but that it cannot get to.
         reachable_m2, swept_m2: floor at the end, by pixels of the last map: all that the tool's
@@ -133,13 +130,7 @@ class ReviewDocument(msgspec.Struct):
         left_by_reason: reachable floor not swept at the end, by the daemon's reasons [m2].
         out_of_reach_by_reason: free floor that the tool cannot reach, by reason [m2]; null if the
             robot drives through the centres of cells.
-        coverage_from: source of the counts: `status` (the daemon) or `trail` (recorded poses and
-            the last map, if the daemon's last recorded count is outdated).
-        reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s];
-            by the statuses where a line over the floor is driven.
-        steps: moves from cell to cell; a cell counts when the tool passes over its centre.
-        revisits: visits of cells after each one's first.
-        turns_90, turns_180: quarter-turns and about-turns between steps.
+        reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s].
         driven_m: length of the trail, without jumps [m].
         paths: paths that were published.
         replans: paths from a plan, without the first after each start of the daemon.
@@ -155,10 +146,6 @@ class ReviewDocument(msgspec.Struct):
             the current one or were outdated.
         plan_ms_p50, plan_ms_p99, plan_ms_max: their times, including unused ones [ms].
         attempts, attempts_used: plans made to improve the path; those that did.
-        pheromone: fields (number of recorded fields), cells_share (cells that the last field spans
-            over those that have a stand, a place from which the robot sweeps them, reachable or
-            not, by the last status), branching (at the end: mean number of directions of a cell
-            within reach of its strongest).
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
         processor_s, recorder_processor_s: total processor time of daemon and recorder, by the
             computer's clock [s].
@@ -209,12 +196,7 @@ class ReviewDocument(msgspec.Struct):
     ledger_swept_m2: float | None = None
     left_by_reason: dict[str, float] | None = None
     out_of_reach_by_reason: dict[str, float] | None = None
-    coverage_from: str | None = None
     reached_s: dict[str, float | None] | None = None
-    steps: int | None = None
-    revisits: int | None = None
-    turns_90: int | None = None
-    turns_180: int | None = None
     driven_m: float | None = None
     paths: int = 0
     replans: int = 0
@@ -232,7 +214,6 @@ class ReviewDocument(msgspec.Struct):
     plan_ms_max: float | None = None
     attempts: int | None = None
     attempts_used: int | None = None
-    pheromone: PheromoneFigures = PheromoneFigures(0, None, None)
     memory_mb_max: float | None = None
     recorder_memory_mb_max: float | None = None
     processor_s: float | None = None

@@ -15,7 +15,6 @@ from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.document import (
     Charge,
     MapSize,
-    PheromoneFigures,
     RecordedFile,
     Replan,
     ReviewDocument,
@@ -86,7 +85,6 @@ def document_of(review: Review) -> ReviewDocument:
     )
     _add_coverage(document, review)
     _add_plans(document, review)
-    document.pheromone = _pheromone(review)
     for member, entity in PLOTTED.items():
         if (points := record.plots.get(entity)) is not None:
             setattr(document, member, _rounded(float(points[:, 1].max())))
@@ -135,10 +133,9 @@ PLOTTED = {
 def _add_coverage(document: ReviewDocument, review: Review) -> None:
     if (grid := review.data.grid) is not None:
         document.map = MapSize(grid.geometry.rows, grid.geometry.cols, grid.geometry.resolution)
-    if (counts := review.counts) is not None:
+    if (counts := review.data.counts) is not None:
         document.covered_cells, document.coverable_cells = counts.covered, counts.coverable
         document.recovered_cells, document.unreachable_cells = counts.recovered, counts.unreachable
-        document.coverage_from = counts.source
     document.swept_before_m2 = round(review.data.swept_before_m2, 3)
     if (floor := review.floor) is not None:
         figures = floor.figures
@@ -151,11 +148,8 @@ def _add_coverage(document: ReviewDocument, review: Review) -> None:
         document.ledger_swept_m2 = ledger.swept_m2
         document.left_by_reason = _by_reason(ledger.left)
         document.out_of_reach_by_reason = _by_reason(ledger.out_of_reach)
-    if (walk := review.walk) is not None:
-        document.steps, document.revisits = walk.steps, walk.revisits
-        document.turns_90, document.turns_180 = walk.turns_90, walk.turns_180
-    if review.drive is not None:
-        document.driven_m = round(review.drive.driven_m, 2)
+    if review.data.poses:
+        document.driven_m = round(float(review.data.ways_m.sum()), 2)
     if (reached := review.reached_s) is not None:
         document.reached_s = {str(percent): _rounded(at_s) for percent, at_s in reached.items()}
 
@@ -182,19 +176,6 @@ def _add_plans(document: ReviewDocument, review: Review) -> None:
     )
 
 
-def _pheromone(review: Review) -> PheromoneFigures:
-    plots = review.record.plots
-    spanned, branching = (
-        float(points[-1, 1]) if (points := plots.get(entity)) is not None else None
-        for entity in (entities.TRAIL_CELLS, entities.BRANCHING)
-    )
-    # Along the track only cells count whose centre fits the robot; more cells have a stand.
-    counted = [each.status.coverage for each in review.data.statuses if each.status.coverage]
-    stands = counted[-1].coverable + counted[-1].unreachable if counted else 0
-    share = spanned / stands if spanned is not None and stands else None
-    return PheromoneFigures(len(review.record.field_ns), _rounded(share), _rounded(branching))
-
-
 def _replan(path: PathSample) -> Replan:
     about = path.about
     return Replan(
@@ -219,24 +200,21 @@ def _not_recorded(review: Review) -> dict[str, str]:
     data, why = review.data, {}
     if not data.statuses:
         why["robot, version, config, state"] = "no status of the daemon was recorded"
-    if review.drive is None:
-        why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = review.no_lattice
+    if review.lattice is None:
         why[FLOOR] = review.no_lattice
     elif review.data.restored_cells:
         restored = review.data.restored_cells
-        before = (
-            f"{restored} cells were covered before the recording, which does not show which ones"
-        )
-        why["reached_s"] = why[FLOOR] = before
+        before = f"{restored} cells were covered before the recording"
+        why[FLOOR] = f"{before}, which does not show which ones"
     elif review.floor is None:
         why[FLOOR] = "no pose lies on the map"
     if data.ledger_floor is None:
         why["ledger_swept_m2, left_by_reason, out_of_reach_by_reason"] = (
             "no recorded status has figures of the floor"
         )
-    if review.counts is None:
-        why["covered_cells, coverable_cells, recovered_cells"] = (
-            "the daemon's last recorded count is outdated, and the poses are incomplete"
+    if data.counts is None:
+        why["covered_cells, coverable_cells, recovered_cells, reached_s"] = (
+            "no recorded status counts cells"
         )
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
@@ -27,18 +27,14 @@ AT_REST = (
     *("loading", "charging", "done", "silent"),
 )
 TROUBLES = ("degraded", "blocked", "silent")
-# The effect of a command is published at most this long after it, by the recorder's clock [s].
-COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
 # "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
 # Texts of ``mission.map.reachable_area.AreaChange``.
 _MAP = "map: "
 _CHANGES = ("more", "fewer", "passages changed")
-_ERROR = re.compile(r"error (\d+): ")
 # Log lines of a recorder without a fault.
 IN_ORDER = tuple(f"{state}: " for state in RECORDER_IN_ORDER)
-NOT_RECORDED = "code not recorded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,47 +139,12 @@ def longest_stand(
     return Moment("longest stand", seconds, "s", since, note)
 
 
-def longest_gap(what: str, at_s: Sequence[float], during: Span) -> Moment | None:
-    """Return the longest gap between samples, including the ends of the span."""
-    inside = [at for at in at_s if during.begin_s <= at <= during.end_s]
+def longest_gap(pose_s: Sequence[float], during: Span) -> Moment:
+    """Return the longest time without a pose, including the ends of the span."""
+    inside = [at for at in pose_s if during.begin_s <= at <= during.end_s]
     ends = [during.begin_s, *inside, during.end_s]
-    gaps = [(after - before, before) for before, after in pairwise(ends)]
-    seconds, since = max(gaps)
-    return Moment(what, seconds, "s", since)
-
-
-def largest_drop(
-    fractions: NDArray[np.float64],
-    map_s: Sequence[float],
-    command_s: Sequence[float] = (),
-    scale: float = 1.0,
-) -> Moment | None:
-    """Return the largest drop of the covered share that was caused by a new map.
-
-    Args:
-        fractions: float64 (n, 2), times [s] and covered shares as published by the daemon.
-        map_s: arrivals of maps and updates [s].
-        command_s: arrivals of commands [s]: a drop at a command is not caused by a map.
-        scale: seconds of the robot, in which the times are, per second.
-    """
-    arrivals = np.array(sorted(map_s)), np.array(sorted(command_s))
-    drops = list(_drops(fractions, *arrivals, scale * COMMAND_S))
-    return max(drops, key=lambda drop: drop.value, default=None)
-
-
-def _drops(
-    fractions: NDArray[np.float64],
-    map_s: NDArray[np.float64],
-    command_s: NDArray[np.float64],
-    late_s: float,
-) -> Iterator[Moment]:
-    for (since, before), (until, after) in pairwise(fractions.tolist()):
-        maps = np.searchsorted(map_s, (since, until), side="right")
-        commands = np.searchsorted(command_s, (since - late_s, until), side="right")
-        if after < before and maps[1] > maps[0] and commands[1] == commands[0]:
-            points = 100 * (before - after)
-            note = f"from {100 * before:.1f} % to {100 * after:.1f} % of what was known"
-            yield Moment("largest drop of coverage after a map", points, "%", until, note)
+    seconds, since = max((after - before, before) for before, after in pairwise(ends))
+    return Moment("longest time without a pose", seconds, "s", since)
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,15 +184,11 @@ class Replans:
                 took[kind_of(path.about.reason)].append(path.plan_ms)
         return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
 
-    def slowest_first(self, most: int) -> list[PathSample]:
-        """Return up to ``most`` of them, the slowest first."""
-        return sorted(self.later, key=lambda path: -(path.plan_ms or 0.0))[:most]
-
     @property
-    def slowest(self) -> PathSample | None:
-        """The slowest one."""
+    def slowest_first(self) -> list[PathSample]:
+        """Those whose duration is known, the slowest first."""
         timed = [path for path in self.later if path.plan_ms is not None]
-        return max(timed, key=lambda path: path.plan_ms or 0.0, default=None)
+        return sorted(timed, key=lambda path: -(path.plan_ms or 0.0))
 
     def milliseconds(self, percent: float) -> float | None:
         """Return a percentile of their durations [ms], by nearest rank."""
@@ -247,39 +204,25 @@ def kind_of(reason: str) -> str:
     return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason given"
 
 
-def worst_moments(
-    data: RunData,
-    states: tuple[Span, ...],
-    replans: Replans,
-    fractions: NDArray[np.float64],
-) -> tuple[Moment, ...]:
+def worst_moments(data: RunData, states: tuple[Span, ...], replans: Replans) -> tuple[Moment, ...]:
     """Return the worst of each kind of moment there was.
 
     Args:
         data: of the samples.
         states: of the mission, in order.
         replans: plans after the first.
-        fractions: float64 (n, 2), when [s] and the covered share as the daemon published it.
     """
     found: list[Moment | None] = []
     for during in under_way(states):
-        found += [
-            longest_stand(data.times, data.track, during, states),
-            longest_gap("longest time without a pose", data.pose_s, during),
-            longest_gap("longest time without a map", data.map_s, during),
-        ]
-    slowest = replans.slowest
-    if slowest is not None and slowest.plan_ms is not None:
-        reason = slowest.about.reason
-        found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, reason))
-    command_s = [at_s for at_s, _, _ in data.commands]
-    found.append(largest_drop(fractions, data.map_s, command_s, data.time_scale))
+        found.append(longest_stand(data.times, data.track, during, states))
+        found.append(longest_gap(data.pose_s, during))
+    for path in replans.slowest_first[:1]:
+        took_ms, reason = path.plan_ms or 0.0, path.about.reason
+        found.append(Moment("slowest replan", took_ms, "ms", path.at_s, reason))
     # A restarted mission has such moments several times: the worst one counts.
     worst: dict[str, Moment] = {}
-    for moment in found:
-        if moment is not None and (
-            moment.what not in worst or moment.value > worst[moment.what].value
-        ):
+    for moment in filter(None, found):
+        if moment.what not in worst or moment.value > worst[moment.what].value:
             worst[moment.what] = moment
     return tuple(worst.values())
 
@@ -289,8 +232,7 @@ class Faults:
     """Refused messages and losses.
 
     Attributes:
-        by_code: messages refused by the daemon; ``NOT_RECORDED``: those that it counted after the
-            last recorded counts by code.
+        by_code: messages refused by the daemon.
         lost: samples that the recorder could not write; None where that is not recorded.
         torn_bytes: what a crash tore off the files [bytes].
         complaints: warnings in the recorder's log.
@@ -309,16 +251,10 @@ class Faults:
 
 def faults_of(data: RunData, record: RunRecord) -> Faults:
     """Return the faults in a recording."""
-    by_code = _over_restarts(each.status.errors.by_code for each in data.statuses)
-    # Curves have counts up to the end, but after a restart of the daemon not each count.
-    by_code |= _plotted(record.plots)
-    total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
-    if total > by_code.total():
-        by_code[NOT_RECORDED] = total - by_code.total()
     recorders = [each.status.recorder for each in data.statuses]
     lost = [recorder.lost for recorder in recorders if recorder and recorder.lost is not UNSET]
     return Faults(
-        by_code=dict(sorted(by_code.items())),
+        by_code=dict(sorted(_plotted(record.plots).items())),
         lost=max(lost, default=None),
         torn_bytes=sum(part.torn_bytes for part in record.parts),
         complaints=tuple(
@@ -330,36 +266,12 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     )
 
 
-def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> Counter[str]:
-    """Return the counts by code by their curves, over restarts."""
-    counts: Counter[str] = Counter()
+def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> dict[str, int]:
+    """Return the counts of curves by code; a restart of the daemon resets them."""
+    counts: dict[str, int] = {}
     for entity, points in plots.items():
         if entity.startswith(f"{entities.ERRORS}/"):
             values = points[:, 1]
             ended = values[:-1][np.diff(values) < 0]
             counts[entity.removeprefix(f"{entities.ERRORS}/")] = round(ended.sum() + values[-1])
     return counts
-
-
-def _over_restarts(counts: Iterable[Mapping[str, int]]) -> Counter[str]:
-    """Return the sum of counts that a restart of the daemon resets."""
-    ended: Counter[str] = Counter()
-    newest: Counter[str] = Counter()
-    for count in counts:
-        now = Counter(dict(count))
-        if now.total() < newest.total():
-            ended += newest
-        newest = now
-    return ended + newest
-
-
-def _counted(lines: Iterable[str]) -> int:
-    """Return how many errors the log counts, over restarts."""
-    ended = newest = 0
-    for line in lines:
-        match = _ERROR.match(line)
-        if match:
-            now = int(match[1])
-            ended += newest if now <= newest else 0
-            newest = now
-    return ended + newest

@@ -23,15 +23,8 @@ from fasaco_edge.recording.read.run import (
     count_frames,
     read_run_record,
 )
-from fasaco_edge.review.drive import (
-    Drive,
-    WalkFigures,
-    drive_over,
-    first_covered,
-    milestones,
-    swept_floor,
-    walk_figures,
-)
+from fasaco_edge.review.document import MILESTONES
+from fasaco_edge.review.drive import swept_floor, visits_of
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
@@ -44,10 +37,9 @@ from fasaco_edge.review.moments import (
     troubles_at_rest,
     worst_moments,
 )
-from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
+from fasaco_edge.review.orders import OrderChapter, chapters
 from fasaco_edge.review.rooms import RoomChapter, room_chapters
-from fasaco_edge.review.run_data import RunData, first_counted, gather
-from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.review.run_data import RunData, gather
 
 # Progress is reported with every n-th sample.
 REPORT_EVERY = 200
@@ -89,17 +81,6 @@ Entered = tuple[float, str, str]
 """Time [s] at which a state was entered, the state, and the reason."""
 
 
-@dataclass(frozen=True, slots=True)
-class CoverageCounts:
-    """Cells at the end of a recording, and their source: "status" or "trail", the track."""
-
-    covered: int
-    coverable: int
-    recovered: int | None
-    unreachable: int | None
-    source: str
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Review:
     """All figures of a recording; times are the robot's [s] since it began.
@@ -110,13 +91,9 @@ class Review:
         lattice: over the last map; None without a map or a configuration, or if the map is too
             large or too far away.
         no_lattice: why there is none; "" if there is one.
-        drive, walk: the robot's drive over it.
-        floor: the swept part of the reachable floor; None without a drive, or if some was swept
+        visits: uint16, its shape: how often the tool passed over each cell.
+        floor: the swept part of the reachable floor; None without a lattice, or if some was swept
             before.
-        first_s: float64 (n,), when each cell was first covered, ascending; by the daemon's counts
-            if a line over the floor was driven, because the track then passes beside centres.
-        first_of: number of cells that could be covered at the end, by the same count.
-        counts: of cells; None if not recorded.
         replans: plans after the first.
         states: of the mission, in order.
         recorder_states: of the recorder.
@@ -129,12 +106,8 @@ class Review:
     data: RunData
     lattice: CoverageLattice | None
     no_lattice: str
-    drive: Drive | None
+    visits: NDArray[np.uint16] | None
     floor: JudgedFloor | None
-    walk: WalkFigures | None
-    first_s: NDArray[np.float64]
-    first_of: int
-    counts: CoverageCounts | None
     replans: Replans
     states: tuple[Span, ...]
     recorder_states: tuple[Span, ...]
@@ -154,20 +127,16 @@ class Review:
         return names[-1] if names else ""
 
     @property
-    def known_fractions(self) -> NDArray[np.float64]:
-        """Times [s] and covered shares of the cells known then; float64 (n, 2)."""
-        nothing = np.zeros((0, 2))
-        return self.record.plots.get(entities.COVERED_FRACTION, nothing)
+    def covered_share(self) -> NDArray[np.float64]:
+        """Times [s] and covered shares of the cells that could be covered at the end, (n, 2)."""
+        at_s, counts = self.data.counted_s, self.data.counts
+        count = np.arange(len(at_s)) + 1.0
+        return np.column_stack((at_s, count / max(counts.coverable, 1) if counts else count))
 
     @property
     def complete(self) -> bool | None:
         """Whether the last order reached ``done`` with nothing missing; None if not recorded."""
-        if not self.state or (self.state == "done" and self.counts is None):
-            return None
-        if self.counts is None:
-            return False
-        last = self.data.statuses[-1] if self.data.statuses else None
-        return is_complete(self.state, last, self.counts.covered, self.counts.coverable)
+        return self.orders[-1].complete
 
     @property
     def troubles(self) -> list[Span]:
@@ -193,14 +162,19 @@ class Review:
     @property
     def reached_s(self) -> dict[int, float | None] | None:
         """When each of ``MILESTONES`` was reached [s]; None if not recorded."""
-        if self.drive is None or self.data.restored_cells:
+        if (counts := self.data.counts) is None:
             return None
-        return milestones(self.first_s, self.first_of)
+        needed = {percent: -(-counts.coverable * percent // 100) for percent in MILESTONES}
+        at_s = self.data.counted_s
+        return {
+            percent: float(at_s[count - 1]) if 0 < count <= len(at_s) else None
+            for percent, count in needed.items()
+        }
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:
         """The orders, and the outcome of each."""
-        return chapters(self.data, self.states, self.known_fractions, self.duration_s)
+        return chapters(self.data, self.states, self.duration_s)
 
     @property
     def rooms(self) -> tuple[RoomChapter, ...]:
@@ -218,30 +192,21 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     """
     end_s = _end_s(record, data)
     lattice, no_lattice = _lattice(data)
-    drive = drive_over(lattice, data.times, data.track, data.lost_pose_s) if lattice else None
-    floor = swept_floor(data, lattice) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
-    fractions = record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
-    counts = _counts(data, drive, fractions)
-    first_s, first_of = _first_covered(data, drive, lattice, counts)
     return Review(
         record=record,
         data=data,
         lattice=lattice,
         no_lattice=no_lattice,
-        drive=drive,
-        floor=floor,
-        walk=walk_figures(drive.cells) if drive else None,
-        first_s=first_s,
-        first_of=first_of,
-        counts=counts,
+        visits=visits_of(data, lattice) if lattice else None,
+        floor=swept_floor(data, lattice) if lattice else None,
         replans=replans,
         states=states,
         recorder_states=spans_of(
             _entered(record, entities.RECORDER_STATE, entities.RECORDER_LOG), end_s
         ),
-        moments=worst_moments(data, states, replans, fractions),
+        moments=worst_moments(data, states, replans),
         faults=faults_of(data, record),
         missing=missing,
     )
@@ -289,40 +254,3 @@ def _reason(lines: tuple[TimedText, ...], at_ns: int, state: str) -> str:
     prefix = f"{state}: "
     found = (line for at, line in lines if at == at_ns and line.startswith(prefix))
     return next(found, prefix).removeprefix(prefix)
-
-
-def _counts(
-    data: RunData, drive: Drive | None, fractions: NDArray[np.float64]
-) -> CoverageCounts | None:
-    """Return the daemon's counts if its last status still holds, else those of the track."""
-    counted = [each for each in data.statuses if each.status.coverage is not None]
-    own = counted[-1].status.coverage if counted else None
-    if own is not None and is_still_true(counted[-1], fractions, data.time_scale):
-        return CoverageCounts(
-            own.covered, own.coverable, own.recovered, own.unreachable, source="status"
-        )
-    # Cells covered before the recording began are not in the track.
-    if drive is None or data.restored_cells:
-        return None
-    cover = drive.coverage
-    return CoverageCounts(
-        cover.covered, cover.coverable, cover.recovered, cover.unreachable, source="trail"
-    )
-
-
-def _first_covered(
-    data: RunData,
-    drive: Drive | None,
-    lattice: CoverageLattice | None,
-    counts: CoverageCounts | None,
-) -> tuple[NDArray[np.float64], int]:
-    """Return when each cell was first covered [s], float64 (n,), and how many could be at the end.
-
-    A line over the floor covers cells without passing their centres: only the daemon counted them.
-    """
-    is_line = known_settings(data.config).planner.line != "cells"
-    if is_line and counts is not None and counts.source == "status":
-        return first_counted(data.statuses), counts.coverable
-    if drive is None or lattice is None:
-        return np.zeros(0), 0
-    return first_covered(drive, lattice), drive.coverage.coverable

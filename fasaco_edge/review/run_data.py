@@ -25,7 +25,7 @@ from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
-from fasaco_edge.wire.documents.replies import FloorReport
+from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import Settings, known_settings
 from fasaco_edge.wire.documents.status import Status
@@ -171,11 +171,36 @@ class RunData:
         if not swept or anew:
             return 0.0
         at_s, m2 = swept[0]
-        driven = self.track[self.times <= at_s, :2]
         tool_m = known_settings(self.config).robot.tool_width_m or 0.0
-        length_m = float(np.hypot(*np.diff(driven, axis=0).T).sum()) if len(driven) > 1 else 0.0
+        length_m = float(self.lengths_m[self.times[1:] <= at_s].sum())
         before_m2 = m2 - tool_m * (length_m + tool_m)
         return before_m2 if before_m2 > SURELY_SWEPT_M2 else 0.0
+
+    @property
+    def counts(self) -> CoverageReport | None:
+        """The daemon's last count of cells; None if there is none."""
+        counted = (each.status.coverage for each in reversed(self.statuses))
+        return next((count for count in counted if count is not None), None)
+
+    @property
+    def counted_s(self) -> NDArray[np.float64]:
+        """When the daemon had counted each number of covered cells [s], float64 (n,), rising.
+
+        A recording has a status each quarter of a minute: cells are interpolated evenly between
+        two of them. Cells that stopped counting, as after a reset or a loop closure, count from
+        their next coverage.
+        """
+        at_s: list[float] = []
+        before_s: float | None = None
+        for each in self.statuses:
+            if (coverage := each.status.coverage) is None:
+                continue
+            del at_s[coverage.covered :]
+            since_s = each.at_s if before_s is None else before_s
+            more = coverage.covered - len(at_s)
+            at_s += np.linspace(since_s, each.at_s, more + 1)[1:].tolist()
+            before_s = each.at_s
+        return np.array(at_s, np.float64)
 
     @property
     def ledger_floor(self) -> FloorReport | None:
@@ -211,9 +236,20 @@ class RunData:
         )
 
     @property
-    def jump_m(self) -> float:
-        """Two poses further apart than this are a jump [m]."""
-        return JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
+    def lengths_m(self) -> NDArray[np.float64]:
+        """Distance from each pose to the next [m], float64 (n - 1,)."""
+        return np.asarray(np.hypot(*np.diff(self.track[:, :2], axis=0).T), np.float64)
+
+    @property
+    def jumps(self) -> NDArray[np.bool_]:
+        """Which ways between poses are jumps, bool (n - 1,)."""
+        jump_m = JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
+        return self.lengths_m > jump_m
+
+    @property
+    def ways_m(self) -> NDArray[np.float64]:
+        """Driven distance from each pose to the next, 0 for jumps [m], float64 (n - 1,)."""
+        return np.where(self.jumps, 0.0, self.lengths_m)
 
     @property
     def lost_pose_s(self) -> float:
@@ -227,9 +263,7 @@ class RunData:
 
         Over the others, jumps and gaps without a pose, no floor counts as swept.
         """
-        lengths_m = np.hypot(*np.diff(self.track[:, :2], axis=0).T)
-        driven: NDArray[np.bool_] = lengths_m <= self.jump_m
-        return driven & (np.diff(self.times) <= (self.lost_pose_s or math.inf))
+        return ~self.jumps & (np.diff(self.times) <= (self.lost_pose_s or math.inf))
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -240,25 +274,6 @@ class RunData:
     def track(self) -> NDArray[np.float64]:
         """All poses: x [m], y [m], yaw [rad], float64 (n, 3)."""
         return np.array(self.poses, np.float64).reshape(-1, 3)
-
-
-def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
-    """Return when the daemon had counted each number of covered cells, float64 (n,) [s], rising.
-
-    A recording has a status each quarter of a minute: cells are interpolated evenly between two of
-    them. Cells that stopped counting, as after a reset or a loop closure, count from their next
-    coverage.
-    """
-    at_s: list[float] = []
-    before_s: float | None = None
-    for each in statuses:
-        if (coverage := each.status.coverage) is None:
-            continue
-        del at_s[coverage.covered :]
-        since_s, more = each.at_s if before_s is None else before_s, coverage.covered - len(at_s)
-        at_s += np.linspace(since_s, each.at_s, more + 1)[1:].tolist()
-        before_s = each.at_s
-    return np.array(at_s, np.float64)
 
 
 def gather(samples: Iterable[Arrival], clock: RobotClock) -> RunData:

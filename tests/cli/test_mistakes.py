@@ -95,7 +95,6 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --planner mine.py:f --png mine.py", 78, "cannot write mine.py: it is read"),
         ("simulate map.yaml --trail-out map.png", 78, "cannot write map.png: it is read from"),
         ("review a.rrd --png a.rrd", 78, "cannot write a.rrd: it is read from"),
-        ("review a.rrd --html a.html", 78, "hint: fasaco-edge serve FILE.rrd shows"),
         ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is read from"),
         ("plan good.npy --png around", 78, "cannot write around: Too many levels of symbolic"),
         (f"plan good.npy --png {'w' * 300}", 78, "File name too long"),

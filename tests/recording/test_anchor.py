@@ -43,7 +43,7 @@ def recorded(tmp_path_factory):
     return Path(report["file"]), mission
 
 
-GRIDS = [entities.MAP, entities.COVERAGE, entities.FLOOR, entities.PHEROMONE]
+GRIDS = [entities.MAP, entities.FLOOR, entities.PHEROMONE]
 
 
 def test_near_zero_nothing_is_moved():

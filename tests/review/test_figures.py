@@ -7,42 +7,22 @@ import pytest
 
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.run import RunRecord
-from fasaco_edge.review.drive import milestones, walk_figures
 from fasaco_edge.review.moments import (
     Span,
     faults_of,
     kind_of,
-    largest_drop,
     longest_gap,
     longest_stand,
     spans_of,
 )
 from fasaco_edge.review.output.panels import curve
-from fasaco_edge.review.run_data import PlanLog, RunData, StatusSample, first_counted
+from fasaco_edge.review.run_data import PlanLog, RunData, StatusSample
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.documents.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch
 
 ALL = Span("under way", 0.0, 100.0)
-
-
-def test_a_walk_is_counted():
-    cells = np.array([(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (1, 2), (3, 5), (3, 6)], np.int32)
-    figures = walk_figures(cells)
-    assert (figures.steps, figures.revisits) == (7, 1)
-    # Up, and left; what comes before and after the jump is no turn.
-    assert (figures.turns_90, figures.turns_180) == (2, 1)
-    nothing = walk_figures(cells[:0])
-    assert (nothing.steps, nothing.revisits, nothing.turns_90) == (0, 0, 0)
-    assert walk_figures(cells[:1]).steps == 0
-
-
-def test_milestones_need_whole_cells():
-    first_s = np.array([1.0, 2.0, 3.0, 4.0])
-    assert milestones(first_s, 5) == {50: 3.0, 90: None, 99: None, 100: None}
-    assert milestones(first_s, 4) == {50: 2.0, 90: 4.0, 99: 4.0, 100: 4.0}
-    assert milestones(np.zeros(0), 0) == dict.fromkeys((50, 90, 99, 100))
 
 
 @pytest.mark.parametrize(
@@ -56,11 +36,11 @@ def test_milestones_need_whole_cells():
     ids=["rising", "a loop closure", "a reset"],
 )
 def test_cells_that_stopped_counting_count_once_covered_again(counted, first_s):
-    statuses = (
+    statuses = [
         StatusSample(at_s, Status(coverage=CoverageReport(covered=covered)))
         for at_s, covered in counted
-    )
-    assert first_counted(statuses).tolist() == first_s
+    ]
+    assert RunData(statuses=statuses).counted_s.tolist() == first_s
 
 
 def test_the_longest_stand_neither_drives_nor_turns():
@@ -75,20 +55,9 @@ def test_the_longest_stand_neither_drives_nor_turns():
 
 
 def test_gaps_reach_from_end_to_end():
-    assert longest_gap("", [10.0, 30.0, 95.0], ALL).value == 65.0
-    assert longest_gap("", [60.0, 70.0], ALL).at_s == 0.0
-    assert longest_gap("", [], ALL).value == 100.0
-
-
-def test_only_a_map_makes_coverage_drop():
-    fractions = np.array([(0, 0.1), (1, 0.5), (2, 0.3), (3, 0.4), (4, 0.1), (5, 0.1)])
-    drop = largest_drop(fractions, [1.5, 2.5])
-    assert (drop.at_s, drop.value) == (2.0, pytest.approx(20.0))
-    assert largest_drop(fractions, []) is None
-    # A `mission start` makes it drop, too: that is no map's doing.
-    assert largest_drop(fractions, [1.5, 3.5], [1.4]).at_s == 4.0
-    assert largest_drop(fractions, [1.5], [1.4]) is None
-    assert largest_drop(np.zeros((0, 2)), [1.0]) is None
+    assert longest_gap([10.0, 30.0, 95.0], ALL).value == 65.0
+    assert longest_gap([60.0, 70.0], ALL).at_s == 0.0
+    assert longest_gap([], ALL).value == 100.0
 
 
 def test_states_said_again_go_on():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from msgspec import to_builtins
 
@@ -22,11 +21,8 @@ ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})
 
 
-def told(*rows, commands=(), drawn=()):
-    """Return the chapters of a data of (time, state, covered, coverable).
-
-    ``drawn``: further points of the curve of the covered share, (time, share).
-    """
+def told(*rows, commands=()):
+    """Return the chapters of data of (time, state, covered, coverable)."""
     statuses = [
         StatusSample(
             at_s,
@@ -35,24 +31,13 @@ def told(*rows, commands=(), drawn=()):
         for at_s, state, covered, coverable in rows
     ]
     states = spans_of([(at_s, state, "") for at_s, state, _, _ in rows], 100.0)
-    shares = [(at_s, covered / coverable) for at_s, _, covered, coverable in rows]
-    fractions = np.array(sorted([*shares, *drawn]))
     data = RunData(statuses=statuses, commands=list(commands))
-    return chapters(data, states, fractions, 100.0)
+    return chapters(data, states, 100.0)
 
 
 def test_a_mission_without_commands_is_one_order():
     (order,) = told((0, "covering", 0, 60), (50, "done", 60, 60))
     assert (order.ordered, order.at_s, order.until_s) == ("itself", 0.0, 100.0)
-    assert (order.covered_cells, order.coverable_cells, order.complete) == (60, 60, True)
-
-
-@pytest.mark.parametrize("late_s", [1.9, 40.0])
-def test_a_curve_drawn_late_leaves_a_done_mission_done(late_s):
-    """The curve's last point may be drawn two seconds late, or at the end of the recording."""
-    (order,) = told(
-        (0, "covering", 0, 60), (50, "done", 60, 60), drawn=[(49, 0.97), (50 + late_s, 0.99)]
-    )
     assert (order.covered_cells, order.coverable_cells, order.complete) == (60, 60, True)
 
 
@@ -128,7 +113,7 @@ def run(**changes):
         "faults_by_code": {},
     }
     names = (
-        *("recovered_cells", "unreachable_cells", "steps", "revisits", "turns_90", "turns_180"),
+        *("recovered_cells", "unreachable_cells"),
         *("driven_m", "paths", "replans", "first_plan_ms", "replan_ms_p50", "replan_ms_p99"),
         *("replan_ms_max", "plans", "plans_unused", "plan_ms_max", "attempts", "attempts_used"),
         *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
@@ -176,11 +161,11 @@ def test_differing_setups_are_listed_and_not_compared(other, what, compares):
     both = side_by_side(run(), other)
     assert [difference["what"] for difference in both["setup"]] == what
     assert both["compare"] is compares
-    assert ("steps" in both["difference"]) is compares
+    assert ("driven_m" in both["difference"]) is compares
     assert both["difference"]["faults"] == 0
     rows = {row[0]: row for row in compared_rows(run(), other)}
-    assert rows["steps"][3] == ("0" if compares else "")
+    assert rows["driven"][3] == ("0" if compares else "")
     assert rows["messages refused"][3] == "0"
     words = setup_words(run(), other)
     assert ("not two runs of one problem" in words) is not compares
-    assert differences(to_builtins(run()), to_builtins(run()))["steps"] == 0
+    assert differences(to_builtins(run()), to_builtins(run()))["driven_m"] == 0

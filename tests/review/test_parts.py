@@ -107,6 +107,7 @@ def _status(state, reason, faults, troubles=()):
     errors = {"total": sum(faults.values()), "last": "one", "by_code": faults}
     return encode_json(
         {"robot": "robot", "version": "9", "state": state, "reason": reason, "config": CONFIG}
+        | {"coverage": {"coverable": 24, "covered": 0 if state == "planning" else 4}}
         | {"errors": errors, "recorder": {"lost": 2}, "map": {"rows": 1}, "troubles": troubles}
     )
 
@@ -130,12 +131,8 @@ def test_parts_are_one_run(parts):
     assert len(parts) >= 2
     told = document(read_review(list(reversed(parts))))
     assert len(told["files"]) == len(parts)
-    assert (told["steps"], told["revisits"], told["turns_180"]) == (5, 2, 1)
     assert told["driven_m"] == pytest.approx(1.5)
-    assert (told["covered_cells"], told["recovered_cells"]) == (4, 2)
-    assert told["coverage_from"] == "trail"
-    # The disc of 0.18 m fits where a cell's centre is that far from the walls of 0.05 m.
-    assert told["coverable_cells"] == 6 * 4
+    assert (told["covered_cells"], told["coverable_cells"]) == (4, 24)
     assert told["reached_s"]["50"] is None
     assert told["complete"] is False
 
@@ -196,7 +193,7 @@ def test_of_a_killed_recorder_all_is_told(tmp_path, parts):
     told, whole = document(read_review(files)), document(read_review(parts))
     assert [file.read_bytes() for file in files] == content
     assert told["files"][-1]["ended"] is False
-    for name in ("steps", "revisits", "covered_cells", "replans_by_reason", "paths", "state"):
+    for name in ("driven_m", "swept_m2", "replans_by_reason", "paths", "state"):
         assert told[name] == whole[name]
     assert told["faults_by_code"]["wrong_frame"] == 2
 
@@ -212,7 +209,7 @@ def test_two_runs_side_by_side(parts, other, tmp_path, capsys):
     one, two = (document_of(read_review(files)) for files in (parts, other))
     both = side_by_side(one, two)
     assert both["difference"]["faults"] == 3
-    assert both["difference"]["steps"] == 0
+    assert both["difference"]["driven_m"] == 0
     assert "complete" not in both["difference"]
     one_alone, both_png = tmp_path / "one.png", tmp_path / "both.png"
     words = ["review", *map(str, parts)]

@@ -322,5 +322,5 @@ def test_a_review_fits_on_one_screen(parts, capsys, terminal_width):
     assert any("start: zone a" in line for line in lines)
     assert main(["review", *map(str, parts), "--long"]) == 0
     full = capsys.readouterr().out
-    for title in ("Orders", "Commands", "Not reached", "Floor left", "Replans in order of time"):
+    for title in ("Orders", "Commands", "Not reached", "Floor left", "Replans"):
         assert title in full

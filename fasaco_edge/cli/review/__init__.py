@@ -29,8 +29,8 @@ Report what happened in a recorded mission, on one screen; with --long all figur
 commands, replans, floor left and why, worst moments and faults. With --at and --point it answers a
 question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
 balance, floor swept again or only driven through, waiting and messages; such a recording takes
---json, --png and --view only. Parts of one run are read together. Files are only read; of files
-that a crash cut short, the whole part is used.
+--json and --png only. Parts of one run are read together. Files are only read; of files that a
+crash cut short, the whole part is used.
 """
 
 
@@ -106,8 +106,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a picture of the run, with --against of both",
     )
-    # An option of earlier releases.
-    parser.add_argument("--html", nargs="?", const=True, help=argparse.SUPPRESS)
     parser.add_argument(
         "--export",
         type=Path,
@@ -123,17 +121,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="what the tables are written as; Parquet keeps types and describes its columns itself "
         "(default: %(default)s)",
     )
-    parser.add_argument("--view", action="store_true", help="open the recording in Rerun's viewer")
 
 
 def run(args: argparse.Namespace) -> int:
     """Review."""
     recordings = [*args.recordings, *(args.against or ())]
-    if args.html:
-        raise BadConfiguration(
-            "--html: review writes no page",
-            hint="fasaco-edge serve FILE.rrd shows the recording in a browser",
-        )
     check_outputs((args.png,), recordings)
     for file in recordings:
         with open_part(file):  # reports a file that is no recording before loading the rest
@@ -177,10 +169,6 @@ def run(args: argparse.Namespace) -> int:
         width = max(len(str(file)) for file, _ in written)
         for file, what in written:
             terminal.err().print(f"{file!s:{width}}  {what}", soft_wrap=True, highlight=False)
-    if args.view:
-        from fasaco_edge.recording.read.repair import view
-
-        view(recordings)
     return 0
 
 

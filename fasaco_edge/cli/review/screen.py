@@ -18,7 +18,7 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
-from fasaco_edge.review.output.panels import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
+from fasaco_edge.review.output.panels import EIGHTHS, PLAIN_EIGHTHS, curve
 from fasaco_edge.review.spot import spots_left
 from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
@@ -55,8 +55,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     _print_table(console, "Not reached", rows.UNREACHED, rows.unreached_rows(document))
     _print_table(console, "Floor left", rows.LEFT, rows.left_rows(document, spots_left(review)))
     _print_table(console, "Reasons of replans", rows.REASONS, rows.reason_rows(document))
-    _print_table(console, "The slowest replans", rows.REPLANS, rows.replan_rows(review))
-    _print_table(console, "Replans in order of time", rows.REPLANS, rows.replans_in_time(review))
+    _print_table(console, "Replans", rows.REPLANS, rows.replan_rows(review))
     moments = rows.moment_rows(review)
     _print_table(console, "Worst moments", ("what", "how much", "at", "context"), moments)
     troubles = rows.trouble_rows(review.troubles)
@@ -106,7 +105,7 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
 
 
 def _print_curve(console: Console, review: Review, height: int) -> None:
-    at_s, shares = covered_share(review)
+    at_s, shares = review.covered_share.T
     if not len(at_s):
         return
     marks = EIGHTHS if console.encoding.startswith("utf") else PLAIN_EIGHTHS

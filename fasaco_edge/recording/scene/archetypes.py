@@ -32,7 +32,6 @@ HEADING_COLOUR: Colour = (250, 204, 21)
 COVERED_COLOUR: Colour = (56, 152, 222)
 RECOVERED_COLOUR: Colour = (245, 140, 40)
 SWEPT_COLOUR: Colour = (45, 212, 191)
-BLOCKED_COLOUR: Colour = (120, 120, 130)
 LABEL_COLOUR: Colour = (255, 255, 255)
 # Bright, as their names are written in them on a dark ground.
 START_COLOUR: Colour = (74, 222, 128)
@@ -46,7 +45,7 @@ ARROW_Z, ROBOT_Z, LABEL_Z = 0.03, 0.06, 0.1
 # Sizes on the screen [points].
 ARROW_WIDTH = 1.0
 MARK_RADIUS = 5.0
-MAP_ORDER, FLOOR_ORDER, COVERAGE_ORDER = 0.0, 0.5, 1.0
+MAP_ORDER, FLOOR_ORDER = 0.0, 0.5
 # Distance of a label above its field, as a share of the field's height.
 LABEL_ABOVE = 0.1
 
@@ -63,7 +62,6 @@ class LineStyle:
     width: float
 
 
-CHANGE = LineStyle((8, 145, 178), z=0.02, width=1.6)
 WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 # They lie below all that moves; the colour is also that of their names, on dark labels.
 ROOM = LineStyle((251, 146, 60), z=0.015, width=1.0)
@@ -73,7 +71,6 @@ DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
 ZONE = LineStyle((37, 99, 235), z=0.052, width=2.0)
 KEEP_OUT = LineStyle((234, 88, 12), z=0.053, width=2.4)
 LINES = {
-    entities.MAP_CHANGE: CHANGE,
     entities.REPLAN_WINDOW: WINDOW,
     entities.ROOMS: ROOM,
     entities.OLD_PATH: OLD_PATH,
@@ -89,16 +86,6 @@ def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
     # -1 becomes 255, unknown in the colour map.
     pixels = grid.cells.view(np.uint8)
     return grid_archetype(grid.geometry, pixels, rr.components.Colormap.RvizMap, MAP_ORDER)
-
-
-def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
-    """Return a coverage grid as a layer over the map: blocked cells are tinted.
-
-    What is covered is drawn as swept floor, which cells exceed.
-    """
-    tints = np.zeros((256, 4), np.uint8)
-    tints[CoverageValue.BLOCKED] = (*BLOCKED_COLOUR, 40)
-    return grid_archetype(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
 
 
 def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:

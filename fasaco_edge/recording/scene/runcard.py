@@ -29,7 +29,6 @@ LEGEND = """\
 - **Robot** red, its front yellow; its **track** green, from **start** to **end**
 - **Path** to drive violet, the previous one pale
 - **Pink frame** around all changes of the map that led to this path, and its reason
-- **Cyan frame** an obstacle came or went
 - **Blue line** a zone of the order, **orange line** a keep-out zone
 - **Pheromone** left by the planner's ants, for its next ants: dark little, bright much
 - **Arrows** where most pheromone leads, bright if one way has nearly all"""

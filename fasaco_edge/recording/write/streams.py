@@ -2,24 +2,15 @@
 
 A stream that is no longer referenced keeps two threads and half a megabyte until ``sweep``. Each
 blueprint that is sent leaves a stream that references itself: a leak, unless disconnected.
-
-A live stream is served, never sent: without a viewer at the other end rerun's memory would grow
-without bound. Viewers join at rerun+http://HOST:PORT/proxy.
 """
 
 from __future__ import annotations
 
-import socket
-
 import numpy as np
 import rerun_bindings as bindings
 
-from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
-
-# Limit on the data kept for a viewer that joins late; the oldest are dropped first.
-MEMORY_LIMIT = "25MB"
 
 
 class LatchedState:
@@ -76,33 +67,6 @@ class LatchedState:
         stream.set_time(entities.WALL_CLOCK, timestamp=np.datetime64(wall_ns, "ns"))
         for timeline, number in self.sequences.items():
             stream.set_time(timeline, sequence=number)
-
-
-def serve_live(recording_id: str, host: str, port: int) -> rr.RecordingStream:
-    """Return a stream that serves its data at ``host``:``port``.
-
-    Raises:
-        BadConfiguration: there is no such address here, or another program listens there.
-    """
-    _try_address(host, port)
-    stream = rr.RecordingStream(entities.APPLICATION, recording_id=recording_id)
-    stream.set_log_time_enabled(False)
-    stream.set_sinks(rr.GrpcServerSink(host, port, server_memory_limit=MEMORY_LIMIT))
-    return stream
-
-
-def _try_address(host: str, port: int) -> None:
-    """Listen there for a moment: rerun does not report failure to listen."""
-    try:
-        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-        with socket.socket(family, socket.SOCK_STREAM) as trial:
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            trial.bind((host, port))
-    except OSError as error:
-        raise BadConfiguration(
-            f"cannot serve at {host}:{port}: {error}",
-            hint="give an address of this computer, and a port that no program listens at",
-        ) from error
 
 
 def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:

@@ -17,17 +17,6 @@ Points = tuple[NDArray[np.float64], NDArray[np.float64]]
 """Times [s], and the values from then on; both float64 (n,)."""
 
 
-def covered_share(review: Review) -> Points:
-    """Return the covered share of the cells coverable at the end, 0 to 1.
-
-    If some were covered before the recording began, the share of the cells known then.
-    """
-    if review.drive is None or review.data.restored_cells:
-        return review.known_fractions[:, 0], review.known_fractions[:, 1]
-    count = len(review.first_s)
-    return review.first_s, (np.arange(count) + 1.0) / max(review.first_of, 1)
-
-
 def replan_times(review: Review) -> Points:
     """Return the time [s] and duration [ms] of each replan."""
     timed = [path for path in review.replans.later if path.plan_ms is not None]
@@ -86,10 +75,7 @@ class TimeAxis:
 
 
 def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
-    """Return a chart of the covered share; of one review also the share of the cells known then.
-
-    ``labels`` name two of them.
-    """
+    """Return a chart of the covered share; ``labels`` name two reviews."""
     time = TimeAxis.over(max(review.duration_s for review in reviews))
     lines = [
         Line(
@@ -97,12 +83,7 @@ def coverage_panel(reviews: Sequence[Review], labels: Sequence[str]) -> Panel:
         )
         for review, label, colour in zip(reviews, labels, COLOURS, strict=False)
     ]
-    if len(reviews) == 1:
-        known = reviews[0].known_fractions
-        points = time.points(known[:, 0], 100 * known[:, 1])
-        lines.append(Line("", FAINT, points, dotted=False, width=1.4))
-    one = "blue: of all cells known at the end; grey: of those known at the time"
-    caption = one if len(reviews) == 1 else "of all cells that each run knew at the end"
+    caption = "of all cells known at the end"
     y = Axis.linear("%", [100.0])
     return Panel("Covered share of all cells", caption, time.axis, y, tuple(lines))
 
@@ -142,7 +123,7 @@ def state_panel(review: Review) -> Panel:
 
 
 def _curve(time: TimeAxis, review: Review) -> tuple[tuple[float, float], ...]:
-    at_s, shares = covered_share(review)
+    at_s, shares = review.covered_share.T
     if not len(at_s):
         return ()
     at_s = np.concatenate(([at_s[0]], at_s, [review.duration_s]))

@@ -72,9 +72,9 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         review: the review.
         space: largest size of the map (width, height) [px].
     """
-    grid, lattice, drive, floor = review.data.grid, review.lattice, review.drive, review.floor
+    grid, lattice, visits, floor = review.data.grid, review.lattice, review.visits, review.floor
     track, driven = _thinned(review.data)
-    if grid is None or lattice is None or drive is None or not len(track):
+    if grid is None or lattice is None or visits is None or not len(track):
         return None
     # A line over the floor covers cells without passing their centres: visits would not show it.
     is_line = known_settings(review.data.config).planner.line != "cells"
@@ -82,14 +82,13 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         grid,
         lattice,
         track,
-        drive.visits,
+        visits,
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
         space=space,
         driven=driven,
         swept=MapLayer(floor.geometry, floor.swept) if floor and is_line else None,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
-        left_out_words=left_out_words(review),
         zones=[zone.polygon for zone in review.data.zones if zone.polygon],
         keep_out=review.data.keep_out,
         rooms=[(one_line(room.title), room.outline) for room in outlined(review.data)],
@@ -177,7 +176,7 @@ def _simulated(review: Review) -> list[str]:
 
 
 def _caption(review: Review) -> list[str]:
-    counts, walk, replans = review.counts, review.walk, review.replans
+    counts, replans = review.data.counts, review.replans
     lines = _simulated(review)
     if counts is not None:
         lines.append(
@@ -188,10 +187,6 @@ def _caption(review: Review) -> list[str]:
         figures = review.floor.figures
         swept = swept_words(figures.swept_m2, figures.reachable_m2)
         lines.append(f"floor swept: {swept}, by recorded poses")
-    if walk is not None:
-        lines.append(
-            f"{walk.steps:,} steps, {walk.revisits:,} revisits, {walk.turns_90:,} quarter-turns"
-        )
     median, slowest = replans.milliseconds(50), replans.milliseconds(100)
     if median is not None and slowest is not None:
         lines.append(
@@ -199,18 +194,6 @@ def _caption(review: Review) -> list[str]:
             f"{slowest:.0f} ms at worst; {review.faults.total:,} messages refused"
         )
     return lines
-
-
-def left_out_words(review: Review) -> str:
-    """Return what cells are called that the track did not pass.
-
-    The daemon also counts what was covered before the recording began, or beside a track.
-    """
-    counts, drive = review.counts, review.drive
-    has_counted_more = (
-        counts is not None and drive is not None and (counts.covered > drive.coverage.covered)
-    )
-    return "not passed while it was recorded" if has_counted_more else "not covered"
 
 
 def _thinned(

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 from msgspec.structs import astuple
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.review.comparison import figures
-from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.document import MILESTONES, ReviewDocument
 from fasaco_edge.review.orders import order_words
 from fasaco_edge.review.rooms import room_at
 from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
@@ -27,7 +25,6 @@ if TYPE_CHECKING:
 REASONS = ("reason", "replans", "median", "slowest")
 REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
 """Columns of ``reason_rows`` and ``replan_rows``."""
-MOST_REPLANS = 8
 # The most important settings; the others are in the run card and in the JSON document.
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
@@ -108,11 +105,6 @@ def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     return [(clock(each.at_s), each.command) for each in document.commands]
 
 
-def replans_in_time(review: Review) -> list[tuple[str, ...]]:
-    """Return all replans as ``replan_rows`` has the slowest ones, in order of time."""
-    return [_replan_row(path) for path in review.replans.later]
-
-
 def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str]]:
     """Return the most important rows: with verdict and curve they fit on one screen."""
     by_name = {figure.name: figure.text for figure in figures(document)}
@@ -122,9 +114,8 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     reached = [
         f"{percent} % {by_name[f'{percent} % of cells covered after']}" for percent in MILESTONES
     ]
-    slowest = review.replans.slowest
     replans = f"{document.replans}"
-    if slowest is not None and document.replan_ms_p50 is not None:
+    for slowest in review.replans.slowest_first[:1]:
         replans += f", {amount(document.replan_ms_p50, 'ms')} in the median"
         replans += f", the slowest {amount(slowest.plan_ms, 'ms')} at {clock(slowest.at_s)}"
     left = [f"{patch.m2:.2f} m2 at ({patch.x:.2f}, {patch.y:.2f})" for patch in document.left]
@@ -145,7 +136,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
         ("not reached", _some(unreached)),
-        ("driven", f"{amount(document.driven_m, 'm')}, {count(document.steps, 'steps')}"),
+        ("driven", amount(document.driven_m, "m")),
         ("replans", replans),
         *([("processor", _processor(document))] if document.processor_s else []),
         ("commands", _some(commands)),
@@ -170,9 +161,7 @@ def _shares(document: ReviewDocument) -> str:
 def _lost_way(review: Review) -> str:
     """Return over how much of its way the robot's poses are missing; "" over little."""
     data = review.data
-    if len(data.poses) < 2:
-        return ""
-    ways_m = np.hypot(*np.diff(data.track[:, :2], axis=0).T)[~data.driven]
+    ways_m = data.lengths_m[~data.driven]
     if ways_m.sum() < LEAST_LOST_M:
         return ""
     gaps = f"{len(ways_m)} gap{'s' * (len(ways_m) != 1)}"
@@ -279,8 +268,8 @@ def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
 
 
 def replan_rows(review: Review) -> list[tuple[str, ...]]:
-    """Return the slowest replans: time, duration, plan, change of the map, reason."""
-    return [_replan_row(path) for path in review.replans.slowest_first(MOST_REPLANS)]
+    """Return the replans: time, duration, plan, change of the map, reason."""
+    return [_replan_row(path) for path in review.replans.later]
 
 
 def _replan_row(path: PathSample) -> tuple[str, ...]:
