@@ -89,8 +89,9 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     """Print the figures of two documents side by side."""
     console = terminal.out()
     names = (one.recording, other.recording)
-    _say(console, setup_words(one, other), style="bold")
-    _print_table(console, "Set-up", ("", *names), setup_differences(one, other))
+    setup = setup_differences(one, other)
+    _say(console, setup_words(setup), style="bold")
+    _print_table(console, "Set-up", ("", *names), setup)
     compared = compared_rows(one, other)
     _print_table(console, "Two runs", ("", *names, "difference"), compared)
     counts = [
