@@ -257,6 +257,18 @@ def test_how_decided_the_trail_is_is_a_curve(recorded):
     assert last == pytest.approx(1.03, abs=0.01)
 
 
+def test_the_card_says_how_it_ended_from_then_on_only(recorded):
+    states = read_column(recorded.path, entities.MISSION_STATE, "StateChange:state")
+    done_ns = states.wall_ns[states.values.index(["done"])]
+    cards = read_column(recorded.path, entities.RUN_CARD, "TextDocument:text")
+    said = {
+        at_ns: text for at_ns, (text,) in zip(cards.wall_ns.tolist(), cards.values, strict=True)
+    }
+    assert any("**under way**" in text for text in said.values())
+    # The card of the end comes just before the state.
+    assert ["**done**" in text for text in said.values()] == [at >= done_ns - 1 for at in said]
+
+
 def test_a_malformed_sample_costs_that_sample(recorded):
     assert recorded.report["malformed"] == 1
     assert recorded.report["lost"] == 0

@@ -1,4 +1,4 @@
-"""The run card: the settings of a run and a legend, shown when its recording is opened."""
+"""The run card: the outcome of a run, a legend and its settings, beside the map."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-from fasaco_edge.text import one_line
-from fasaco_edge.wire.documents.settings import Settings
+from fasaco_edge.client.phrases import scale_words
+from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.text import duration, one_line
+from fasaco_edge.wire.documents.settings import Settings, known_settings
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.reasons import plain
 
 # The most important settings come first, the others by name.
 FIRST = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
@@ -51,7 +55,7 @@ class RunDescription:
         config: its configuration from its status.
         pheromone_range: least and greatest pheromone of all fields; None while there is none.
         anchor: point (x, y) [m] of the map frame that is drawn at 0; None for 0 itself.
-        outcome: of the mission; "" while it is under way.
+        outcome: of the mission, as far as known.
     """
 
     robot: str
@@ -144,3 +148,43 @@ def _rank(setting: tuple[str, object]) -> tuple[int, str]:
 def markdown_cell(value: object) -> str:
     """Return a value escaped for Markdown: no link, no picture, no HTML, no further cell."""
     return MARK_UP.sub(r"\\\g<0>", one_line(str(value)))
+
+
+# States in which there is no outcome yet.
+UNDER_WAY = ("planning", "covering")
+UNDER_WAY_LINE = "**under way**"
+
+
+class Outcome:
+    """The outcome of a mission, as far as known at the time.
+
+    Attributes:
+        text: its line in the run card; "" before the first status.
+    """
+
+    def __init__(self) -> None:
+        self.text = ""
+        self._began_ns = self._now_ns = 0
+        self._state = ""
+
+    def add_pose(self, stamped: StampedPose) -> None:
+        """Note the robot's clock; a robot without one has stamps of 0."""
+        self._began_ns, self._now_ns = self._began_ns or stamped.stamp_ns, stamped.stamp_ns
+
+    def add_status(self, status: Status) -> None:
+        """Note the mission's state, once when it is entered."""
+        if status.state == self._state:
+            return
+        self._state, self.text = status.state, UNDER_WAY_LINE
+        if status.state in UNDER_WAY:
+            return
+        words = f"**{status.state}**"
+        if self._now_ns > self._began_ns:
+            words += f" after {duration(1e-9 * (self._now_ns - self._began_ns))}"
+        if simulated := scale_words(known_settings(status.config).robot.time_scale):
+            words += f" ({simulated})"
+        said = [plain(status.reason)] if status.reason else []
+        floor = status.floor
+        if floor is not None and floor.reachable_m2 and "swept" not in status.reason:
+            said.append(f"{floor.swept_m2:.1f} of {floor.reachable_m2:.1f} m2 swept")
+        self.text = ": ".join([words, *filter(None, ["; ".join(said)])])

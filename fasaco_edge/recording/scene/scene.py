@@ -31,8 +31,7 @@ from fasaco_edge.recording.scene.layers import (
     is_far_from,
     size_in_file,
 )
-from fasaco_edge.recording.scene.outcome import UNDER_WAY, Outcome
-from fasaco_edge.recording.scene.runcard import RunDescription
+from fasaco_edge.recording.scene.runcard import UNDER_WAY, Outcome, RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.text import one_line
@@ -332,7 +331,8 @@ class Scene:
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
-        self._writer.log_static(entities.RUN_CARD, card)
+        # With a time, as the outcome is not known before the end.
+        self._writer.log(entities.RUN_CARD, card, latched=True)
         self._writer.describe(self._run.name, self._run.properties())
 
     def _draw_robot(self, radius_m: float) -> None:
