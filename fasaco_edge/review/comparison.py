@@ -8,7 +8,6 @@ from typing import TypeGuard
 
 import msgspec
 
-from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.review.document import MILESTONES, ReviewDocument
 from fasaco_edge.review.wording import NOT_KNOWN, clock, count
 
@@ -165,11 +164,7 @@ def figures(document: ReviewDocument) -> Iterator[Figure]:
     yield Figure("duration", clock(document.duration_s), document.duration_s)
     text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
     yield Figure("covered", text, covered)
-    swept_m2, reachable_m2 = document.swept_m2, document.reachable_m2
-    text = NOT_KNOWN
-    if swept_m2 is not None and reachable_m2 is not None:
-        text = swept_words(swept_m2, reachable_m2)
-    yield Figure("floor swept", text, swept_m2)
+    yield Figure("floor swept", document.swept_words or NOT_KNOWN, document.swept_m2)
     patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
     yield Figure("patches left, over 4 dm2", count(patches, ""), patches)
     yield Figure("largest patch left", count(largest_m2, "m2"), largest_m2)

@@ -38,6 +38,11 @@ class RoomChapter:
     skip: bool
 
     @property
+    def share(self) -> float | None:
+        """Its swept share, by recorded poses, or else as the daemon counted it."""
+        return self.counted_share if self.swept_share is None else self.swept_share
+
+    @property
     def title(self) -> str:
         """Its name, or its number in words."""
         return one_line(self.name) or f"room {self.room}"

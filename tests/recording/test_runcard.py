@@ -109,6 +109,11 @@ def outcome(*states, driven_s=90.0, first_ns=5_000_000_000, **members):
         (outcome(("covering", "")), "**under way**"),
         (outcome(("done", "all is covered")), "**done** after 1 min 30 s: all is covered"),
         (outcome(("done", "all is covered"), first_ns=0), "**done**: all is covered"),
+        (
+            outcome(("done", "every reachable cell is covered; 47.7 of 49.4 m2 of floor swept")),
+            "**done** after 1 min 30 s: the tool has passed the centre of every cell that it "
+            "reaches; 47.7 of 49.4 m2 of floor swept",
+        ),
         (outcome(("done", "9 m2 swept"), floor=FLOOR), "**done** after 1 min 30 s: 9 m2 swept"),
         (
             outcome(("degraded", "it stands"), floor=FLOOR, **SIMULATED),

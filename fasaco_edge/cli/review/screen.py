@@ -40,7 +40,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
         if full:
             console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
         else:
-            console.print(_fitting(verdict, console.width))
+            console.print(verdict)
     if not full:
         _print_screen(console, review, document, more=len(verdicts) - MOST_VERDICTS)
         return
@@ -70,19 +70,8 @@ def _print_screen(console: Console, review: Review, document: ReviewDocument, *,
     if more > 0:
         console.print(f"and {more} more orders")
     _print_curve(console, review, SCREEN_PLOT_HEIGHT)
-    for name, text in rows.screen_rows(review, document):
-        line = Text.assemble((f"{name:<12}", "cyan"), one_line(text))
-        console.print(_fitting(line, console.width))
-    hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a browser: serve FILE"
-    console.print(_fitting(Text(hint), console.width))
-
-
-def _fitting(text: Text, width: int) -> Text:
-    """Return a text that takes one line of the terminal."""
-    if text.cell_len > width:
-        text.truncate(width - 3)
-        text.append("...")
-    return text
+    console.print(terminal.summary(rows.screen_rows(review, document)))
+    console.print("more: --long; a moment: --at MM:SS; a spot: --point X,Y; a browser: serve FILE")
 
 
 def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:

@@ -105,10 +105,13 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
 
 def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
     """Return the label over the living trail: its path, and how decided it is."""
-    text = (
-        f"pheromone at path {about.revision}, {message.best_steps} steps to drive\n"
-        f"branching factor {about.branching:.2f} (1: one way in each cell, 4: none is preferred)"
-    )
+    text = f"pheromone at path {about.revision}, "
+    if message.best_steps:
+        text += f"{message.best_steps} steps to drive\nbranching factor {about.branching:.2f} "
+        text += "(1: one way in each cell, 4: none is preferred)"
+    else:
+        # Without a way to drive it says nothing how many ways a cell has.
+        text += "nothing left to drive"
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 
 

@@ -42,6 +42,7 @@ from fasaco_edge.wire.documents.status import TROUBLES, ErrorCounts, Recorder, S
 from fasaco_edge.wire.messages.maps import directions_of
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
+from fasaco_edge.wire.reasons import plain
 
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
@@ -235,7 +236,7 @@ class Scene:
             # The plans came before, and a viewer orders lines of one time by entity.
             self._paths.finish()
             self._writer.at(self._writer.wall_ns + 1)
-        self.enter(entities.MISSION_STATE, status.state, status.reason)
+        self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
         self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
         self._add_troubles(status)
         self._add_errors(status.errors)

@@ -34,7 +34,7 @@ LEFT = ("m2", "at", "why")
 """Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
 ROOMS = ("room", "m2", "time", "entered", "swept", "passes", "left")
 """Columns of ``room_rows``."""
-MOST_PLACES = 3
+MOST_PLACES = 2
 # Less of a way without poses is not shown [m].
 LEAST_LOST_M = 1.0
 CHARGES = ("at", "for", "battery")
@@ -79,7 +79,6 @@ def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]
     at = {patch: room_at(review.data, (patch.x, patch.y)) for patch in document.left}
     found: list[tuple[str, ...]] = []
     for room in document.rooms:
-        share = room.counted_share if room.swept_share is None else room.swept_share
         patches = [
             f"{patch.m2:.2f} at ({patch.x:.2f}, {patch.y:.2f})"
             for patch, there in at.items()
@@ -92,7 +91,7 @@ def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]
                 f"{room.area_m2:.1f}",
                 clock(room.seconds),
                 str(room.entered),
-                NOT_KNOWN if share is None else f"{100 * share:.1f} %",
+                NOT_KNOWN if room.share is None else f"{100 * room.share:.1f} %",
                 "-" if room.passes is None else str(room.passes),
                 left + (f": {_some(patches)}" if patches else ""),
             )
@@ -119,43 +118,42 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         replans += f", {amount(document.replan_ms_p50, 'ms')} in the median"
         replans += f", the slowest {amount(slowest.plan_ms, 'ms')} at {clock(slowest.at_s)}"
     left = [f"{patch.m2:.2f} m2 at ({patch.x:.2f}, {patch.y:.2f})" for patch in document.left]
-    areas = [area for order in document.orders[-1:] for area in order.unreached]
     unreached = [
-        f"{area.m2:.2f} m2 at ({area.x:.2f}, {area.y:.2f}) {area.reason}" for area in areas
+        f"{area.m2:.2f} m2 at ({area.x:.2f}, {area.y:.2f}) {area.reason}"
+        for order in document.orders[-1:]
+        for area in order.unreached
     ]
     troubles = [
         f"{t.state} {clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s" for t in document.troubles
     ]
     commands = [" ".join(row) for row in command_rows(document)]
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
-    return [
+    has_count = document.covered_cells is not None
+    found = [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
         *clock_rows(document),
         ("floor swept", _swept(document, by_name["floor swept"])),
-        ("covered", by_name["covered"]),
+        ("covered", by_name["covered"] + ": the tool passed their centres" * has_count),
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
         ("not reached", _some(unreached)),
         ("driven", amount(document.driven_m, "m")),
         ("replans", replans),
-        *([("processor", _processor(document))] if document.processor_s else []),
+        ("processor", _processor(document)),
         ("commands", _some(commands)),
-        *([("rooms", _shares(document))] if document.rooms else []),
-        *([("charges", _some(charges))] if charges else []),
-        *([("poses", lost)] if (lost := _lost_way(review)) else []),
-        ("troubles", _some(troubles)),
+        ("rooms", _shares(document)),
+        ("charges", _some(charges)),
+        ("poses", _lost_way(review)),
+        ("troubles", _some(troubles) or "none"),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
+    return [(name, text) for name, text in found if text]
 
 
 def _shares(document: ReviewDocument) -> str:
     """Return the swept share of each room, those with the least first."""
-    shares = [
-        (room.counted_share if room.swept_share is None else room.swept_share, room.title)
-        for room in document.rooms
-    ]
-    known = sorted((share, title) for share, title in shares if share is not None)
-    return ", ".join(f"{title} {share:.0%}" for share, title in known) or NOT_KNOWN
+    known = sorted((room.share, room.title) for room in document.rooms if room.share is not None)
+    return ", ".join(f"{title} {share:.0%}" for share, title in known)
 
 
 def _lost_way(review: Review) -> str:
@@ -169,7 +167,9 @@ def _lost_way(review: Review) -> str:
 
 
 def _processor(document: ReviewDocument) -> str:
-    daemon, recorder = document.processor_s or 0.0, document.recorder_processor_s
+    daemon, recorder = document.processor_s, document.recorder_processor_s
+    if not daemon:
+        return ""
     told = f"daemon {amount(daemon, 's')}"
     if document.recorded_s:
         told += f" ({100 * daemon / document.recorded_s:.1f} % of a core)"
@@ -178,7 +178,7 @@ def _processor(document: ReviewDocument) -> str:
 
 def _some(texts: Sequence[str]) -> str:
     more = f"; {len(texts) - MOST_PLACES} more" if len(texts) > MOST_PLACES else ""
-    return "; ".join(texts[:MOST_PLACES]) + more or "none"
+    return "; ".join(texts[:MOST_PLACES]) + more
 
 
 def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
@@ -205,7 +205,8 @@ def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
 
 def _ending(document: ReviewDocument) -> str:
     if document.complete:
-        return "complete: every reachable cell of the order is covered"
+        floor = f"; {document.swept_words} of floor swept" if document.swept_words else ""
+        return f"complete: every cell covered{floor}"
     if document.complete is None:
         return "not recorded whether it was completed"
     covered, coverable = document.covered_cells, document.coverable_cells
