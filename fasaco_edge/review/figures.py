@@ -88,6 +88,7 @@ def document_of(review: Review) -> ReviewDocument:
     for member, entity in PLOTTED.items():
         if (points := record.plots.get(entity)) is not None:
             setattr(document, member, _rounded(float(points[:, 1].max())))
+    document.threads_max = max((each.status.threads for each in data.statuses), default=0) or None
     document.processor_s = _rounded(_used([each.status.cpu_s for each in data.statuses]))
     of_recorder = record.plots.get(entities.RECORDER_CPU_S)
     if of_recorder is not None:
@@ -125,7 +126,6 @@ PLOTTED = {
     "memory_mb_max": f"{entities.MEMORY}/planner",
     "recorder_memory_mb_max": f"{entities.MEMORY}/recorder",
     "processor_percent_max": entities.PROCESSOR,
-    "threads_max": entities.THREADS,
 }
 """Members that are the most of a curve, and the curve."""
 

@@ -119,7 +119,8 @@ def test_a_line_keeps_its_corners_and_loses_the_rest():
     [
         (
             9,
-            "9 steps to drive\nbranching factor 1.75 (1: one way in each cell, 4: none is preferred)",
+            "9 steps to drive\nbranching factor 1.75 "
+            "(1: one way in each cell, 4: none is preferred)",
         ),
         (0, "nothing left to drive"),
     ],

@@ -62,31 +62,6 @@ def test_what_is_asked_for_first_stands_in_a_line():
     assert card.startswith("**r2**, version 1.0, seed 7\n")
 
 
-def test_the_range_of_the_pheromone_is_a_property():
-    told = RunDescription("r2", "2026-01-01", pheromone_range=(0.1, 0.25)).properties()
-    assert (told["trail_min"], told["trail_max"]) == ("0.1", "0.25")
-    assert "trail_min * (trail_max / trail_min)" in told["trail"]
-    assert "trail" not in RunDescription("r2", "2026-01-01").properties()
-
-
-@pytest.mark.parametrize(
-    ("field", "known"),
-    [
-        ((0.15, 0.3), (0.1, 0.5)),
-        ((0.095, 0.54), (0.1, 0.5)),  # not by a tenth
-        ((0.0, 0.0), (0.1, 0.5)),  # no cell is coverable
-        ((0.05, 0.3), (0.05, 0.5)),
-        ((0.15, 0.6), (0.1, 0.6)),
-    ],
-)
-def test_the_range_of_the_pheromone_widens(field, known):
-    first = RunDescription("r2", "2026-01-01").with_pheromone(0.1, 0.5)
-    assert first.pheromone_range == (0.1, 0.5)
-    after = first.with_pheromone(*field)
-    assert after.pheromone_range == known
-    assert (after is first) == (known == (0.1, 0.5))
-
-
 FLOOR = {"swept_m2": 47.7, "reachable_m2": 49.4, "left": None, "out_of_reach": None}
 SIMULATED = {"config": {"robot": {"time_scale": 20.0}}}
 

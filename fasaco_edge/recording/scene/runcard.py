@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.grid.geometry import StampedPose
@@ -22,26 +22,17 @@ HEAD = (
     ("radius_m", "radius", " m"),
 )
 
-# The range of the pheromone is updated if it grows by this factor.
-SLACK = 1.1
-
 # Markdown characters that end a cell, or make links, pictures and HTML.
 MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 
 LEGEND = """\
 - **Map** white free, black occupied, grey unknown; **turquoise** swept floor
 - **Robot** red, its front yellow; its **track** green, from **start** to **end**
-- **Path** to drive violet, the previous one pale
+- **Path** to drive violet
 - **Pink frame** around all changes of the map that led to this path, and its reason
 - **Blue line** a zone of the order, **orange line** a keep-out zone
 - **Pheromone** left by the planner's ants, for its next ants: dark little, bright much
 - **Arrows** where most pheromone leads, bright if one way has nearly all"""
-
-# Each field has its own range, so that it is never flat.
-LEVELS = (
-    "level l from 1 to 255 is trail_min * (trail_max / trail_min) ** ((l - 1) / 254), by the "
-    "metrics/trail/min and max of that time; level 0 cannot be covered"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +44,6 @@ class RunDescription:
         began: when the recording began, UTC, as text.
         version: of the planner; "" while unknown.
         config: its configuration from its status.
-        pheromone_range: least and greatest pheromone of all fields; None while there is none.
         anchor: point (x, y) [m] of the map frame that is drawn at 0; None for 0 itself.
         outcome: of the mission, as far as known.
     """
@@ -62,21 +52,8 @@ class RunDescription:
     began: str
     version: str = ""
     config: Settings = field(default_factory=dict)
-    pheromone_range: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
     outcome: str = ""
-
-    def with_pheromone(self, least: float, most: float) -> RunDescription:
-        """Return it with the range widened by a field's least and greatest pheromone; 0 for none.
-
-        A range that grows by less than ``SLACK`` stays.
-        """
-        if most <= 0:
-            return self  # no cell is coverable
-        low, high = self.pheromone_range or (least, most)
-        if self.pheromone_range and least * SLACK >= low and most <= high * SLACK:
-            return self
-        return replace(self, pheromone_range=(min(least, low), max(most, high)))
 
     @property
     def name(self) -> str:
@@ -89,9 +66,6 @@ class RunDescription:
         settings = {
             name.replace(".", "_"): str(value) for name, value in flat_settings(self.config)
         }
-        if self.pheromone_range:
-            least, most = self.pheromone_range
-            known |= {"trail_min": f"{least:.6g}", "trail_max": f"{most:.6g}", "trail": LEVELS}
         if self.anchor:
             x, y = self.anchor
             known |= {"drawn_from_x_m": f"{x:.0f}", "drawn_from_y_m": f"{y:.0f}"}
@@ -104,9 +78,6 @@ class RunDescription:
             ("began", self.began),
             ("version", self.version or "unknown until the first status"),
         ]
-        if self.pheromone_range:
-            least, most = self.pheromone_range
-            rows.append(("pheromone", f"{least:.3g} to {most:.3g}, log scale"))
         if self.anchor:
             x, y = self.anchor
             rows.append(("drawn from", f"x {x:.0f} m, y {y:.0f} m of the map's frame"))

@@ -139,7 +139,9 @@ class Scene:
         self._rooms = named
 
         points = sum(len(outline) for _, outline in named)
-        self._draw(entities.ROOMS, POINT_BYTES * points, lambda: self._polygons(draw.ROOM, named))
+        self._draw(
+            entities.ROOMS, 2 * POINT_BYTES * points, lambda: self._polygons(draw.ROOM, named)
+        )
 
     def _draw_areas(self) -> None:
         """Draw the zones of the order, its keep-outs and the operator's."""
@@ -192,7 +194,6 @@ class Scene:
             return
         message = self._anchored(message.geometry.origin).grid(message)
         self._curves.draw(entities.BRANCHING, about.branching)
-        self._curves.draw(entities.TRAIL_CELLS, about.cells)
 
         def draw_pheromone() -> rr.GridMap:
             label = draw.trail_label(message, about)
@@ -204,10 +205,6 @@ class Scene:
         # The scale of the levels, to decode them into trails.
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
-        known = self._run.with_pheromone(message.trail_min, message.trail_max)
-        if known is not self._run:
-            self._run = known
-            self._describe()
 
     def add_directions(self, grid: OccupancyGrid) -> None:
         """Draw the directions of the living trail."""

@@ -13,7 +13,7 @@ import os
 import re
 import shutil
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 from fasaco_edge.config.config import DaemonConfig
@@ -76,48 +76,27 @@ class Quota:
 def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     """Return the parts of a robot's recordings, each with its size [bytes], the oldest first.
 
-    Runs named by earlier releases, without a number, come first. Among themselves they are ordered
-    by their last write: the later of the file's time and the time in the name, which differ for a
-    copy.
+    Runs named by earlier releases, without a number, come first, by the times in their names.
 
     Raises:
         OSError: the folder cannot be read.
     """
     named = re.compile(
         # Without a leading number, a second run within a second has a trailing one.
-        r"(?P<run>(?:run(?P<order>\d{5,9})-)?(?P<when>\d{8}T\d{6}Z)-"
-        rf"{re.escape(robot)}(?(order)|(?:-(?P<again>\d+))?))-part(?P<number>\d+)\.rrd"
+        rf"(?:run(\d{{5,9}})-)?(\d{{8}}T\d{{6}}Z)-{re.escape(robot)}(?(1)|(?:-(\d+))?)-part(\d+)\.rrd"
     )
-    found, last = [], dict[str, float]()
     matches = {path: match for path in folder.iterdir() if (match := named.fullmatch(path.name))}
-    runs = {match["run"] for match in matches.values()}
+    firsts = {match[2] for match in matches.values() if not match[1] and not match[3]}
+    found = []
     for path, match in matches.items():
-        # A number after the name may be the end of another robot's name: of two numbers the second
-        # is ours.
-        if match["again"] and f"{match['when']}-{robot}" not in runs:
-            continue
-        if path.is_file() and not path.is_symlink():
-            status = path.stat()
-            found.append((match, path, status.st_size))
-            written = max(_time(match["when"]), status.st_mtime)
-            last[match["run"]] = max(last.get(match["run"], 0.0), written)
-
-    def age(part: tuple[re.Match[str], Path, int]) -> tuple[int, float, int, int]:
-        match, _, _ = part
-        number = int(match["number"])
-        if match["order"]:
-            return int(match["order"]), 0.0, 1, number
-        return 0, last[match["run"]], int(match["again"] or 1), number
-
-    return [(path, size) for _, path, size in sorted(found, key=age)]
-
-
-def _time(when: str) -> float:
-    """Return the time in a name [s]; 0 for an invalid date."""
-    try:
-        return datetime.strptime(when, TIME).replace(tzinfo=UTC).timestamp()
-    except ValueError:
-        return 0.0
+        run, began, again, part = match.groups()
+        # A number after the name may be the end of another robot's name: then the first of the
+        # runs of that second is missing.
+        is_ours = not again or began in firsts
+        if is_ours and path.is_file() and not path.is_symlink():
+            age = (int(run), "", 0) if run else (0, began, int(again or 1))
+            found.append((*age, int(part), path, path.stat().st_size))
+    return [(path, size) for *_, path, size in sorted(found)]
 
 
 def _delete(path: Path) -> bool:
