@@ -19,7 +19,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
-from fasaco_edge.replay.replay import Replay, read_run
+from fasaco_edge.replay.replay import PROPOSALS, Replay, read_run
 from fasaco_edge.text import shown
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
 
@@ -38,11 +38,10 @@ code 1. One without is replayed approximately: time is that of the samples and p
 in work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
-The column `then` shows whether the path equals the recorded one cell by cell. Without a turn log
-a recording does not show in full which samples the daemon took together, nor the work of plans
-that were not used: a different path is no error then. With --config or --work the replay is of
-another mission, and approximate, too. So is that of a daemon of an earlier release which planned
-with a planner of the user's own: those plans cannot be repeated, and `planner.name` plans instead.
+The column `then` shows whether the path equals the recorded one cell by cell; without a turn log
+paths are not compared. With --config or --work the replay is of another mission, and approximate,
+too. So is that of a daemon of an earlier release which planned with a planner of the user's own:
+those plans cannot be repeated, and `planner.name` plans instead.
 """
 
 
@@ -64,7 +63,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--work",
         type=_count,
         metavar="N",
-        help="proposals of each plan (default: as recorded with its path)",
+        help=f"proposals of each plan, where there is no turn log (default: {PROPOSALS})",
     )
     parser.add_argument("--json", action="store_true", help="print a JSON document")
 
@@ -82,7 +81,8 @@ def run(args: argparse.Namespace) -> int:
     if record is not None:
         replay = CycleReplay(config, record)
     else:
-        replay = Replay(config, recorded, args.work)
+        work = PROPOSALS if args.work is None else args.work
+        replay = Replay(config, recorded.ready_ns, work)
     began = time.monotonic()
     steps: list[ReplayStep] = []
     last_s = 0.0
@@ -145,7 +145,7 @@ class Summary(msgspec.Struct):
     plans: int
     paths: int
     paths_recorded: int
-    paths_as_recorded: int
+    paths_as_recorded: int | None
     faults: dict[str, int]
     samples_missing: int
     restored_cells_missing: int
@@ -174,9 +174,9 @@ def _summary(
         plans=mission.route.plans,
         paths=mission.route.revision,
         paths_recorded=len(recorded.paths),
-        paths_as_recorded=sum(
-            step.as_recorded is True for step in steps if step.decision.path is not None
-        ),
+        paths_as_recorded=None
+        if is_approximate
+        else sum(step.as_recorded is True for step in steps if step.decision.path is not None),
         faults=dict(sorted(faults.items())),
         samples_missing=samples.missing,
         restored_cells_missing=recorded.restored_cells if is_approximate else 0,
@@ -216,9 +216,10 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
         ("ended", f"{summary.state}: {summary.reason}"),
         ("covered", f"{summary.covered_cells} of {summary.coverable_cells} cells"),
         ("plans, paths", f"{summary.plans}, {summary.paths}"),
-        ("as recorded", f"{summary.paths_as_recorded} of {summary.paths_recorded} paths"),
         ("refused", faults or "nothing"),
     ]
+    if (same := summary.paths_as_recorded) is not None:
+        rows.append(("as recorded", f"{same} of {summary.paths_recorded} paths"))
     if own := summary.own_planner_missing:
         rows.append(("own planner", f"{shown(own)}: its plans cannot be repeated"))
     if summary.samples_missing:

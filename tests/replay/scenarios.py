@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from msgspec.structs import asdict
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
@@ -18,8 +17,6 @@ from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.replay.mission_drive import ReplayStep
 from fasaco_edge.replay.replay import Replay, read_run
-from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PlanFigures, digest
 from fasaco_edge.wire.messages.maps import (
     decode_map_update,
     decode_occupancy_grid,
@@ -68,7 +65,6 @@ class Story:
                 step.decision.plan and step.decision.plan.reason,
                 step.decision.path and (step.decision.path.revision, step.decision.path.reason),
                 step.decision.path and step.decision.path.cells.tobytes(),
-                step.as_recorded,
             )
             for step in self.news
         ]
@@ -76,7 +72,7 @@ class Story:
 
 def played(samples: Samples, config: DaemonConfig) -> Story:
     """Play ``samples``; whatever they are, no path is illegal and no claim false."""
-    replay = Replay(config, read_run(samples))
+    replay = Replay(config, read_run(samples).ready_ns)
     mission, news, map_revision = replay.mission, [], 0
     for step in replay.steps(samples):
         if step.is_news:
@@ -193,26 +189,6 @@ def mapper_restarted(samples: Samples, index: int) -> Samples:
     It knows only what it has seen since, so its maps have another origin.
     """
     return [*samples[:index], *_new_mapper(samples, index)]
-
-
-def with_paths(samples: Samples, story: Story) -> Samples:
-    """Record with the samples the paths that they led to."""
-    lattice = story.mission.lattice
-    paths = []
-    for step in story.news:
-        if (update := step.decision.path) is None:
-            continue
-        at_ns = samples[0].at_ns + round(1e9 * step.at_s)
-        about = {
-            "revision": update.revision,
-            "reason": update.reason,
-            **asdict(PlanFigures.of(update.plan)),
-        }
-        points = lattice.centres(update.cells).tobytes()
-        sample = Sample("robot/path", digest(points), attachment=encode_json(about))
-        wall_ns = at_ns + samples[0].wall_ns - samples[0].at_ns
-        paths.append(Arrival(PATH_DIGEST, sample, at_ns, wall_ns))
-    return sorted([*samples, *paths], key=lambda sample: sample.wall_ns)
 
 
 def moved(sample: Arrival, by_ns: int) -> Arrival:

@@ -89,7 +89,7 @@ def test_every_decision_is_as_it_was(which, request):
     assert all(paths)
     recorded = read_run(samples).paths.values()
     # A mission that drives when its daemon ends has its path withdrawn after the last step.
-    assert len(paths) == len([path for path in recorded if path.reason != "the daemon ends"])
+    assert len(paths) == len([reason for reason in recorded if reason != "the daemon ends"])
     assert len(paths) == recording.status["path"]["revision"]
     assert replay.plans > 2
     assert replay.mission.state == recording.status["state"]
