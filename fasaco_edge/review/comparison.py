@@ -48,7 +48,6 @@ NUMBERS = (
     ("replan, slowest", "replan_ms_max", "ms"),
     ("plans made", "plans", ""),
     ("plans that became no path", "plans_unused", ""),
-    ("slowest plan", "plan_ms_max", "ms"),
     ("attempts at a better path", "attempts", ""),
     ("attempts that found one", "attempts_used", ""),
     ("memory of the daemon, most", "memory_mb_max", "MB"),

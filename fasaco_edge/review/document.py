@@ -12,11 +12,10 @@ import msgspec
 from fasaco_edge.judge.floor import swept_words
 
 if TYPE_CHECKING:
-    from fasaco_edge.review.moments import Moment
+    from fasaco_edge.review.moments import Stand
     from fasaco_edge.review.orders import CommandThen, OrderChapter
     from fasaco_edge.review.rooms import RoomChapter
     from fasaco_edge.review.spot import LeftPatch
-    from fasaco_edge.wire.documents.path_documents import Rectangle
 
 
 MILESTONES = (50, 90, 99, 100)
@@ -43,22 +42,6 @@ class MapSize(msgspec.Struct):
     def sides_m(self) -> tuple[float, float]:
         """Width and depth [m]."""
         return self.cols * self.resolution_m, self.rows * self.resolution_m
-
-
-class Replan(msgspec.Struct):
-    """A replan that became a path."""
-
-    at_s: float | None
-    revision: int
-    reason: str
-    plan_ms: float | None
-    steps: int
-    planned_steps: int | None
-    lower_bound_steps: int | None
-    lower_bound_cost_s: float | None
-    gap: float | None
-    cost_s: float | None
-    changed: Rectangle | None
 
 
 class TimesTaken(msgspec.Struct):
@@ -144,9 +127,8 @@ class ReviewDocument(msgspec.Struct):
             itself, from where the robot was then: planned_steps, lower_bound_steps, cost_s (driving
             it, by the configuration), lower_bound_cost_s and gap (cost_s over that bound, as a
             share of it); changed, the changed rectangle of the map that caused it [m].
-        plans, plans_unused: by the turn log: all plans; plans that became no path, as they equalled
-            the current one or were outdated.
-        plan_ms_p50, plan_ms_p99, plan_ms_max: their times, including unused ones [ms].
+        plans, plans_unused: by the daemon's count: all plans; plans that became no path, as they
+            equalled the current one or were outdated.
         attempts, attempts_used: plans made to improve the path; those that did.
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
         processor_s, recorder_processor_s: total processor time of daemon and recorder, by the
@@ -160,7 +142,8 @@ class ReviewDocument(msgspec.Struct):
             full`, `recorder: stalled`): state, reason, at_s, seconds.
         charges: each time the robot charged: at_s, seconds, level_from, level_to (0 to 1; null
             where not known).
-        worst: moments that stand out: what, value, unit, at_s, note.
+        longest_stand: the longest time at work that the robot neither drove nor turned: at_s,
+            seconds, place (x, y) [m], and the states of the mission meanwhile; null without any.
         faults: messages refused by the daemon.
         faults_by_code: the same by code.
         recorder_lost: samples that the recorder could not write, by its own count.
@@ -208,12 +191,9 @@ class ReviewDocument(msgspec.Struct):
     replan_ms_p99: float | None = None
     replan_ms_max: float | None = None
     replan_ms_by_reason: dict[str, TimesTaken] = {}
-    replan_list: list[Replan] = []
+    replan_list: list[dict[str, object]] = []
     plans: int | None = None
     plans_unused: int | None = None
-    plan_ms_p50: float | None = None
-    plan_ms_p99: float | None = None
-    plan_ms_max: float | None = None
     attempts: int | None = None
     attempts_used: int | None = None
     memory_mb_max: float | None = None
@@ -226,7 +206,7 @@ class ReviewDocument(msgspec.Struct):
     states: dict[str, float] = {}
     troubles: list[Trouble] = []
     charges: list[Charge] = []
-    worst: list[Moment] = []
+    longest_stand: Stand | None = None
     faults: int = 0
     faults_by_code: dict[str, int] = {}
     recorder_lost: int | None = None

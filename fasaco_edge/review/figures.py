@@ -9,14 +9,13 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.document import (
     Charge,
     MapSize,
     RecordedFile,
-    Replan,
     ReviewDocument,
     TimesTaken,
     Trouble,
@@ -74,7 +73,7 @@ def document_of(review: Review) -> ReviewDocument:
             for s in review.troubles
         ],
         charges=charges_of(review),
-        worst=[replace(m, value=round(m.value, 3), at_s=round(m.at_s, 3)) for m in review.moments],
+        longest_stand=review.longest_stand,
         faults=faults.total,
         faults_by_code=faults.by_code,
         recorder_lost=faults.lost,
@@ -159,37 +158,33 @@ def _by_reason(floor: tuple[FloorLeft, ...] | None) -> dict[str, float] | None:
 
 
 def _add_plans(document: ReviewDocument, review: Review) -> None:
-    """Add counts and times of plans by the turn log, if there is one."""
-    made = review.data.plan_log.plans
-    if not made:
+    """Add the daemon's counts of plans."""
+    plans = [each.status.plan for each in review.data.statuses]
+    if not plans:
         return
-    plans = [plan for plan in made if not plan.is_attempt]
-    attempts = [plan for plan in made if plan.is_attempt]
-    took = [plan.took_ms for plan in plans]
-    document.plans, document.plans_unused = len(plans), sum(not plan.is_used for plan in plans)
-    document.plan_ms_p50, document.plan_ms_p99, document.plan_ms_max = (
-        _rounded(percentile(took, percent)) for percent in (50, 99, 100)
-    )
-    document.attempts, document.attempts_used = (
-        len(attempts),
-        sum(plan.is_used for plan in attempts),
-    )
+    document.plans = _total([plan.plans for plan in plans])
+    document.plans_unused = _total([plan.unchanged + plan.outdated for plan in plans])
+    document.attempts = _total([plan.attempts for plan in plans])
+    document.attempts_used = sum(path.about.reason == BETTER for path in review.data.paths)
 
 
-def _replan(path: PathSample) -> Replan:
+def _total(counts: Sequence[int]) -> int:
+    """Return the total of a count that restarts at 0 with each process."""
+    return counts[-1] + sum(before for before, now in pairwise(counts) if now < before)
+
+
+# Members of a path's attachment in the list of replans.
+REPLAN = (
+    *("revision", "reason", "steps", "planned_steps", "lower_bound_steps", "lower_bound_cost_s"),
+    *("gap", "changed"),
+)
+
+
+def _replan(path: PathSample) -> dict[str, object]:
     about = path.about
-    return Replan(
-        at_s=_rounded(path.at_s),
-        revision=about.revision,
-        reason=about.reason,
-        plan_ms=_rounded(path.plan_ms),
-        steps=about.steps,
-        planned_steps=about.planned_steps,
-        lower_bound_steps=about.lower_bound_steps,
-        lower_bound_cost_s=about.lower_bound_cost_s,
-        gap=about.gap,
-        cost_s=about.planned_cost_s,
-        changed=about.changed,
+    times = {"at_s": _rounded(path.at_s), "plan_ms": _rounded(path.plan_ms)}
+    return (
+        times | {"cost_s": about.planned_cost_s} | {name: getattr(about, name) for name in REPLAN}
     )
 
 
@@ -199,7 +194,9 @@ FLOOR = "reachable_m2, swept_m2, patches_over_4_dm2, largest_patch_m2"
 def _not_recorded(review: Review) -> dict[str, str]:
     data, why = review.data, {}
     if not data.statuses:
-        why["robot, version, config, state"] = "no status of the daemon was recorded"
+        why["robot, version, config, state, plans, attempts"] = (
+            "no status of the daemon was recorded"
+        )
     if review.lattice is None:
         why[FLOOR] = review.no_lattice
     elif review.data.restored_cells:
@@ -218,10 +215,6 @@ def _not_recorded(review: Review) -> dict[str, str]:
         )
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"
-    if not data.plan_log.plans:
-        why["plans, plans_unused, plan_ms_p50, plan_ms_p99, plan_ms_max, attempts"] = (
-            "there is no turn log"
-        )
     if review.faults.lost is None:
         why["recorder_lost"] = "no recorded status has figures of the recorder"
     return why

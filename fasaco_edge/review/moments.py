@@ -1,4 +1,4 @@
-"""Extremes of a recording: states and their durations, replans, worst moments, faults."""
+"""States of a recording and their durations, the longest stand, replans, faults."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
+import msgspec
 import numpy as np
 from msgspec import UNSET
 from numpy.typing import NDArray
@@ -52,22 +53,14 @@ class Span:
         return self.end_s - self.begin_s
 
 
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """An extreme of some figure.
+class Stand(msgspec.Struct, frozen=True):
+    """A time [s] that the robot stood at a place (x, y) [m], and what the mission did meanwhile."""
 
-    Attributes:
-        what: name of the figure.
-        value, unit: of the extreme.
-        at_s: when it began [s].
-        note: context of it.
-    """
-
-    what: str
-    value: float
-    unit: str
     at_s: float
-    note: str = ""
+    seconds: float
+    x: float
+    y: float
+    states: list[str]
 
 
 def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[Span, ...]:
@@ -107,44 +100,32 @@ def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
     return tuple(Span("under way", run[0].begin_s, run[-1].end_s) for run in runs)
 
 
-def longest_stand(
-    at_s: NDArray[np.float64],
-    track: NDArray[np.float64],
-    during: Span,
-    states: Sequence[Span] = (),
-) -> Moment | None:
-    """Return the longest time the robot neither drove nor turned.
+def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
+    """Return the longest time at work that the robot neither drove nor turned."""
+    found = [stand for during in under_way(states) if (stand := _stand(data, during))]
+    longest = max(found, key=lambda stand: stand[1], default=None)
+    if longest is None:
+        return None
+    since, seconds, x, y = (round(value, 3) for value in longest)
+    meanwhile = [s.name for s in states if since < s.end_s and s.begin_s < since + seconds]
+    return Stand(since, seconds, x, y, list(dict.fromkeys(meanwhile)))
 
-    Args:
-        at_s: float64 (n,), when each pose came [s].
-        track: float64 (n, 3), x [m], y [m], yaw [rad].
-        during: the time to look at.
-        states: what the mission did meanwhile.
-    """
-    chosen = (at_s >= during.begin_s) & (at_s <= during.end_s)
-    times, poses = at_s[chosen].tolist(), track[chosen].tolist()
+
+def _stand(data: RunData, during: Span) -> tuple[float, float, float, float] | None:
+    """Return begin and length of the longest stand [s], and its place [m]; None without a pose."""
+    chosen = (data.times >= during.begin_s) & (data.times <= during.end_s)
+    times, poses = data.times[chosen].tolist(), data.track[chosen].tolist()
     if not times:
         return None
-    best, anchor = (0.0, times[0], poses[0]), 0
+    best, anchor = (times[0], 0.0, *poses[0][:2]), 0
     for index, (x, y, yaw) in enumerate(poses):
         x0, y0, yaw0 = poses[anchor]
         turned = abs(math.remainder(yaw - yaw0, math.tau))
         if math.hypot(x - x0, y - y0) > STILL_M or turned > STILL_RAD:
             anchor = index
-        best = max(best, (times[index] - times[anchor], times[anchor], poses[anchor]))
-    seconds, since, (x, y, _) = best
-    until = since + seconds
-    meanwhile = [s.name for s in states if since < s.end_s and s.begin_s < until]
-    note = f"at ({x:.2f}, {y:.2f}) m: {', '.join(dict.fromkeys(meanwhile))}".rstrip(": ")
-    return Moment("longest stand", seconds, "s", since, note)
-
-
-def longest_gap(pose_s: Sequence[float], during: Span) -> Moment:
-    """Return the longest time without a pose, including the ends of the span."""
-    inside = [at for at in pose_s if during.begin_s <= at <= during.end_s]
-    ends = [during.begin_s, *inside, during.end_s]
-    seconds, since = max((after - before, before) for before, after in pairwise(ends))
-    return Moment("longest time without a pose", seconds, "s", since)
+        elif (seconds := times[index] - times[anchor]) > best[1]:
+            best = times[anchor], seconds, x0, y0
+    return best
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,29 +183,6 @@ def kind_of(reason: str) -> str:
         cells = "" if "passages changed" in changes else "cells "
         return _MAP + cells + " and ".join(changes) if changes else "map"
     return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason given"
-
-
-def worst_moments(data: RunData, states: tuple[Span, ...], replans: Replans) -> tuple[Moment, ...]:
-    """Return the worst of each kind of moment there was.
-
-    Args:
-        data: of the samples.
-        states: of the mission, in order.
-        replans: plans after the first.
-    """
-    found: list[Moment | None] = []
-    for during in under_way(states):
-        found.append(longest_stand(data.times, data.track, during, states))
-        found.append(longest_gap(data.pose_s, during))
-    for path in replans.slowest_first[:1]:
-        took_ms, reason = path.plan_ms or 0.0, path.about.reason
-        found.append(Moment("slowest replan", took_ms, "ms", path.at_s, reason))
-    # A restarted mission has such moments several times: the worst one counts.
-    worst: dict[str, Moment] = {}
-    for moment in filter(None, found):
-        if moment.what not in worst or moment.value > worst[moment.what].value:
-            worst[moment.what] = moment
-    return tuple(worst.values())
 
 
 @dataclass(frozen=True, slots=True)

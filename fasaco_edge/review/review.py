@@ -29,13 +29,13 @@ from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
     Faults,
-    Moment,
     Replans,
     Span,
+    Stand,
     faults_of,
+    longest_stand,
     spans_of,
     troubles_at_rest,
-    worst_moments,
 )
 from fasaco_edge.review.orders import OrderChapter, chapters
 from fasaco_edge.review.rooms import RoomChapter, room_chapters
@@ -97,7 +97,7 @@ class Review:
         replans: plans after the first.
         states: of the mission, in order.
         recorder_states: of the recorder.
-        moments: the worst ones.
+        longest_stand: the longest time at work that the robot stood; None without any.
         faults: refused messages and losses.
         missing: samples that were lost before they were written.
     """
@@ -111,7 +111,7 @@ class Review:
     replans: Replans
     states: tuple[Span, ...]
     recorder_states: tuple[Span, ...]
-    moments: tuple[Moment, ...]
+    longest_stand: Stand | None
     faults: Faults
     missing: int
 
@@ -206,7 +206,7 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
         recorder_states=spans_of(
             _entered(record, entities.RECORDER_STATE, entities.RECORDER_LOG), end_s
         ),
-        moments=worst_moments(data, states, replans),
+        longest_stand=longest_stand(data, states),
         faults=faults_of(data, record),
         missing=missing,
     )

@@ -18,7 +18,6 @@ from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import BETTER, SPARE
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
@@ -29,69 +28,12 @@ from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import Settings, known_settings
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.documents.turns import Cycle, TurnBatch, decode_turns
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 # Smaller areas are within the noise of poses and times [m2].
 SURELY_SWEPT_M2 = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class MadePlan:
-    """A plan that was made.
-
-    Attributes:
-        at_s: when it was finished, since the recording began [s].
-        took_ms: duration of planning [ms].
-        reason: why it was requested; "" if not recorded.
-        is_attempt: whether it was only an attempt to improve the path.
-        is_used: whether it became a path.
-    """
-
-    at_s: float
-    took_ms: float
-    reason: str
-    is_attempt: bool
-    is_used: bool
-
-
-@dataclass(slots=True)
-class PlanLog:
-    """Matches plan requests with their results, batch by batch."""
-
-    plans: list[MadePlan] = field(default_factory=list)
-    _asked: dict[int, str] = field(default_factory=dict)
-
-    def take(self, batch: TurnBatch, at_s: float, scale: float = 1.0) -> None:
-        """Take the turns of a batch that came at ``at_s`` [s]; ``scale``: of the robot's clock."""
-        if batch.beginning is not None:
-            self._asked = {}  # another daemon numbers from 1 again
-        last = batch.times[-1] if batch.times else 0.0
-        for turn in batch.turns:
-            index = turn.number - batch.first
-            ago_s = last - batch.times[index] if 0 <= index < len(batch.times) else 0.0
-            self._take(turn, max(at_s - scale * ago_s, 0.0))
-
-    def _take(self, turn: Cycle, at_s: float) -> None:
-        decided, ready = turn.decided, turn.plan
-        if ready is not None:
-            reason = self._asked.pop(ready.number, "")
-            path = decided.path if decided else None
-            became = reason if reason != SPARE else BETTER
-            self.plans.append(
-                MadePlan(
-                    at_s=at_s,
-                    took_ms=1e3 * ready.seconds,
-                    reason=reason,
-                    is_attempt=reason == SPARE,
-                    is_used=path is not None and path[1] == became,
-                )
-            )
-        if decided is not None and decided.asked is not None:
-            number, reason = decided.asked
-            self._asked[number] = reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +66,6 @@ class RunData:
         map_s: arrival of each map and update.
         paths, statuses: in order.
         commands: arrival and name of each, and the order of a ``start``.
-        plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
         ordered_keep_out: polygons of the last order.
         zones: of the last order; empty without an order, or if it is for everything.
@@ -141,7 +82,6 @@ class RunData:
     paths: list[PathSample] = field(default_factory=list)
     statuses: list[StatusSample] = field(default_factory=list)
     commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
-    plan_log: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
     ordered_keep_out: tuple[Polygon, ...] = ()
     zones: tuple[Zone, ...] = ()
@@ -309,7 +249,6 @@ class _SampleReader:
             "tf_static": self._pose,
             "command": self._command,
             "status": self._status,
-            "turns": self._turns,
             "rooms": self._rooms,
             PATH_DIGEST: self._path,
         }
@@ -363,10 +302,6 @@ class _SampleReader:
         if frames := known.ros2.frames:
             self._poses.follow((frames.map, frames.robot))
         data.statuses.append(StatusSample(self._now, status))
-
-    def _turns(self, arrival: Arrival) -> None:
-        turns = decode_turns(arrival.sample.payload)
-        self.data.plan_log.take(turns, self._now, self.data.time_scale)
 
     def _rooms(self, arrival: Arrival) -> None:
         self.data.rooms = decode_tolerant(arrival.sample.payload, Rooms)

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fasaco_edge.drawing.chart import Axis
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.cost import NO_WORK, CoverageCost
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.__main__ import main
+from tests.benchmarks.chart import Axis
 from tests.benchmarks.harness import WrongWalkError, judged, planner_for
 from tests.benchmarks.quality.benchmark import report
 from tests.benchmarks.quality.figures import by_grid

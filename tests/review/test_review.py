@@ -134,7 +134,6 @@ def test_plans_are_those_of_the_status(told, recording):
     assert told["attempts"] == plan["attempts"]
     notes = {note["revision"]: note["reason"] for _, note in recording.notes}
     assert told["attempts_used"] == list(notes.values()).count("better further on")
-    assert told["plan_ms_max"] >= told["first_plan_ms"] - 0.001
 
 
 def test_what_it_took_is_told(told, recording):
@@ -193,32 +192,12 @@ def test_the_card_says_what_was_run(told, recording):
     assert told["not_recorded"] == {}
 
 
-def test_moments_lie_within_the_mission(review):
-    found = {moment.what: moment for moment in review.moments}
-    assert len(found) == 3
-    for moment in found.values():
-        assert 0 <= moment.at_s <= review.duration_s
-    slowest = max(p.plan_ms for p in review.data.paths[1:] if p.plan_ms is not None)
-    assert found["slowest replan"].value == slowest
-    # Brute force: each moment between two poses at which the robot had something to do.
-    ends = sorted({0.0, *review.data.pose_s, *(at for s in review.states for at in _ends(s))})
-    gaps, last = [], None
-    for before, after in pairwise(ends):
-        busy = any(
-            s.begin_s <= before < s.end_s and s.name in ("planning", "covering", "paused")
-            for s in review.states
-        )
-        last = (before if last is None or before in review.data.pose_s else last) if busy else None
-        gaps.append(after - last if last is not None else 0.0)
-    assert found["longest time without a pose"].value == pytest.approx(max(gaps))
-
-
-def test_the_longest_stand_is_one(review):
-    (stand,) = (moment for moment in review.moments if moment.what == "longest stand")
+def test_the_longest_stand_is_one(review, told):
+    stand = told["longest_stand"]
     poses = [
         pose
         for at, pose in zip(review.data.pose_s, review.data.poses, strict=True)
-        if stand.at_s <= at <= stand.at_s + stand.value
+        if stand["at_s"] - 1e-3 <= at <= stand["at_s"] + stand["seconds"] + 1e-3
     ]
     xy = np.array(poses)[:, :2]
     assert len(xy) > 1
@@ -282,7 +261,6 @@ def test_the_command_prints_a_report(recording, told):
         f"{told['covered_cells']} of {told['coverable_cells']} cells",
         "Coverage over time",
         "Reasons of replans",
-        "slowest replan",
         "malformed_message",
         ": complete",
     ):
@@ -294,10 +272,6 @@ def _began(recording, review):
     done = next(at for at, status in recording.statuses if status["state"] == "done")
     span = next(span for span in review.states if span.name == "done")
     return done - span.begin_s
-
-
-def _ends(span):
-    return span.begin_s, span.end_s
 
 
 def _groups(names):

@@ -22,11 +22,13 @@ from fasaco_edge.recording.read.repair import open_part
 from fasaco_edge.review.document import explanations
 
 if TYPE_CHECKING:
+    from PIL import Image
+
     from fasaco_edge.review.review import Review
 
 DESCRIPTION = """\
 Report what happened in a recorded mission, on one screen; with --long all figures, orders,
-commands, replans, floor left and why, worst moments and faults. With --at and --point it answers a
+commands, replans, floor left and why, and faults. With --at and --point it answers a
 question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
 balance, floor swept again or only driven through, waiting and messages; such a recording takes
 --json and --png only. Parts of one run are read together. Files are only read; of files that a
@@ -159,8 +161,7 @@ def run(args: argparse.Namespace) -> int:
     if args.png:
         from fasaco_edge.review.output.pictures import draw_review
 
-        with writing(args.png) as file:
-            draw_review(review, other).save(file, "PNG")
+        _save(draw_review([review, other] if other else [review]), review, args.png)
     if args.export:
         from fasaco_edge.review.output.export import export
 
@@ -204,14 +205,18 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
             console.print(terminal.figures(answer_rows.spot_rows(spot)))
     if args.png:
         picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
-        if picture is None:
-            raise BadConfiguration(
-                f"no picture: {review.no_lattice or 'there is no map yet'}",
-                hint="the answer is complete without --png",
-            )
-        with writing(args.png) as file:
-            picture.save(file, "PNG")
+        _save(picture, review, args.png)
     return 0
+
+
+def _save(picture: Image.Image | None, review: Review, path: Path) -> None:
+    if picture is None:
+        raise BadConfiguration(
+            f"no picture: {review.no_lattice or 'there is no map yet, or no pose'}",
+            hint="the answer is complete without --png",
+        )
+    with writing(path) as file:
+        picture.save(file, "PNG")
 
 
 def _read(paths: Sequence[Path], name: str) -> Review:

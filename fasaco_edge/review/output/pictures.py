@@ -1,4 +1,4 @@
-"""Pictures of a review: the map with the track, charts, a moment, spots."""
+"""Pictures of a review: the map with the track, a moment, spots."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.chart import draw_panels
 from fasaco_edge.drawing.pictures import draw_mission, draw_order, draw_unswept
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.output.answer_rows import instant_rows, spot_rows
-from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rooms import outlined
 from fasaco_edge.review.run_data import RunData
@@ -26,52 +24,27 @@ from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.settings import known_settings
 
-# The most that one review takes, and the height of all [px].
-SIZE = (1600, 900)
-# Space of title, caption and key beside the map.
-AROUND = (56, 210)
 TRAIL_SPACING_M = 0.02
 # Width of a drive drawn beside the lines of paths [m].
 DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
 
 
-def draw_review(review: Review, other: Review | None = None) -> Image.Image:
-    """Return a picture, RGB: map and charts; of two runs both maps, and their curves together.
-
-    It is as wide as it has to be: one is of ``SIZE`` at most, two are wider by a map.
-    """
-    reviews = [review] if other is None else [review, other]
-    labels = ["left", "right"]
-    panels = [
-        coverage_panel(reviews, labels),
-        replan_panel(reviews, labels),
-        *([state_panel(review)] if other is None else []),
-    ]
-    charts = draw_panels("", (), panels, columns=1)
-    space = SIZE[0] - charts.width
-    maps = [draw_map(each, (space - AROUND[0], SIZE[1] - AROUND[1])) for each in reviews]
-    missions = [each for each in maps if each is not None]
-    for mission in missions:
-        # A caption of many lines leaves less space for the map.
-        mission.thumbnail((space, SIZE[1]))
-    width = sum(mission.width for mission in missions) + charts.width
-    sheet, left = Image.new("RGB", (width, SIZE[1]), palette.PAPER), 0
-    for mission in missions:
-        sheet.paste(mission, (left, (SIZE[1] - mission.height) // 2))
-        left += mission.width
-    # The empty title above the charts may be cut off.
-    sheet.paste(charts, (left, SIZE[1] - charts.height))
+def draw_review(reviews: Sequence[Review]) -> Image.Image | None:
+    """Return the maps of reviews side by side, RGB; None if there is none."""
+    maps = [found for found in map(draw_map, reviews) if found is not None]
+    if not maps:
+        return None
+    size = sum(one.width for one in maps), max(one.height for one in maps)
+    sheet, left = Image.new("RGB", size, palette.PAPER), 0
+    for one in maps:
+        sheet.paste(one, (left, 0))
+        left += one.width
     return sheet
 
 
-def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
-    """Return the last map with cells, unswept floor and track; None without any of them.
-
-    Args:
-        review: the review.
-        space: largest size of the map (width, height) [px].
-    """
+def draw_map(review: Review) -> Image.Image | None:
+    """Return the last map with cells, unswept floor and track; None without any of them."""
     grid, lattice, visits, floor = review.data.grid, review.lattice, review.visits, review.floor
     track, driven = _thinned(review.data)
     if grid is None or lattice is None or visits is None or not len(track):
@@ -85,7 +58,6 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         visits,
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
-        space=space,
         driven=driven,
         swept=MapLayer(floor.geometry, floor.swept) if floor and is_line else None,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,

@@ -144,7 +144,8 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("rooms", _shares(document)),
         ("charges", _some(charges)),
         ("poses", _lost_way(review)),
-        ("troubles", _some(troubles) or "none"),
+        ("stood", _stood(document)),
+        ("troubles", _some(troubles)),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
     return [(name, text) for name, text in found if text]
@@ -164,6 +165,13 @@ def _lost_way(review: Review) -> str:
         return ""
     gaps = f"{len(ways_m)} gap{'s' * (len(ways_m) != 1)}"
     return f"{gaps} over {ways_m.sum():.0f} m: floor between them does not count"
+
+
+def _stood(document: ReviewDocument) -> str:
+    if (stand := document.longest_stand) is None:
+        return ""
+    at = f"from {clock(stand.at_s)} at ({stand.x:.2f}, {stand.y:.2f})"
+    return f"longest {stand.seconds:.1f} s {at}: {', '.join(stand.states)}"
 
 
 def _processor(document: ReviewDocument) -> str:
@@ -223,12 +231,8 @@ def _swept(document: ReviewDocument, text: str) -> str:
 
 
 def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return robot, map, time and settings of a run."""
-    config, grid, parts = document.config, document.map, document.files
-    size = "none"
-    if grid is not None:
-        width, depth = grid.sides_m
-        size = f"{width:.1f} x {depth:.1f} m, {grid.resolution_m:g} m a pixel"
+    """Return version, settings and files of a run."""
+    config, parts = document.config, document.files
     settings = [
         f"{name.rpartition('.')[2] if name != 'planner.name' else 'planner'} {config[name]}"
         for name in CARD_SETTINGS
@@ -237,11 +241,6 @@ def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     megabytes = sum(part.bytes for part in parts) / 1e6
     state = "" if document.is_ended else ", not ended in order"
     return [
-        ("robot", document.robot or "not recorded"),
-        ("began", _began(document.began)),
-        ("duration", clock(document.duration_s)),
-        *clock_rows(document),
-        ("map", size),
         ("version", document.version or "not recorded"),
         ("settings", ", ".join(settings) or "not recorded"),
         ("recording", f"{len(parts)} part{'s' * (len(parts) != 1)}, {megabytes:.1f} MB{state}"),
@@ -284,11 +283,6 @@ def _replan_row(path: PathSample) -> tuple[str, ...]:
         _place(about.changed),
         plain(about.reason),
     )
-
-
-def moment_rows(review: Review) -> list[tuple[str, ...]]:
-    """Return the worst moments: figure, value, time and note."""
-    return [(m.what, amount(m.value, m.unit), clock(m.at_s), plain(m.note)) for m in review.moments]
 
 
 def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:

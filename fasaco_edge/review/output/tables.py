@@ -117,18 +117,6 @@ def _paths(review: Review) -> Iterator[Table]:
         (AT, REVISION, place, X, Y),
         _points(review),
     )
-    columns = (
-        AT,
-        Column("took_ms", "float", "ms", "duration of planning"),
-        Column("attempt", "bool", "", "whether it was only to make the path better"),
-        Column("used", "bool", "", "whether it became a path"),
-        REASON,
-    )
-    plans = (
-        (round(p.at_s, 6), round(p.took_ms, 3), p.is_attempt, p.is_used, p.reason)
-        for p in data.plan_log.plans
-    )
-    yield Table("plans", "a plan that was made, also one that became no path", columns, plans)
 
 
 def _points(review: Review) -> Iterator[tuple[object, ...]]:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from PIL import Image
 
-from fasaco_edge.drawing.chart import COLOURS, LINE_PX, Axis, Line, Panel, draw_panels
 from fasaco_edge.drawing.spread import Spread
+from tests.benchmarks.chart import COLOURS, LINE_PX, Axis, Line, Panel, draw_panels
 from tests.benchmarks.quality.figures import (
     MISSION_TURN_S,
     MOST_STEPS,

@@ -12,8 +12,8 @@ from typing import Any
 from PIL import Image
 
 from fasaco_edge.bench.benchmark import Goal, Report
-from fasaco_edge.drawing.chart import COLOURS, Axis, Line, Panel, draw_panels
 from fasaco_edge.drawing.spread import Spread
+from tests.benchmarks.chart import COLOURS, Axis, Line, Panel, draw_panels
 from tests.benchmarks.scale.process import TARGETS, ScaleRun, SizedRun
 
 MOST_GROWTH = 1.1

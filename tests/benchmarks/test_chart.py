@@ -2,8 +2,9 @@
 
 import pytest
 
-from fasaco_edge.drawing import chart, palette
-from fasaco_edge.drawing.chart import Axis, Line, Panel, draw_panels
+from fasaco_edge.drawing import palette
+from tests.benchmarks import chart
+from tests.benchmarks.chart import Axis, Line, Panel, draw_panels
 
 X, Y = Axis.linear("s", [100.0]), Axis.linear("%", [100.0])
 
