@@ -231,10 +231,6 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     return rows
 
 
-# Limit on the differing samples that are named.
-NAMED = 5
-
-
 class Versions(msgspec.Struct):
     """The software that decided then, and the software that decides now."""
 
@@ -250,24 +246,21 @@ class Comparison(msgspec.Struct):
     turns_equal: int
     plans_repeated: int
     difference: Difference | None
-    samples_lacking: list[Difference]
     log_ends: str
     version: Versions
     kernels: Versions
 
 
 def _comparison(replay: CycleReplay, record: CycleRecord) -> Comparison:
-    difference, *lacking = (
-        found and replace(found, at_s=round(found.at_s, 6))
-        for found in (replay.difference, *replay.lacking)
-    )
+    difference = replay.difference
+    if difference is not None:
+        difference = replace(difference, at_s=round(difference.at_s, 6))
     return Comparison(
-        equal=difference is None and not lacking and not record.gap,
+        equal=difference is None and not record.gap,
         turns=record.turns,
         turns_equal=replay.turns,
         plans_repeated=replay.plans,
         difference=difference,
-        samples_lacking=[found for found in lacking if found is not None],
         log_ends=record.gap,
         version=Versions(record.beginning.version, __version__),
         kernels=Versions(record.kernels, replay.kernels),
@@ -285,10 +278,6 @@ def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
     rows = [("replay", f"{said}: {turns}")]
     if compared.difference is not None:
         rows.append(("first difference", _words(compared.difference)))
-    lacking = compared.samples_lacking
-    rows.extend(("sample", _words(found)) for found in lacking[:NAMED])
-    if len(lacking) > NAMED:
-        rows.append(("samples", f"{len(lacking) - NAMED} more are not as they were taken"))
     if compared.log_ends:
         rows.append(("compared up to", f"turn {compared.turns}: {compared.log_ends}"))
     for name, versions in (("version", compared.version), ("kernels", compared.kernels)):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording.write.quota import Quota, next_run, oldest_first
+from fasaco_edge.recording.write.quota import delete_oldest, next_run, oldest_first
 
 AT_BOOT, LAST_WEEK, NEXT_YEAR = (
     datetime(year, month, 20, 10, tzinfo=UTC) for year, month in ((1970, 1), (2026, 11), (2027, 11))
@@ -32,7 +32,7 @@ def test_a_clock_that_goes_back_makes_no_newer_part_go(tmp_path):
     runs = [run(tmp_path, began, parts=2) for began in (LAST_WEEK, AT_BOOT, NEXT_YEAR, LAST_WEEK)]
     assert order(tmp_path) == [name for names in runs for name in names]
     assert sorted(order(tmp_path)) == order(tmp_path), "nor does a listing show it elsewhere"
-    deleted = Quota("maja", 30).keep(tmp_path)
+    deleted = delete_oldest(tmp_path, "maja", 30)
     assert [path.name for path in deleted] == runs[0] + runs[1] + runs[2][:1]
 
 
@@ -48,7 +48,7 @@ def test_a_robot_name_that_ends_in_a_number_keeps_its_recordings(tmp_path):
     for name in (theirs, ours):
         (tmp_path / name).write_bytes(bytes(10))
     assert order(tmp_path, "maja-2") == [theirs]
-    assert [path.name for path in Quota("maja", 1).keep(tmp_path)] == [ours]
+    assert [path.name for path in delete_oldest(tmp_path, "maja", 1)] == [ours]
     assert (tmp_path / theirs).is_file()
 
 
@@ -73,7 +73,7 @@ def test_another_robots_recordings_and_links_are_left_alone(tmp_path):
     link.symlink_to(outside)
     mine = run(tmp_path, LAST_WEEK)
     assert order(tmp_path) == mine
-    assert [path.name for path in Quota("maja", 5).keep(tmp_path)] == mine
+    assert [path.name for path in delete_oldest(tmp_path, "maja", 5)] == mine
     assert outside.exists()
     assert all((tmp_path / name).exists() for name in others)
 

@@ -19,12 +19,12 @@ JSON = st.recursive(
 )
 
 
-def test_settings_that_matter_come_first():
-    robot = {"name": "r2", "radius_m": 0.2, "tool_width_m": 0.3}
-    config = {"alpha": 1, "robot": robot, "planner": {"ants": 8, "name": "fasaco", "seed": 7}}
+def test_settings_stand_below_by_their_names():
+    robot = {"name": "r2", "radius_m": 0.2}
+    config = {"alpha": 1, "robot": robot, "planner": {"name": "fasaco", "seed": 7}}
     card = RunDescription("r2", "2026-01-01", "1.0", config).markdown().partition("| setting |")[2]
-    first = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed", "alpha")
-    order = [card.index(name) for name in ("r2", *first, "planner.ants")]
+    first = ("alpha", "planner.name", "planner.seed", "robot.name", "robot.radius_m")
+    order = [card.index(name) for name in ("r2", *first)]
     assert order == sorted(order)
 
 
@@ -39,17 +39,6 @@ def test_settings_that_matter_come_first():
 def test_a_value_breaks_no_table_and_is_no_link(words, value, line):
     card = RunDescription(*words, {"planner": value}).markdown()
     assert line in card.splitlines()
-
-
-def test_properties_are_text():
-    config = {"robot": {"radius": 0.2}, "planner": "fasaco", "limits": [1, 2]}
-    assert RunDescription("r2", "now", "", config).properties() == {
-        "robot": "r2",
-        "began": "now",
-        "robot_radius": "0.2",
-        "planner": "fasaco",
-        "limits": "1, 2",
-    }
 
 
 @given(st.dictionaries(st.sampled_from("abc"), JSON))

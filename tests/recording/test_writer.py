@@ -16,7 +16,7 @@ from fasaco_edge.errors import BadConfiguration, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.quota import DiskBudget, Quota
+from fasaco_edge.recording.write.quota import DiskBudget, delete_oldest
 from fasaco_edge.recording.write.writer import (
     FLUSH_PERIOD_NS,
     RETRY_PERIOD_NS,
@@ -59,7 +59,7 @@ def writer_in(folder, part_bytes: int = 10**9, least_free_bytes: int = 0) -> Rec
 def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
     clock = Clock()
     writer = writer_in(tmp_path, part_bytes=250_000)
-    writer.describe("a run", {"planner": "fasaco"})
+    writer.describe("a run")
     writer.log_static(entities.RUN_CARD, rr.TextDocument("card"))
     writer.message(clock.now_ns)
     writer.log(entities.PATH, rr.LineStrips3D([[[0, 0, 0], [1, 2, 0]]]), latched=True)
@@ -100,7 +100,7 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
     for path in (*others, *before):
         path.write_bytes(bytes(400_000))
     clock = Clock()
-    room = DiskBudget(300_000, 0, part_s=3 * FLUSH_PERIOD_NS / 1e9, quota=Quota("robot", 1_000_000))
+    room = DiskBudget(300_000, 0, 3 * FLUSH_PERIOD_NS / 1e9, "robot", 1_000_000)
     name = "20260101T000000Z-robot"
     writer = RecordingWriter(tmp_path, name, room, build_blueprint(None))
     writer.sync(clock.tick())
@@ -124,9 +124,9 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
 def test_a_part_that_is_written_is_not_deleted_for_the_quota(tmp_path):
     room = DiskBudget(10**6, 0)
     writer = RecordingWriter(tmp_path, "20200101T000000Z-robot", room, build_blueprint(None))
-    assert not Quota("robot", 1).keep(tmp_path)
+    assert not delete_oldest(tmp_path, "robot", 1)
     assert writer.close()
-    assert Quota("robot", 1).keep(tmp_path)
+    assert delete_oldest(tmp_path, "robot", 1)
 
 
 def test_no_part_is_written_below_the_floor(tmp_path):

@@ -13,9 +13,6 @@ from fasaco_edge.wire.documents.settings import Settings, known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.reasons import plain
 
-# The most important settings come first, the others by name.
-FIRST = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
-
 HEAD = (
     ("seed", "seed", ""),
     ("tool_width_m", "cells of", " m"),
@@ -60,17 +57,6 @@ class RunDescription:
         """The name of the run."""
         return f"{self.robot} {self.began}"
 
-    def properties(self) -> dict[str, str]:
-        """Return the run's properties, flat, all as text: another version's types may differ."""
-        known = {"robot": self.robot, "began": self.began, "version": self.version}
-        settings = {
-            name.replace(".", "_"): str(value) for name, value in flat_settings(self.config)
-        }
-        if self.anchor:
-            x, y = self.anchor
-            known |= {"drawn_from_x_m": f"{x:.0f}", "drawn_from_y_m": f"{y:.0f}"}
-        return {name: value for name, value in (settings | known).items() if value}
-
     def markdown(self) -> str:
         """Return the run card."""
         rows: list[tuple[str, object]] = [
@@ -81,7 +67,7 @@ class RunDescription:
         if self.anchor:
             x, y = self.anchor
             rows.append(("drawn from", f"x {x:.0f} m, y {y:.0f} m of the map's frame"))
-        rows += sorted(flat_settings(self.config), key=_rank)
+        rows += sorted(flat_settings(self.config))
         table = "\n".join(
             f"| {markdown_cell(name)} | {markdown_cell(value)} |" for name, value in rows
         )
@@ -109,11 +95,6 @@ def flat_settings(config: Settings, prefix: str = "") -> Iterator[tuple[str, str
             yield f"{prefix}{name}", value
         elif isinstance(value, list):
             yield f"{prefix}{name}", ", ".join(str(item) for item in value)
-
-
-def _rank(setting: tuple[str, object]) -> tuple[int, str]:
-    name = setting[0]
-    return (FIRST.index(name) if name in FIRST else len(FIRST), name)
 
 
 def markdown_cell(value: object) -> str:

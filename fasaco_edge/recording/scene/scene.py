@@ -331,7 +331,7 @@ class Scene:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
         # With a time, as the outcome is not known before the end.
         self._writer.log(entities.RUN_CARD, card, latched=True)
-        self._writer.describe(self._run.name, self._run.properties())
+        self._writer.describe(self._run.name)
 
     def _draw_robot(self, radius_m: float) -> None:
         body, heading = draw.body_archetypes(radius_m)

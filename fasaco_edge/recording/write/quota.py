@@ -47,30 +47,21 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
     return f"run{newest + 1:05}-{began:{TIME}}-{robot}"
 
 
-@dataclass(frozen=True, slots=True)
-class Quota:
-    """Limit of the size of ``robot``'s recordings in a folder [bytes]; 0 for none."""
+def delete_oldest(folder: Path, robot: str, most_bytes: int) -> list[Path]:
+    """Delete the oldest of ``robot``'s parts until they take ``most_bytes``; return them.
 
-    robot: str
-    most_bytes: int
-
-    def keep(self, folder: Path, coming: int = 0) -> list[Path]:
-        """Delete the oldest parts until ``coming`` more bytes fit; return the deleted files.
-
-        Raises:
-            OSError: the folder cannot be read, or a file cannot be deleted.
-        """
-        if not self.most_bytes:
-            return []
-        parts = oldest_first(folder, self.robot)
-        total, deleted = sum(size for _, size in parts), []
-        for path, size in parts:
-            if total + coming <= self.most_bytes:
-                break
-            if _delete(path):
-                deleted.append(path)
-                total -= size
-        return deleted
+    Raises:
+        OSError: the folder cannot be read, or a file cannot be deleted.
+    """
+    parts = oldest_first(folder, robot)
+    total, deleted = sum(size for _, size in parts), []
+    for path, size in parts:
+        if total <= most_bytes:
+            break
+        if _delete(path):
+            deleted.append(path)
+            total -= size
+    return deleted
 
 
 def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
@@ -121,7 +112,7 @@ class DiskBudget:
         least_free_bytes: space that must stay free on the disk.
         part_s: age at which the next part begins [s]; 0 for never. Until the footer of a part is
             written, rerun's index of it grows by a megabyte a minute.
-        quota: of all recordings of the robot.
+        robot, quota_bytes: name of the robot, and limit of all its recordings; 0 for none.
 
     Raises:
         BadConfiguration: a size is impossible.
@@ -130,23 +121,23 @@ class DiskBudget:
     part_bytes: int
     least_free_bytes: int
     part_s: float = 0.0
-    quota: Quota | None = None
+    robot: str = ""
+    quota_bytes: int = 0
 
     def __post_init__(self) -> None:
-        quota_bytes = self.quota.most_bytes if self.quota else 0
         for name, given, least in (
             ("part_bytes", self.part_bytes, 1),
             ("least_free_bytes", self.least_free_bytes, 0),
             ("part_s", self.part_s, 0),
-            ("quota_bytes", quota_bytes, 0),
+            ("quota_bytes", self.quota_bytes, 0),
         ):
             # Negated comparisons also catch NaN.
             if not given >= least:
                 raise BadConfiguration(f"{name} must be at least {least}, got {given}")
-        if 0 < quota_bytes < 2 * self.part_bytes:
+        if 0 < self.quota_bytes < 2 * self.part_bytes:
             raise BadConfiguration(
                 f"quota_bytes must be 0 or at least two parts, {2 * self.part_bytes}, "
-                f"got {quota_bytes}"
+                f"got {self.quota_bytes}"
             )
 
     def is_full(self, folder: Path) -> bool:
@@ -159,10 +150,11 @@ class DiskBudget:
 
     def keep_quota(self, folder: Path) -> None:
         """Delete the oldest parts in ``folder`` above the quota."""
-        if self.quota is None:
+        if not self.quota_bytes:
             return
         try:
-            deleted = self.quota.keep(folder, self.part_bytes)
+            # The part that is being written may become as large as any.
+            deleted = delete_oldest(folder, self.robot, self.quota_bytes - self.part_bytes)
         except OSError as error:
             LOG.warning("recordings above their quota stay: %s", error)
             return
@@ -181,7 +173,8 @@ def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
         limits.part_mb * MEGABYTE,
         limits.least_free_mb * MEGABYTE,
         60.0 * limits.part_min,
-        Quota(robot, limits.quota_mb * MEGABYTE),
+        robot,
+        limits.quota_mb * MEGABYTE,
     )
 
 

@@ -14,7 +14,7 @@ from fasaco_edge.recording.sdk import rr, rrb
 
 
 class LatchedState:
-    """Initial data of each part: static data, newest latched data, properties, layout, times.
+    """Initial data of each part: static data, newest latched data, name, layout, times.
 
     Attributes:
         wall_ns: the time of the next log call [ns].
@@ -24,7 +24,6 @@ class LatchedState:
         self.wall_ns = 0
         self.blueprint = blueprint
         self.name = name
-        self.properties: dict[str, str] = {}
         self.static: dict[str, tuple[rr.AsComponents, ...]] = {}
         self.sequences: dict[str, int] = {}
         self._latched: dict[str, rr.AsComponents] = {}
@@ -39,16 +38,10 @@ class LatchedState:
     def begin(self, stream: rr.RecordingStream) -> None:
         """Begin a part with all data in force."""
         send_blueprint(stream, self.blueprint)
-        self.send_description(stream)
+        stream.send_recording_name(self.name)
         for entity, archetypes in self.static.items():
             stream.log(entity, *archetypes, static=True)
         self.send_latched(stream)
-
-    def send_description(self, stream: rr.RecordingStream) -> None:
-        """Write name and properties."""
-        stream.send_recording_name(self.name)
-        if self.properties:
-            stream.send_property(entities.APPLICATION, rr.AnyValues(**self.properties))
 
     def send_latched(self, stream: rr.RecordingStream) -> None:
         """Write latched data, missed ones at their time of arrival."""

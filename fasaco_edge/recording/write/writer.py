@@ -164,11 +164,11 @@ class RecordingWriter:
         if (stream := self._stream) is not None:
             stream.log(entity, *archetypes, static=True)
 
-    def describe(self, name: str, properties: dict[str, str]) -> None:
-        """Name the recording, and set its properties."""
-        self._latched.name, self._latched.properties = name, properties
+    def describe(self, name: str) -> None:
+        """Name the recording."""
+        self._latched.name = name
         if (stream := self._stream) is not None:
-            self._latched.send_description(stream)
+            stream.send_recording_name(name)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
         """Make ``blueprint`` the active one; the last one in a file counts."""
