@@ -60,7 +60,6 @@ RECORDER_CPU_S: Final = "metrics/recorder_cpu_s"
 BATTERY: Final = "metrics/resources/battery"
 
 MISSION_STATE: Final = "state/mission"
-PLANNER_STATE: Final = "state/planner"
 RECORDER_STATE: Final = "state/recorder"
 
 PATH_LOG: Final = "log/path"

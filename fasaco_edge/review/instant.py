@@ -333,7 +333,7 @@ def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapTh
     since_s = max(at_s - MAP_S, 0.0)
     old: OccupancyGrid | None = None
     new: OccupancyGrid | None = None
-    for came_s, grid in maps_of(RecordedSamples.of(record.batches), record.clock):
+    for came_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
         if came_s > at_s:
             break
         new = grid

@@ -62,7 +62,7 @@ def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> 
     """
     total, numbers = count_frames(paths), count(1)
     record = read_run_record(paths, lambda: progress("reading", next(numbers), total))
-    samples = RecordedSamples.of(record.batches)
+    samples = RecordedSamples((), record.batches)
     # Samples are numbered: the last batch shows their approximate number.
     about = max(batch.place.first for batch in record.batches) + 1
     data = gather(_reported(samples, progress, "decoding", about), record.clock)

@@ -130,7 +130,7 @@ class _Recorded:
         record, footprint = self._review.record, self._review.data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
         since = np.full(len(self.places), np.nan)
-        for at_s, grid in maps_of(RecordedSamples.of(record.batches), record.clock):
+        for at_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
             free = (grid.cells >= FREE) & (grid.cells <= free_at_most)
             is_free = grid.geometry.values_at(free, self.places)
             since = np.where(is_free, np.fmin(since, at_s), np.nan)

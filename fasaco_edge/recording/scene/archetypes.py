@@ -273,7 +273,6 @@ STATES: dict[str, dict[str, int]] = {
         "done": BLUE,
         "silent": AMBER,
     },
-    entities.PLANNER_STATE: {"idle": GREY, "planning": VIOLET},
     entities.RECORDER_STATE: {
         "recording": GREEN,
         "disk full": RED,

@@ -234,7 +234,6 @@ class Scene:
             self._paths.finish()
             self._writer.at(self._writer.wall_ns + 1)
         self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
-        self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
         self._add_troubles(status)
         self._add_errors(status.errors)
 
