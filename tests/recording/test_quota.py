@@ -42,22 +42,11 @@ def test_runs_that_begin_in_the_same_second_do_not_meet(tmp_path):
     assert order(tmp_path) == names
 
 
-def test_a_robot_name_that_ends_in_a_number_keeps_its_recordings(tmp_path):
-    """File names once marked a second run in the same second by a number after the name."""
-    theirs, ours = "20261120T100000Z-maja-2-part1.rrd", "20261120T100005Z-maja-part1.rrd"
-    for name in (theirs, ours):
-        (tmp_path / name).write_bytes(bytes(10))
-    assert order(tmp_path, "maja-2") == [theirs]
-    assert [path.name for path in delete_oldest(tmp_path, "maja", 1)] == [ours]
-    assert (tmp_path / theirs).is_file()
-
-
 def test_runs_without_a_number_are_older_than_those_with_one(tmp_path):
     old = [
         "20261101T000012Z-maja-part1.rrd",
         "20261120T100000Z-maja-part2.rrd",
         "20261120T100000Z-maja-part10.rrd",
-        "20261120T100000Z-maja-2-part1.rrd",
     ]
     for name in old:
         (tmp_path / name).write_bytes(bytes(10))

@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
-from fasaco_edge.errors import BadConfiguration, UnreadableRecording
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.sdk import rr
@@ -216,12 +216,6 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(BadConfiguration, match="cannot record into"):
         writer_in(tmp_path / "file" / "runs")
-
-
-def test_what_is_no_recording_is_said_to_be_none(tmp_path):
-    (tmp_path / "a.rrd").write_text("hello")
-    with pytest.raises(UnreadableRecording, match=r"a\.rrd"):
-        read_summary(tmp_path / "a.rrd")
 
 
 def read_cards(part):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import signal
 import time
 
@@ -13,7 +12,7 @@ from PIL import Image
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
-from fasaco_edge.errors import DifferentRuns, UnreadableRecording
+from fasaco_edge.errors import DifferentRuns
 from fasaco_edge.review.comparison import side_by_side
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.review import read_review
@@ -229,23 +228,3 @@ def test_what_is_no_recording_is_named(tmp_path, capsys):
     (tmp_path / "text.rrd").write_text("hello")
     assert main(["review", str(tmp_path / "text.rrd")]) == 1
     assert "this is no recording" in capsys.readouterr().err
-
-
-def test_a_recording_without_samples_is_named(tmp_path):
-    import rerun as rr
-
-    stream = rr.RecordingStream("other", recording_id="other")
-    stream.set_sinks(rr.FileSink(str(tmp_path / "other.rrd")))
-    stream.log("a", rr.TextDocument("b"), static=True)
-    stream.disconnect()
-    with pytest.raises(UnreadableRecording, match="holds no samples"):
-        read_review([tmp_path / "other.rrd"])
-
-
-def test_nothing_but_a_header_holds_no_samples(parts, tmp_path):
-    header = tmp_path / "header.rrd"
-    shutil.copy(parts[0], header)
-    with header.open("r+b") as file:
-        file.truncate(40)
-    with pytest.raises(UnreadableRecording, match=r"header\.rrd"):
-        read_review([header])

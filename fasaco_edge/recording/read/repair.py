@@ -8,7 +8,6 @@ than the last frame may be missing.
 
 from __future__ import annotations
 
-import errno
 import fcntl
 import os
 import struct
@@ -123,7 +122,6 @@ def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
 
 def _end_of_data(recording: BinaryIO, total: int) -> int:
     """Return the offset of the zeros at the end of a file [bytes]."""
-    total = _end_on_disk(recording.fileno(), total)
     while total:
         start = max(total - _BLOCK, 0)
         recording.seek(start)
@@ -131,24 +129,6 @@ def _end_of_data(recording: BinaryIO, total: int) -> int:
             return start + len(solid)
         total = start
     return 0
-
-
-def _end_on_disk(descriptor: int, total: int) -> int:
-    """Return the offset of the hole at the end of a file [bytes]; the file size if there is none.
-
-    A hole of 50 GB takes no space, but a minute to read.
-    """
-    before, low, high = os.lseek(descriptor, 0, os.SEEK_CUR), 0, total
-    while low < high:
-        middle = (low + high) // 2
-        try:
-            low = os.lseek(descriptor, middle, os.SEEK_DATA) + 1
-        except OSError as error:
-            if error.errno != errno.ENXIO:
-                return total
-            high = middle  # only a hole from there on
-    os.lseek(descriptor, before, os.SEEK_SET)
-    return high
 
 
 def repair_recording(path: Path) -> Repair | None:

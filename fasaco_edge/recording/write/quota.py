@@ -72,21 +72,14 @@ def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     Raises:
         OSError: the folder cannot be read.
     """
-    named = re.compile(
-        # Without a leading number, a second run within a second has a trailing one.
-        rf"(?:run(\d{{5,9}})-)?(\d{{8}}T\d{{6}}Z)-{re.escape(robot)}(?(1)|(?:-(\d+))?)-part(\d+)\.rrd"
-    )
-    matches = {path: match for path in folder.iterdir() if (match := named.fullmatch(path.name))}
-    firsts = {match[2] for match in matches.values() if not match[1] and not match[3]}
+    # The numbers of runs count on, whatever the clock says; parts have numbers, too.
+    named = re.compile(rf"(?:run(\d{{5,9}})-)?(\d{{8}}T\d{{6}}Z)-{re.escape(robot)}-part(\d+)\.rrd")
     found = []
-    for path, match in matches.items():
-        run, began, again, part = match.groups()
-        # A number after the name may be the end of another robot's name: then the first of the
-        # runs of that second is missing.
-        is_ours = not again or began in firsts
-        if is_ours and path.is_file() and not path.is_symlink():
-            age = (int(run), "", 0) if run else (0, began, int(again or 1))
-            found.append((*age, int(part), path, path.stat().st_size))
+    for path in folder.iterdir():
+        match = named.fullmatch(path.name)
+        if match and path.is_file() and not path.is_symlink():
+            run, began, part = match.groups()
+            found.append((int(run or 0), began, int(part), path, path.stat().st_size))
     return [(path, size) for *_, path, size in sorted(found)]
 
 
