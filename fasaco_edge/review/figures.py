@@ -210,9 +210,7 @@ def _not_recorded(review: Review) -> dict[str, str]:
             "no recorded status has figures of the floor"
         )
     if data.counts is None:
-        why["covered_cells, coverable_cells, recovered_cells, reached_s"] = (
-            "no recorded status counts cells"
-        )
+        why["covered_cells, coverable_cells, recovered_cells"] = "no recorded status counts cells"
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"
     if review.faults.lost is None:

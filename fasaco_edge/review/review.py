@@ -128,10 +128,19 @@ class Review:
 
     @property
     def covered_share(self) -> NDArray[np.float64]:
-        """Times [s] and covered shares of the cells that could be covered at the end, (n, 2)."""
-        at_s, counts = self.data.counted_s, self.data.counts
-        count = np.arange(len(at_s)) + 1.0
-        return np.column_stack((at_s, count / max(counts.coverable, 1) if counts else count))
+        """Times [s] and covered shares of the cells that could be covered at the end, (n, 2).
+
+        They are drawn every two seconds, of the cells known then: statuses, which are recorded
+        four times a minute, say how many these were.
+        """
+        counts = [(each.at_s, each.status.coverage) for each in self.data.statuses]
+        known = [(at_s, count.coverable) for at_s, count in counts if count and count.coverable]
+        drawn = self.record.plots.get(entities.COVERED_FRACTION)
+        if not known or drawn is None:
+            return np.zeros((0, 2))
+        at_s, coverable = np.array(known, np.float64).T
+        then = np.interp(drawn[:, 0], at_s, coverable)
+        return np.column_stack((drawn[:, 0], drawn[:, 1] * then / coverable[-1]))
 
     @property
     def complete(self) -> bool | None:
@@ -161,15 +170,13 @@ class Review:
 
     @property
     def reached_s(self) -> dict[int, float | None] | None:
-        """When each of ``MILESTONES`` was reached [s]; None if not recorded."""
-        if (counts := self.data.counts) is None:
+        """When each of ``MILESTONES`` was reached for good [s]; None if not recorded."""
+        at_s, shares = self.covered_share.T
+        if not len(at_s):
             return None
-        needed = {percent: -(-counts.coverable * percent // 100) for percent in MILESTONES}
-        at_s = self.data.counted_s
-        return {
-            percent: float(at_s[count - 1]) if 0 < count <= len(at_s) else None
-            for percent, count in needed.items()
-        }
+        below = {p: np.flatnonzero(shares < p / 100 - 1e-9) for p in MILESTONES}
+        first = {p: int(found[-1]) + 1 if len(found) else 0 for p, found in below.items()}
+        return {p: float(at_s[index]) if index < len(at_s) else None for p, index in first.items()}
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:

@@ -123,26 +123,6 @@ class RunData:
         return next((count for count in counted if count is not None), None)
 
     @property
-    def counted_s(self) -> NDArray[np.float64]:
-        """When the daemon had counted each number of covered cells [s], float64 (n,), rising.
-
-        A recording has a status each quarter of a minute: cells are interpolated evenly between
-        two of them. Cells that stopped counting, as after a reset or a loop closure, count from
-        their next coverage.
-        """
-        at_s: list[float] = []
-        before_s: float | None = None
-        for each in self.statuses:
-            if (coverage := each.status.coverage) is None:
-                continue
-            del at_s[coverage.covered :]
-            since_s = each.at_s if before_s is None else before_s
-            more = coverage.covered - len(at_s)
-            at_s += np.linspace(since_s, each.at_s, more + 1)[1:].tolist()
-            before_s = each.at_s
-        return np.array(at_s, np.float64)
-
-    @property
     def ledger_floor(self) -> FloorReport | None:
         """The daemon's last report of the floor; None if there is none."""
         floors = (each.status.floor for each in reversed(self.statuses))

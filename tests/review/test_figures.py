@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.cli.review.screen import curve
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.moments import (
@@ -14,28 +15,32 @@ from fasaco_edge.review.moments import (
     longest_stand,
     spans_of,
 )
+from fasaco_edge.review.review import review_of
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import Status
 
 
-@pytest.mark.parametrize(
-    ("counted", "first_s"),
-    [
-        ([(1.0, 0), (2.0, 2), (3.0, 3)], [1.5, 2.0, 3.0]),
-        # A loop closure: one of three counts no more, then others do.
-        ([(1.0, 3), (2.0, 2), (3.0, 2), (4.0, 4)], [1.0, 1.0, 3.5, 4.0]),
-        ([(1.0, 3), (2.0, 0), (3.0, 1)], [3.0]),
-    ],
-    ids=["rising", "a loop closure", "a reset"],
-)
-def test_cells_that_stopped_counting_count_once_covered_again(counted, first_s):
+def shares(drawn, coverable):
+    """Return a review of drawn shares, (time, share), and of counts of cells, (time, count)."""
+    plots = {entities.COVERED_FRACTION: np.array(drawn, np.float64)}
     statuses = [
-        StatusSample(at_s, Status(coverage=CoverageReport(covered=covered)))
-        for at_s, covered in counted
+        StatusSample(at_s, Status(coverage=CoverageReport(coverable=cells)))
+        for at_s, cells in coverable
     ]
-    assert RunData(statuses=statuses).counted_s.tolist() == first_s
+    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
+    return review_of(record, RunData(statuses=statuses), 0)
+
+
+def test_shares_are_of_the_cells_known_at_the_end():
+    drawn = [(0.0, 0.0), (2.0, 0.5), (4.0, 0.6), (6.0, 0.4), (8.0, 1.0)]
+    found = shares(drawn, [(0.0, 50), (4.0, 100)])
+    assert found.covered_share[:, 1] == pytest.approx([0.0, 0.375, 0.6, 0.4, 1.0])
+    # What was reached and then lost, as by a loop closure, counts once it is reached again.
+    assert found.reached_s == dict.fromkeys((50, 90, 99, 100), 8.0)
+    assert shares(drawn[:3], [(0.0, 100)]).reached_s == {50: 2.0, 90: None, 99: None, 100: None}
+    assert shares(drawn, []).reached_s is None
 
 
 def test_the_longest_stand_neither_drives_nor_turns():

@@ -13,11 +13,14 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.review.comparison import side_by_side
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.messages.maps import CoverageValue, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
 from tests.support.recordings import (
     TIMEOUT_S,
@@ -51,6 +54,7 @@ def run_told(folder, *, faults, silent=0, killed=False):
             "pose": Sender(bus, topics.POSE),
             "path": Sender(bus, topics.PATH),
             "status": Sender(bus, topics.STATUS),
+            "coverage": Sender(bus, topics.COVERAGE),
         }
         with recorder_process(bus, endpoint, folder, part_bytes=1) as recorder:
             sent = 0
@@ -68,6 +72,7 @@ def run_told(folder, *, faults, silent=0, killed=False):
                 note = {"revision": revision + 1, "reason": why, "planner": planner, "plan_ms": ms}
                 put("path", _path(), note)
             put("status", _status("covering", "path 1", {}))
+            put("coverage", _coverage())
             for x in WAY:
                 put("pose", pose_bytes(x, Y))
             # A part ends with a flush, and these are seconds apart.
@@ -108,6 +113,12 @@ def _status(state, reason, faults, troubles=()):
         | {"coverage": {"coverable": 24, "covered": 0 if state == "planning" else 4}}
         | {"errors": errors, "recorder": {"lost": 2}, "map": {"rows": 1}, "troubles": troubles}
     )
+
+
+def _coverage():
+    cells = np.full((4, 6), CoverageValue.TO_COVER, np.int8)
+    cells[0, :4] = CoverageValue.COVERED
+    return encode_occupancy_grid(OccupancyGrid(GridGeometry(4, 6, 0.3, Pose2D(0.3, 0.3)), cells))
 
 
 def _path():

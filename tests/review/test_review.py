@@ -76,23 +76,21 @@ def test_the_cells_are_those_under_the_tool_of_the_simulated_robot(told, review,
     assert told["driven_m"] == pytest.approx(driven, rel=0.03)
 
 
-def test_shares_are_reached_as_the_daemon_counted(told, review):
+def test_shares_are_reached_when_they_were(told, review, recording):
+    began = _began(recording, review)
     counts = [
-        (sample.at_s, sample.status.coverage.covered)
-        for sample in review.data.statuses
-        if sample.status.coverage
+        (at - began, status["coverage"]["covered"])
+        for at, status in recording.statuses
+        if status["coverage"]
     ]
+    # The share is drawn every two seconds; a slow computer brings statuses late.
+    late_s = 0.3 + max(np.diff([at for at, _ in counts]))
     for percent, at_s in told["reached_s"].items():
         needed = -(-told["coverable_cells"] * int(percent) // 100)
-        at = next(at for at, (_, count) in enumerate(counts) if count >= needed)
-        # A status comes each quarter of a minute; the robot covers cells between them, too.
-        before_s = counts[at - 1][0] if at else 0.0
-        assert before_s - 1e-3 <= at_s <= counts[at][0] + 1e-3
-        if at and counts[at][1] > needed > counts[at - 1][1]:
-            assert before_s < at_s < counts[at][0]
+        assert all(count < needed for at, count in counts if at < at_s - 2.0 - late_s)
+        assert all(count >= needed for at, count in counts if at > at_s + late_s)
     at_s, shares = review.covered_share.T
     assert np.all(np.diff(at_s) >= 0.0)
-    assert len(shares) == told["coverable_cells"]
     assert shares[-1] == 1.0
 
 
