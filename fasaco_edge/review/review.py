@@ -37,7 +37,7 @@ from fasaco_edge.review.moments import (
     spans_of,
     troubles_at_rest,
 )
-from fasaco_edge.review.orders import OrderChapter, chapters
+from fasaco_edge.review.orders import OVER, OrderChapter, chapters
 from fasaco_edge.review.rooms import RoomChapter, room_chapters
 from fasaco_edge.review.run_data import RunData, gather
 
@@ -130,17 +130,26 @@ class Review:
     def covered_share(self) -> NDArray[np.float64]:
         """Times [s] and covered shares of the cells that could be covered at the end, (n, 2).
 
-        They are drawn every two seconds, of the cells known then: statuses, which are recorded
-        four times a minute, say how many these were.
+        They are drawn every two seconds, of the cells known then; statuses, recorded four times a
+        minute and at the end, say how many these were.
         """
-        counts = [(each.at_s, each.status.coverage) for each in self.data.statuses]
-        known = [(at_s, count.coverable) for at_s, count in counts if count and count.coverable]
-        drawn = self.record.plots.get(entities.COVERED_FRACTION)
-        if not known or drawn is None:
+        known = [
+            (each.at_s, count.covered, count.coverable, each.status.state in OVER)
+            for each in self.data.statuses
+            if (count := each.status.coverage) is not None
+        ]
+        if not known or not known[-1][2]:
             return np.zeros((0, 2))
-        at_s, coverable = np.array(known, np.float64).T
-        then = np.interp(drawn[:, 0], at_s, coverable)
-        return np.column_stack((drawn[:, 0], drawn[:, 1] * then / coverable[-1]))
+        at_s, covered, coverable, is_over = np.array(known, np.float64).T
+        drawn = self.record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
+        # It is drawn a little late: once an order is over, it says nothing new.
+        before = np.searchsorted(at_s, drawn[:, 0], side="right") - 1
+        drawn = drawn[(before < 0) | (is_over[before] == 0)]
+        more = drawn[:, 1] * np.interp(drawn[:, 0], at_s, coverable)
+        points = np.vstack([np.column_stack((drawn[:, 0], more)), np.column_stack((at_s, covered))])
+        points[:, 1] /= coverable[-1]
+        found: NDArray[np.float64] = points[np.argsort(points[:, 0], kind="stable")]
+        return found
 
     @property
     def complete(self) -> bool | None:

@@ -22,24 +22,35 @@ from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import Status
 
 
-def shares(drawn, coverable):
-    """Return a review of drawn shares, (time, share), and of counts of cells, (time, count)."""
+def shares(drawn, counted):
+    """Return a review of drawn shares, (time, share), and of counts, (time, covered, coverable).
+
+    The mission is done once all is covered.
+    """
     plots = {entities.COVERED_FRACTION: np.array(drawn, np.float64)}
     statuses = [
-        StatusSample(at_s, Status(coverage=CoverageReport(coverable=cells)))
-        for at_s, cells in coverable
+        StatusSample(
+            at_s,
+            Status(
+                state="done" if covered == cells else "covering",
+                coverage=CoverageReport(coverable=cells, covered=covered),
+            ),
+        )
+        for at_s, covered, cells in counted
     ]
     record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
     return review_of(record, RunData(statuses=statuses), 0)
 
 
 def test_shares_are_of_the_cells_known_at_the_end():
-    drawn = [(0.0, 0.0), (2.0, 0.5), (4.0, 0.6), (6.0, 0.4), (8.0, 1.0)]
-    found = shares(drawn, [(0.0, 50), (4.0, 100)])
-    assert found.covered_share[:, 1] == pytest.approx([0.0, 0.375, 0.6, 0.4, 1.0])
+    drawn, begun = [(0.0, 0.0), (2.0, 0.5), (5.0, 0.6), (6.0, 0.4), (9.0, 0.9)], (0.0, 0, 50)
+    found = shares(drawn, [begun, (4.0, 50, 100), (8.0, 100, 100)])
+    assert found.covered_share[:, 0].tolist() == [0.0, 0.0, 2.0, 4.0, 5.0, 6.0, 8.0]
+    assert found.covered_share[:, 1] == pytest.approx([0.0, 0.0, 0.375, 0.5, 0.6, 0.4, 1.0])
     # What was reached and then lost, as by a loop closure, counts once it is reached again.
     assert found.reached_s == dict.fromkeys((50, 90, 99, 100), 8.0)
-    assert shares(drawn[:3], [(0.0, 100)]).reached_s == {50: 2.0, 90: None, 99: None, 100: None}
+    found = shares(drawn[:3], [begun, (4.0, 50, 100)])
+    assert found.reached_s == {50: 4.0, 90: None, 99: None, 100: None}
     assert shares(drawn, []).reached_s is None
 
 
