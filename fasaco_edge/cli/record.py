@@ -146,16 +146,16 @@ def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettin
     from fasaco_edge.config.robot import RobotConfig
 
     keys, bus, _ = robot_on_bus(args)
+    sizes = {name: getattr(args, name) for name in RecordingConfig.__struct_fields__}
+    try:
+        recording = msgspec.convert(sizes, RecordingConfig)
+    except msgspec.ValidationError as error:
+        raise BadConfiguration(f"disk space: {error}") from error
     config = DaemonConfig(
         robot=RobotConfig(name=keys.robot),
         bus=BusConfig(base=keys.base),
         pose=PoseConfig(schema=args.pose_schema),
-        recording=RecordingConfig(
-            part_mb=args.part_mb,
-            part_min=args.part_min,
-            quota_mb=args.quota_mb,
-            least_free_mb=args.least_free_mb,
-        ),
+        recording=recording,
         ros2=args.ros2 or msgspec.UNSET,
     )
     return config, bus

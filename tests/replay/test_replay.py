@@ -106,23 +106,6 @@ def test_an_update_is_lost(samples, config, share):
     assert_told(story)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_an_update_comes_again_later(samples, config, share):
-    updates = places(samples, "map_update")
-    index = int(share * (len(updates) - 3))
-    story = played(scenarios.repeated(samples, updates[index], updates[index + 2]), config)
-    assert story.faults == []
-    assert_told(story)
-
-
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_two_updates_are_exchanged(samples, config, share):
-    updates = places(samples, "map_update")
-    index = int(share * (len(updates) - 2))
-    story = played(scenarios.swapped(samples, updates[index], updates[index + 1]), config)
-    assert_told(story)
-
-
 def test_no_update_comes_at_all(samples, config, as_it_was):
     """The robot drives on into what the map does not know."""
     last_map = places(samples, "map")[-1]
@@ -134,18 +117,6 @@ def test_no_update_comes_at_all(samples, config, as_it_was):
         assert story.mission.reason
     else:
         assert_told(story)
-
-
-@pytest.mark.parametrize("share", [0.3, 0.6])
-def test_the_mapper_starts_anew(samples, config, as_it_was, share):
-    index = int(share * len(samples))
-    story = played(scenarios.mapper_restarted(samples, index), config)
-    origin, before = (of.mission.grid.geometry.origin for of in (story, as_it_was))
-    assert (origin.x, origin.y) != (before.x, before.y)
-    assert_told(story)
-    # Cells keep their place in the frame: nothing that was covered is forgotten.
-    assert story.visited <= as_it_was.visited
-    assert story.mission.ledger.total == as_it_was.mission.ledger.total
 
 
 @pytest.mark.parametrize("late_s", [0.1, 0.5, 2.0])

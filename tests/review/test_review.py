@@ -188,6 +188,8 @@ def test_the_card_says_what_was_run(told, recording):
     assert told["config"]["planner.budget_s"] == config["planner"]["budget_s"] == 0.05
     assert told["map"]["rows"] == recording.status["map"]["rows"]
     assert told["not_recorded"] == {}
+    # It was not said to be simulated: times are the recorder's.
+    assert (told["time_scale"], told["duration_s"]) == (1.0, told["recorded_s"])
 
 
 def test_the_longest_stand_is_one(review, told):

@@ -106,9 +106,6 @@ class DiskBudget:
         part_s: age at which the next part begins [s]; 0 for never. Until the footer of a part is
             written, rerun's index of it grows by a megabyte a minute.
         robot, quota_bytes: name of the robot, and limit of all its recordings; 0 for none.
-
-    Raises:
-        BadConfiguration: a size is impossible.
     """
 
     part_bytes: int
@@ -116,22 +113,6 @@ class DiskBudget:
     part_s: float = 0.0
     robot: str = ""
     quota_bytes: int = 0
-
-    def __post_init__(self) -> None:
-        for name, given, least in (
-            ("part_bytes", self.part_bytes, 1),
-            ("least_free_bytes", self.least_free_bytes, 0),
-            ("part_s", self.part_s, 0),
-            ("quota_bytes", self.quota_bytes, 0),
-        ):
-            # Negated comparisons also catch NaN.
-            if not given >= least:
-                raise BadConfiguration(f"{name} must be at least {least}, got {given}")
-        if 0 < self.quota_bytes < 2 * self.part_bytes:
-            raise BadConfiguration(
-                f"quota_bytes must be 0 or at least two parts, {2 * self.part_bytes}, "
-                f"got {self.quota_bytes}"
-            )
 
     def is_full(self, folder: Path) -> bool:
         """Return whether ``folder`` has less free space than required."""
@@ -162,6 +143,11 @@ def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
         BadConfiguration: a size is impossible, or the robot's name is no key.
     """
     limits, robot = config.recording, name or config.keys().robot
+    if 0 < limits.quota_mb < 2 * limits.part_mb:
+        raise BadConfiguration(
+            f"a quota has to be 0 or at least two parts, {2 * limits.part_mb} MB, "
+            f"got {limits.quota_mb} MB"
+        )
     return DiskBudget(
         limits.part_mb * MEGABYTE,
         limits.least_free_mb * MEGABYTE,
