@@ -8,6 +8,7 @@ from typing import TypeGuard
 
 import msgspec
 
+from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.review.document import MILESTONES, ReviewDocument
 from fasaco_edge.review.wording import NOT_KNOWN, clock, count
 
@@ -155,6 +156,13 @@ class Figure:
         return (f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}") if less else "0"
 
 
+def floor_words(document: ReviewDocument) -> str:
+    """Return swept and reachable floor in words; "" where they are not known."""
+    if document.swept_m2 is None or document.reachable_m2 is None:
+        return ""
+    return swept_words(document.swept_m2, document.reachable_m2)
+
+
 def figures(document: ReviewDocument) -> Iterator[Figure]:
     """Yield the figures used to compare two runs."""
     share = f" ({document.share_covered})" if document.share_covered else ""
@@ -163,7 +171,7 @@ def figures(document: ReviewDocument) -> Iterator[Figure]:
     yield Figure("duration", clock(document.duration_s), document.duration_s)
     text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
     yield Figure("covered", text, covered)
-    yield Figure("floor swept", document.swept_words or NOT_KNOWN, document.swept_m2)
+    yield Figure("floor swept", floor_words(document) or NOT_KNOWN, document.swept_m2)
     patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
     yield Figure("patches left, over 4 dm2", count(patches, ""), patches)
     yield Figure("largest patch left", count(largest_m2, "m2"), largest_m2)

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.judge.floor import swept_words
-
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Stand
     from fasaco_edge.review.orders import CommandThen, OrderChapter
@@ -219,13 +217,6 @@ class ReviewDocument(msgspec.Struct):
     def is_ended(self) -> bool:
         """Whether each part was closed properly."""
         return all(part.ended for part in self.files)
-
-    @property
-    def swept_words(self) -> str:
-        """Swept and reachable floor, as text; "" where they are not known."""
-        if self.swept_m2 is None or self.reachable_m2 is None:
-            return ""
-        return swept_words(self.swept_m2, self.reachable_m2)
 
     @property
     def share_covered(self) -> str | None:

@@ -86,9 +86,8 @@ class Scene:
         self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
 
     def _draw_grid(self, grid: OccupancyGrid) -> None:
-        before, self._map = self._map, grid
-        is_same = before is not None and before.geometry == grid.geometry
-        if before is not None and is_same and np.array_equal(before.cells, grid.cells):
+        self._map = grid
+        if self._comes_again(entities.MAP, grid.geometry, grid.cells):
             return
 
         def draw_map() -> rr.GridMap:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from msgspec.structs import astuple
 
 from fasaco_edge.client.phrases import scale_words
-from fasaco_edge.review.comparison import figures
+from fasaco_edge.review.comparison import figures, floor_words
 from fasaco_edge.review.document import MILESTONES, ReviewDocument
 from fasaco_edge.review.orders import order_words
 from fasaco_edge.review.rooms import room_at
@@ -213,8 +213,8 @@ def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
 
 def _ending(document: ReviewDocument) -> str:
     if document.complete:
-        floor = f"; {document.swept_words} of floor swept" if document.swept_words else ""
-        return f"complete: every cell covered{floor}"
+        floor = floor_words(document)
+        return "complete: every cell covered" + (f"; {floor} of floor swept" if floor else "")
     if document.complete is None:
         return "not recorded whether it was completed"
     covered, coverable = document.covered_cells, document.coverable_cells
