@@ -9,7 +9,8 @@ from typing import TypeGuard
 import msgspec
 
 from fasaco_edge.judge.floor import swept_words
-from fasaco_edge.review.document import MILESTONES, ReviewDocument
+from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.wording import NOT_KNOWN, clock, count
 
 # Keys of the configuration by the name of a setting.

@@ -16,10 +16,6 @@ if TYPE_CHECKING:
     from fasaco_edge.review.spot import LeftPatch
 
 
-MILESTONES = (50, 90, 99, 100)
-"""Shares of the cells that can be covered at the end [percent]."""
-
-
 class RecordedFile(msgspec.Struct):
     """A file of a recording."""
 

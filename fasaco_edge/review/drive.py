@@ -20,6 +20,9 @@ from fasaco_edge.mission.orders.zones import with_kept_out
 from fasaco_edge.review.run_data import RunData
 from fasaco_edge.wire.documents.settings import known_settings
 
+MILESTONES = (50, 90, 99, 100)
+"""Shares of the cells that can be covered at the end [percent]."""
+
 
 def visits_of(data: RunData, lattice: CoverageLattice) -> NDArray[np.uint16]:
     """Return how often the tool passed over each cell, shape of the lattice."""

@@ -23,8 +23,7 @@ from fasaco_edge.recording.read.run import (
     count_frames,
     read_run_record,
 )
-from fasaco_edge.review.document import MILESTONES
-from fasaco_edge.review.drive import swept_floor, visits_of
+from fasaco_edge.review.drive import MILESTONES, swept_floor, visits_of
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,

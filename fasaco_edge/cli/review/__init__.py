@@ -158,10 +158,6 @@ def run(args: argparse.Namespace) -> int:
         print_comparison(document, document_of(other))
     else:
         print_review(review, document, full=args.long)
-    if args.png:
-        from fasaco_edge.review.output.pictures import draw_review
-
-        _save(draw_review([review, other] if other else [review]), review, args.png)
     if args.export:
         from fasaco_edge.review.output.export import export
 
@@ -170,6 +166,10 @@ def run(args: argparse.Namespace) -> int:
         width = max(len(str(file)) for file, _ in written)
         for file, what in written:
             terminal.err().print(f"{file!s:{width}}  {what}", soft_wrap=True, highlight=False)
+    if args.png:
+        from fasaco_edge.review.output.pictures import draw_review
+
+        _save(draw_review([review, other] if other else [review]), review, args.png)
     return 0
 
 

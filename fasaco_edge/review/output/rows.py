@@ -9,7 +9,8 @@ from msgspec.structs import astuple
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.review.comparison import figures, floor_words
-from fasaco_edge.review.document import MILESTONES, ReviewDocument
+from fasaco_edge.review.document import ReviewDocument
+from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.orders import order_words
 from fasaco_edge.review.rooms import room_at
 from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
