@@ -20,7 +20,6 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
 from fasaco_edge.replay.replay import PROPOSALS, Replay, read_run
-from fasaco_edge.text import shown
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
 
 if TYPE_CHECKING:
@@ -40,8 +39,7 @@ in work. The same files give the same decisions on any machine.
 EPILOG = """\
 The column `then` shows whether the path equals the recorded one cell by cell; without a turn log
 paths are not compared. With --config or --work the replay is of another mission, and approximate,
-too. So is that of a daemon of an earlier release which planned with a planner of the user's own:
-those plans cannot be repeated, and `planner.name` plans instead.
+too. Plans of a user's own planner, as earlier releases had them, cannot be repeated.
 """
 
 
@@ -75,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)
     config = load_config(args.config) if args.config else recorded.daemon_config()
-    is_as_it_was = args.config is None and args.work is None and not recorded.own_planner
+    is_as_it_was = args.config is None and args.work is None
     record = read_turns(samples) if is_as_it_was else None
     replay: Replay | CycleReplay
     if record is not None:
@@ -150,7 +148,6 @@ class Summary(msgspec.Struct):
     samples_missing: int
     restored_cells_missing: int
     restarts_ignored: int
-    own_planner_missing: str
 
 
 def _summary(
@@ -181,7 +178,6 @@ def _summary(
         samples_missing=samples.missing,
         restored_cells_missing=recorded.restored_cells if is_approximate else 0,
         restarts_ignored=recorded.starts if is_approximate else 0,
-        own_planner_missing=recorded.own_planner,
     )
 
 
@@ -220,8 +216,6 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     ]
     if (same := summary.paths_as_recorded) is not None:
         rows.append(("as recorded", f"{same} of {summary.paths_recorded} paths"))
-    if own := summary.own_planner_missing:
-        rows.append(("own planner", f"{shown(own)}: its plans cannot be repeated"))
     if summary.samples_missing:
         rows.append(("not recorded", f"{summary.samples_missing} samples"))
     if summary.restored_cells_missing:

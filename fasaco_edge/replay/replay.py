@@ -70,13 +70,6 @@ class RecordedRun:
     starts: int = 0
     paths: Mapping[int, str] = field(default_factory=dict)
 
-    @property
-    def own_planner(self) -> str:
-        """The user's planner of an earlier release's daemon, which made its plans; "" for none."""
-        planner = self.config.get("planner")
-        own = planner.get("own") if isinstance(planner, Mapping) else None
-        return own if isinstance(own, str) else ""
-
     def daemon_config(self) -> DaemonConfig:
         """Return the configuration in the keys and names of this release.
 

@@ -144,6 +144,23 @@ def test_no_part_is_written_below_the_floor(tmp_path):
     assert writer.close()
 
 
+def test_what_came_while_the_disk_was_full_stands_where_it_came(tmp_path, monkeypatch):
+    clock = Clock()
+    writer = writer_in(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(DiskBudget, "is_full", lambda *_: True)
+        writer.sync(clock.tick())
+    assert writer.state is WriterState.DISK_FULL
+    came_ns = clock.now_ns
+    writer.at(came_ns)
+    writer.log(entities.MISSION_STATE, rr.StateChange(state="blocked"), latched=True)
+    writer.at(came_ns + 10**10)
+    writer.sync(clock.tick() + RETRY_PERIOD_NS)
+    assert writer.close()
+    column = read_column(tmp_path / f"{RUN}-part2.rrd", entities.MISSION_STATE, "StateChange:state")
+    assert column.wall_ns.tolist() == [came_ns]
+
+
 @pytest.mark.parametrize("least_free_bytes", [0, 1000])
 def test_a_deleted_part_is_reported_and_followed_by_another(tmp_path, caplog, least_free_bytes):
     clock, folder = Clock(), tmp_path / "runs"
