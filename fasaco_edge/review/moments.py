@@ -192,13 +192,11 @@ class Faults:
     Attributes:
         by_code: messages refused by the daemon.
         lost: samples that the recorder could not write; None where that is not recorded.
-        torn_bytes: what a crash tore off the files [bytes].
         complaints: warnings in the recorder's log.
     """
 
     by_code: dict[str, int]
     lost: int | None
-    torn_bytes: int
     complaints: tuple[str, ...]
 
     @property
@@ -214,7 +212,6 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     return Faults(
         by_code=dict(sorted(_plotted(record.plots).items())),
         lost=max(lost, default=None),
-        torn_bytes=sum(part.torn_bytes for part in record.parts),
         complaints=tuple(
             line
             for log in (entities.BUS_LOG, entities.RECORDER_LOG)

@@ -104,7 +104,6 @@ def markdown_cell(value: object) -> str:
 
 # States in which there is no outcome yet.
 UNDER_WAY = ("planning", "covering")
-UNDER_WAY_LINE = "**under way**"
 
 
 class Outcome:
@@ -127,7 +126,7 @@ class Outcome:
         """Note the mission's state, once when it is entered."""
         if status.state == self._state:
             return
-        self._state, self.text = status.state, UNDER_WAY_LINE
+        self._state, self.text = status.state, "**under way**"
         if status.state in UNDER_WAY:
             return
         words = f"**{status.state}**"
