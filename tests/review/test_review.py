@@ -194,14 +194,12 @@ def test_the_card_says_what_was_run(told, recording):
 
 def test_the_longest_stand_is_one(review, told):
     stand = told["longest_stand"]
-    poses = [
-        pose
-        for at, pose in zip(review.data.pose_s, review.data.poses, strict=True)
-        if stand["at_s"] - 1e-3 <= at <= stand["at_s"] + stand["seconds"] + 1e-3
-    ]
-    xy = np.array(poses)[:, :2]
-    assert len(xy) > 1
-    assert np.hypot(*(xy - xy[0]).T).max() <= 0.05
+    begin_s, end_s = stand["at_s"], stand["at_s"] + stand["seconds"]
+    assert stand["seconds"] > 0.0
+    # Times are in milliseconds: on a busy computer several poses come within one.
+    for at_s, (x, y, _) in zip(review.data.pose_s, review.data.poses, strict=True):
+        if begin_s + 0.002 < at_s < end_s - 0.002:
+            assert np.hypot(x - stand["x"], y - stand["y"]) <= 0.05
 
 
 def frame_ends(content: bytes) -> list[int]:
