@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.ros import RosConfig
 
-DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 9876
-
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder to write to")
@@ -52,15 +50,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="size of the robot's recordings in DIR above which the oldest files are deleted, "
         "never the one being written [MB]; 0 for no limit (default: %(default)s)",
     )
-    parser.add_argument(
-        "--serve",
-        type=address,
-        nargs="?",
-        const=(DEFAULT_HOST, DEFAULT_PORT),
-        metavar="[HOST:]PORT",
-        help="also serve live viewers: `rerun rerun+http://HOST:PORT/proxy`; anybody who can "
-        f"connect to the port may watch (default: {DEFAULT_HOST}:{DEFAULT_PORT})",
-    )
     add_robot_on_bus(parser, config=False)
 
 
@@ -75,14 +64,6 @@ def ros_config(text: str) -> RosConfig:
     for fault in config.faults():
         raise argparse.ArgumentTypeError(f"ros2: {fault}")
     return config
-
-
-def address(text: str) -> tuple[str, int]:
-    """Read ``HOST:PORT`` or ``PORT``; an IPv6 host is in brackets."""
-    host, _, port = text.rpartition(":")
-    if not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
-        raise argparse.ArgumentTypeError(f"must be [HOST:]PORT, got {text!r}")
-    return host.strip("[]") or DEFAULT_HOST, int(port)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -120,8 +101,8 @@ def _record(args: argparse.Namespace) -> int:
         from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
 
         budget = budget_of(config, file_name(args.fleet))
-        return run_fleet_recorder(config, bus, args.fleet, Output(args.out, budget, args.serve))
-    return run_recorder(config, bus, Output(args.out, budget_of(config), args.serve))
+        return run_fleet_recorder(config, bus, args.fleet, Output(args.out, budget))
+    return run_recorder(config, bus, Output(args.out, budget_of(config)))
 
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:
@@ -130,10 +111,14 @@ def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettin
     from fasaco_edge.config.robot import RobotConfig
 
     keys, bus, _ = robot_on_bus(args)
+    try:
+        recording = msgspec.convert({"quota_mb": args.quota_mb}, RecordingConfig)
+    except msgspec.ValidationError as error:
+        raise BadConfiguration(f"disk space: {error}") from error
     config = DaemonConfig(
         robot=RobotConfig(name=keys.robot),
         bus=BusConfig(base=keys.base),
-        recording=RecordingConfig(quota_mb=args.quota_mb),
+        recording=recording,
         ros2=args.ros2 or msgspec.UNSET,
     )
     return config, bus

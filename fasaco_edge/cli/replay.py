@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 from rich.table import Table
@@ -19,12 +19,10 @@ from fasaco_edge.cli.console.arguments import Command, Exit
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
-from fasaco_edge.replay.replay import Replay, read_run
-from fasaco_edge.text import shown
+from fasaco_edge.replay.replay import PROPOSALS, Replay, read_run
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
 
 if TYPE_CHECKING:
-    from fasaco_edge.errors import FasacoError
     from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.recording.read.run import RecordedSamples
     from fasaco_edge.replay.cycle_replay import CycleRecord
@@ -39,11 +37,9 @@ code 1. One without is replayed approximately: time is that of the samples and p
 in work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
-The column `then` shows whether the path equals the recorded one cell by cell. Without a turn log
-a recording does not show in full which samples the daemon took together, nor the work of plans
-that were not used: a different path is no error then. With --config or --work the replay is of
-another mission, and approximate, too. So is that of a daemon of an earlier release which planned
-with a planner of the user's own: those plans cannot be repeated, and `planner.name` plans instead.
+The column `then` shows whether the path equals the recorded one cell by cell; without a turn log
+paths are not compared. With --config or --work the replay is of another mission, and approximate,
+too. Plans of a user's own planner, as earlier releases had them, cannot be repeated.
 """
 
 
@@ -65,7 +61,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--work",
         type=_count,
         metavar="N",
-        help="proposals of each plan (default: as recorded with its path)",
+        help=f"proposals of each plan, where there is no turn log (default: {PROPOSALS})",
     )
     parser.add_argument("--json", action="store_true", help="print a JSON document")
 
@@ -77,13 +73,14 @@ def run(args: argparse.Namespace) -> int:
     samples = RecordedSamples(args.recordings)
     recorded = read_run(samples)
     config = load_config(args.config) if args.config else recorded.daemon_config()
-    is_as_it_was = args.config is None and args.work is None and not recorded.own_planner
+    is_as_it_was = args.config is None and args.work is None
     record = read_turns(samples) if is_as_it_was else None
     replay: Replay | CycleReplay
     if record is not None:
         replay = CycleReplay(config, record)
     else:
-        replay = Replay(config, recorded, args.work)
+        work = PROPOSALS if args.work is None else args.work
+        replay = Replay(config, recorded.ready_ns, work)
     began = time.monotonic()
     steps: list[ReplayStep] = []
     last_s = 0.0
@@ -94,16 +91,17 @@ def run(args: argparse.Namespace) -> int:
     summary = _summary(replay, recorded, samples, steps, last_s)
     compared = None
     if record is not None and isinstance(replay, CycleReplay):
-        compared = _compared(replay, record)
+        compared = _comparison(replay, record)
     if args.json:
-        document = summary | (msgspec.to_builtins(compared) if compared else {"equal": None})
+        verdict = msgspec.to_builtins(compared) if compared else {"equal": None}
+        document = msgspec.to_builtins(summary) | verdict
         print_json({"decisions": [_document(step) for step in steps], "summary": document})
     else:
         console = terminal.out()
         console.print(_table(steps))
         console.print(terminal.figures([*_rows(summary), *_compared_rows(compared)]))
         terminal.err().print(f"{last_s:.1f} s in {time.monotonic() - began:.1f} s")
-    return Exit.OK if compared is None or compared["equal"] else Exit.ERROR
+    return Exit.OK if compared is None or compared.equal else Exit.ERROR
 
 
 def _count(text: str) -> int:
@@ -119,7 +117,7 @@ def _document(step: ReplayStep) -> dict[str, object]:
         document["asked"] = step.decision.plan.reason
     if step.decision.path is not None:
         document["path"] = _path(step.decision.path) | {"as_recorded": step.as_recorded}
-    if faults := _faults(step):
+    if faults := (*step.refused, *step.decision.faults):
         document["faults"] = [{"code": fault.code, "message": str(fault)} for fault in faults]
     return document
 
@@ -134,38 +132,53 @@ def _path(update: PathUpdate) -> dict[str, object]:
     }
 
 
+class Summary(msgspec.Struct):
+    """The result of a replay."""
+
+    duration_s: float
+    state: str
+    reason: str
+    covered_cells: int
+    coverable_cells: int
+    plans: int
+    paths: int
+    paths_recorded: int
+    paths_as_recorded: int | None
+    faults: dict[str, int]
+    samples_missing: int
+    restored_cells_missing: int
+    restarts_ignored: int
+
+
 def _summary(
     replay: Replay | CycleReplay,
     recorded: RecordedRun,
     samples: RecordedSamples,
     steps: Sequence[ReplayStep],
     last_s: float,
-) -> dict[str, Any]:
-    """Return the result of a replay, as JSON values."""
+) -> Summary:
     mission, coverage = replay.mission, replay.mission.coverage()
     is_approximate = isinstance(replay, Replay)
-    codes = Counter(fault.code for step in steps for fault in _faults(step))
-    as_recorded = [step for step in steps if step.decision.path is not None and step.as_recorded]
-    return {
-        "duration_s": round(last_s, 3),
-        "state": str(mission.state),
-        "reason": mission.reason,
-        "covered_cells": coverage.covered if coverage else 0,
-        "coverable_cells": coverage.coverable if coverage else 0,
-        "plans": mission.route.plans,
-        "paths": mission.route.revision,
-        "paths_recorded": len(recorded.paths),
-        "paths_as_recorded": len(as_recorded),
-        "faults": dict(sorted(codes.items())),
-        "samples_missing": samples.missing,
-        "restored_cells_missing": recorded.restored_cells if is_approximate else 0,
-        "restarts_ignored": recorded.starts if is_approximate else 0,
-        "own_planner_missing": recorded.own_planner,
-    }
-
-
-def _faults(step: ReplayStep) -> tuple[FasacoError, ...]:
-    return (*step.refused, *step.decision.faults)
+    faults = Counter(
+        fault.code for step in steps for fault in (*step.refused, *step.decision.faults)
+    )
+    return Summary(
+        duration_s=round(last_s, 3),
+        state=str(mission.state),
+        reason=mission.reason,
+        covered_cells=coverage.covered if coverage else 0,
+        coverable_cells=coverage.coverable if coverage else 0,
+        plans=mission.route.plans,
+        paths=mission.route.revision,
+        paths_recorded=len(recorded.paths),
+        paths_as_recorded=None
+        if is_approximate
+        else sum(step.as_recorded is True for step in steps if step.decision.path is not None),
+        faults=dict(sorted(faults.items())),
+        samples_missing=samples.missing,
+        restored_cells_missing=recorded.restored_cells if is_approximate else 0,
+        restarts_ignored=recorded.starts if is_approximate else 0,
+    )
 
 
 def _table(steps: Sequence[ReplayStep]) -> Table:
@@ -175,7 +188,7 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
     table.add_column("why", overflow="fold")
     for step in steps:
         update = step.decision.path
-        faults = [str(fault) for fault in _faults(step)]
+        faults = [str(fault) for fault in (*step.refused, *step.decision.faults)]
         why = update.reason if update else step.reason if step.changed else ""
         row = ["", "", "", ""]
         if update is not None:
@@ -193,71 +206,81 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
     return table
 
 
-def _rows(summary: dict[str, Any]) -> list[tuple[str, str]]:
-    faults = ", ".join(f"{count} {code}" for code, count in summary["faults"].items())
+def _rows(summary: Summary) -> list[tuple[str, str]]:
+    faults = ", ".join(f"{count} {code}" for code, count in summary.faults.items())
     rows = [
-        ("ended", f"{summary['state']}: {summary['reason']}"),
-        ("covered", f"{summary['covered_cells']} of {summary['coverable_cells']} cells"),
-        ("plans, paths", f"{summary['plans']}, {summary['paths']}"),
-        ("as recorded", f"{summary['paths_as_recorded']} of {summary['paths_recorded']} paths"),
+        ("ended", f"{summary.state}: {summary.reason}"),
+        ("covered", f"{summary.covered_cells} of {summary.coverable_cells} cells"),
+        ("plans, paths", f"{summary.plans}, {summary.paths}"),
         ("refused", faults or "nothing"),
     ]
-    if own := summary["own_planner_missing"]:
-        rows.append(("own planner", f"{shown(own)}: its plans cannot be repeated"))
-    for name, key, words in (
-        ("not recorded", "samples_missing", "samples"),
-        ("covered before", "restored_cells_missing", "cells, not recorded"),
-        ("daemon restarts", "restarts_ignored", "played as one mission"),
-    ):
-        if count := summary[key]:
-            rows.append((name, f"{count} {words}"))
+    if (same := summary.paths_as_recorded) is not None:
+        rows.append(("as recorded", f"{same} of {summary.paths_recorded} paths"))
+    if summary.samples_missing:
+        rows.append(("not recorded", f"{summary.samples_missing} samples"))
+    if summary.restored_cells_missing:
+        rows.append(("covered before", f"{summary.restored_cells_missing} cells, not recorded"))
+    if summary.restarts_ignored:
+        rows.append(("daemon restarts", f"{summary.restarts_ignored}, played as one mission"))
     return rows
 
 
-# Limit on the differing samples that are named.
-NAMED = 5
+class Versions(msgspec.Struct):
+    """The software that decided then, and the software that decides now."""
+
+    recorded: str
+    replayed: str
 
 
-def _compared(replay: CycleReplay, record: CycleRecord) -> dict[str, Any]:
-    """Return the result of a replay by cycles, as JSON values."""
-    difference, *lacking = (
-        found and replace(found, at_s=round(found.at_s, 6))
-        for found in (replay.difference, *replay.lacking)
+class Comparison(msgspec.Struct):
+    """The result of a replay by cycles."""
+
+    equal: bool
+    turns: int
+    turns_equal: int
+    plans_repeated: int
+    difference: Difference | None
+    log_ends: str
+    version: Versions
+    kernels: Versions
+
+
+def _comparison(replay: CycleReplay, record: CycleRecord) -> Comparison:
+    difference = replay.difference
+    if difference is not None:
+        difference = replace(difference, at_s=round(difference.at_s, 6))
+    return Comparison(
+        equal=difference is None and not record.gap,
+        turns=record.turns,
+        turns_equal=replay.turns,
+        plans_repeated=replay.plans,
+        difference=difference,
+        log_ends=record.gap,
+        version=Versions(record.beginning.version, __version__),
+        kernels=Versions(record.kernels, replay.kernels),
     )
-    return {
-        "equal": difference is None and not lacking and not record.gap,
-        "turns": record.turns,
-        "turns_equal": replay.turns,
-        "plans_repeated": replay.plans,
-        "difference": difference,
-        "samples_lacking": lacking,
-        "log_ends": record.gap,
-        "version": {"recorded": record.beginning.version, "replayed": __version__},
-        "kernels": {"recorded": record.kernels, "replayed": replay.kernels},
-    }
 
 
-def _compared_rows(compared: dict[str, Any] | None) -> list[tuple[str, str]]:
+def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
     """Return the result of a replay by cycles, for people."""
     if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
-    difference, lacking = compared["difference"], compared["samples_lacking"]
-    said = "equal bit for bit" if compared["equal"] else "equal as far as can be compared"
-    said = said if difference is None else "not equal"
-    rows = [("replay", f"{said}: {compared['turns_equal']} of {compared['turns']} turns")]
-    if difference is not None:
-        rows.append(("first difference", _words(difference)))
-    rows.extend(("sample", _words(found)) for found in lacking[:NAMED])
-    if len(lacking) > NAMED:
-        rows.append(("samples", f"{len(lacking) - NAMED} more are not as they were taken"))
-    if ends := compared["log_ends"]:
-        rows.append(("compared up to", f"turn {compared['turns']}: {ends}"))
-    for name in ("version", "kernels"):
-        was, now = compared[name].values()
+    turns = f"{compared.turns_equal} of {compared.turns} turns"
+    said = "equal bit for bit" if compared.equal else "equal as far as can be compared"
+    if compared.difference is not None:
+        said = "not equal"
+    rows = [("replay", f"{said}: {turns}")]
+    if compared.difference is not None:
+        rows.append(("first difference", _words(compared.difference)))
+    if compared.log_ends:
+        rows.append(("compared up to", f"turn {compared.turns}: {compared.log_ends}"))
+    for name, versions in (("version", compared.version), ("kernels", compared.kernels)):
+        was, now = versions.recorded, versions.replayed
         if was and was != now:
             rows.append((name, f"recorded with {was}, replayed with {now}"))
-            if name == "kernels" and difference is not None:
-                rows.append(("why", "other kernels may plan other paths: that is no fault"))
+    kernels = compared.kernels
+    if compared.difference is not None and kernels.recorded not in ("", kernels.replayed):
+        rows.append(("why", "other kernels may plan other paths: that is no fault"))
     return rows
 
 

@@ -54,7 +54,6 @@ def draw_visits(
     lattice: CoverageLattice,
     visits: NDArray[np.integer],
     start: Cell,
-    left_out_words: str = "not covered",
 ) -> list[KeyEntry]:
     """Tint the lattice's cells by number of visits; return the meaning of the tints.
 
@@ -63,7 +62,6 @@ def draw_visits(
         lattice: the planning grid.
         visits: shape of the lattice: how often each cell was visited.
         start: cell (row, col) from where the others can be reached or not.
-        left_out_words: what cells without a visit are called.
     """
     never = lattice.coverable & (visits == 0)
     reachable = _reachable(lattice, start)
@@ -77,7 +75,7 @@ def draw_visits(
 
     key = _visit_key(visits)
     if left_out.any():
-        key.append(_entry("tile", palette.LEFT_OUT, left_out_words, left_out))
+        key.append(_entry("tile", palette.LEFT_OUT, "not passed", left_out))
     if unreachable.any():
         key.append(_entry("hatch", palette.UNREACHABLE, "unreachable", unreachable))
     return key
@@ -314,7 +312,6 @@ def draw_mission(
     zones: Sequence[Polygon] = (),
     keep_out: Sequence[Polygon] = (),
     rooms: Sequence[tuple[str, Polygon]] = (),
-    left_out_words: str = "not covered",
 ) -> Image.Image:
     """Return a picture, RGB, of a mission's result.
 
@@ -331,14 +328,13 @@ def draw_mission(
         unswept: reachable floor that was not swept; None where that is not known.
         zones, keep_out: polygons of the order [m].
         rooms: names and outlines [m].
-        left_out_words: what reachable cells without a visit are called.
     """
     plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     if swept is None:
         assert visits is not None
-        key = draw_visits(plot, lattice, visits, start, left_out_words)
+        key = draw_visits(plot, lattice, visits, start)
     else:
         key = draw_swept(plot, swept, "reachable floor swept")
     if unswept is not None:

@@ -46,8 +46,6 @@ from fasaco_edge.wire.topics import TURNS
 KEPT_NS = 60_000_000_000
 # The log comes twice a second: this long after its end nothing else should come [ns].
 SILENT_NS = 5_000_000_000
-# Limit on the untaken samples that are kept of each topic.
-STRANGE = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,14 +109,11 @@ class UntakenSamples:
     def __init__(self, taken: frozenset[tuple[str, int]]) -> None:
         self._taken = taken
         self._samples: dict[tuple[str, int], Arrival] = {}
-        # Samples that no cycle took in this form.
-        self._strange: dict[str, deque[Sample]] = defaultdict(lambda: deque(maxlen=STRANGE))
 
     def add(self, arrival: Arrival) -> None:
-        """Keep a sample."""
+        """Keep a sample, if a cycle took it."""
         key = arrival.topic, zlib.crc32(arrival.sample.payload)
         if key not in self._taken:
-            self._strange[arrival.topic].append(arrival.sample)
             return
         self._samples.pop(key, None)
         self._samples[key] = arrival
@@ -128,16 +123,10 @@ class UntakenSamples:
                 break
             del self._samples[oldest]
 
-    def find(self, taken: TakenSample) -> tuple[Sample | None, bool]:
-        """Return the sample, and whether it is the recorded one.
-
-        If it is missing, a sample that no cycle took is returned instead.
-        """
+    def find(self, taken: TakenSample) -> Sample | None:
+        """Return the sample; None if it is missing."""
         arrival = self._samples.get((taken.topic, taken.checksum))
-        if arrival is not None:
-            return arrival.sample, True
-        strange = self._strange[taken.topic]
-        return (strange.popleft() if strange else None), False
+        return arrival.sample if arrival else None
 
 
 def inflated_sample(told: EarlySample) -> Sample:
@@ -187,9 +176,8 @@ class CycleReplay:
         mission: the mission, to be looked at between steps.
         turns: how many cycles were played and ended as recorded.
         plans: how many plans were made, those in spare time among them.
-        difference: the first decision that differs; None without one.
+        difference: the first decision or sample that differs; None without one.
         kernels: name of the compiled kernels in use.
-        lacking: samples that are not in the recording, or not as the daemon took them.
     """
 
     def __init__(self, config: DaemonConfig, record: CycleRecord) -> None:
@@ -207,7 +195,6 @@ class CycleReplay:
         self.turns = self.plans = 0
         self.kernels = kernels_name()
         self.difference: Difference | None = None
-        self.lacking: list[Difference] = []
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
         """Yield each cycle, up to the first that differs from the recording."""
@@ -268,11 +255,10 @@ class CycleReplay:
             return inflated_sample(taken.told)
         if not taken.checksum and self._logged[taken.topic]:
             return self._logged[taken.topic].popleft()
-        sample, is_it = self._untaken.find(taken)
-        if not is_it:
-            recorded = "another one" if sample is not None else "missing in the recording"
+        sample = self._untaken.find(taken)
+        if sample is None:
             what = f"{taken.topic} with checksum {taken.checksum:08x}"
-            self.lacking.append(Difference(turn.number, self._at_s, what, "taken", recorded))
+            self._differ(turn, what, "taken", "not in the recording")
         return sample
 
     def _plans(self, turn: Cycle) -> list[PlanReady]:

@@ -140,15 +140,7 @@ class _NoBus(Bus):
     def __init__(self) -> None:
         pass
 
-    def subscribe(
-        self,
-        key: str,
-        callback: object,
-        latched: bool = False,
-        history: int = 1,
-        *,
-        in_order: bool = False,
-    ) -> Subscription:
+    def subscribe(self, *_args: object, **_options: object) -> Subscription:
         return Subscription(None)
 
 

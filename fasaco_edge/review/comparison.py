@@ -17,6 +17,8 @@ from fasaco_edge.review.wording import NOT_KNOWN, clock, count
 SETTINGS = {
     "tool width": "robot.tool_width_m",
     "robot radius": "robot.radius_m",
+    "overlap": "robot.overlap",
+    "line": "planner.line",
     "planner": "planner.name",
     "own planner": "planner.own",
     "seed": "planner.seed",
@@ -26,16 +28,10 @@ SETTINGS = {
     "acceleration": "robot.acceleration_m_s2",
     "simulated seconds per second": "robot.time_scale",
 }
-# If these differ, walks, cells and times belong to different problems.
-ANOTHER_PROBLEM = ("tool width", "robot radius", "line", "width of lanes", "building", "orders")
-# Members that are compared in any case.
-ANYWAY = (
-    *("faults", "faults_by_code", "recorder_lost", "samples_missing"),
-    *("memory_mb_max", "recorder_memory_mb_max", "processor_percent_max", "threads_max"),
-    *("processor_s", "recorder_processor_s"),
-)
-# Maps of one building from two missions differ a little: its sides [m], and its cells [share].
-SIDE_M, CELLS_SHARE = 1.0, 0.15
+# If these differ, floor, cells and times belong to different problems.
+ANOTHER_PROBLEM = ("tool width", "robot radius", "overlap", "line", "building", "orders")
+# Maps of one building from two missions differ by less: its sides [m].
+SIDE_M = 1.0
 
 Difference = tuple[str, str, str]
 """Name of the difference, and its value in the first run and in the other."""
@@ -45,10 +41,6 @@ NUMBERS = (
     ("floor swept, by the daemon", "ledger_swept_m2", "m2"),
     ("covered again", "recovered_cells", "cells"),
     ("out of reach", "unreachable_cells", "cells"),
-    ("steps", "steps", ""),
-    ("revisits", "revisits", ""),
-    ("quarter-turns", "turns_90", ""),
-    ("about-turns", "turns_180", ""),
     ("driven", "driven_m", "m"),
     ("paths published", "paths", ""),
     ("replans", "replans", ""),
@@ -58,7 +50,6 @@ NUMBERS = (
     ("replan, slowest", "replan_ms_max", "ms"),
     ("plans made", "plans", ""),
     ("plans that became no path", "plans_unused", ""),
-    ("slowest plan", "plan_ms_max", "ms"),
     ("attempts at a better path", "attempts", ""),
     ("attempts that found one", "attempts_used", ""),
     ("memory of the daemon, most", "memory_mb_max", "MB"),
@@ -74,65 +65,49 @@ NUMBERS = (
 
 
 def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
-    """Return the differences of two runs' set-ups; settings missing in one do not count."""
-    found = [
-        (name, mine, theirs)
-        for name, mine, theirs in (
-            ("robot", one.robot, other.robot),
-            ("version", one.version, other.version),
-        )
-        if mine and theirs and mine != theirs
-    ]
-    for name, key in SETTINGS.items():
-        mine, theirs = one.config.get(key), other.config.get(key)
+    """Return the differences of two runs' set-ups; what is not recorded of one does not count."""
+    found = []
+    for name, mine, theirs in (
+        ("robot", one.robot, other.robot),
+        ("version", one.version, other.version),
+        *((name, one.config.get(key), other.config.get(key)) for name, key in SETTINGS.items()),
+        ("orders", len(one.orders), len(other.orders)),
+    ):
         if mine is not None and theirs is not None and mine != theirs:
             found.append((name, str(mine), str(theirs)))
-    if _line(one) != _line(other):
-        found.append(("line", _line(one), _line(other)))
-    elif all(_lane_m(each) is not None for each in (one, other)):
-        mine, theirs = (f"{_lane_m(each):.3f} m" for each in (one, other))
-        if mine != theirs and not any(name == "tool width" for name, *_ in found):
-            found.append(("width of lanes", mine, theirs))
-    if not _is_one_building(one, other):
-        found.append(("building", _building(one), _building(other)))
-    if len(one.orders) != len(other.orders):
-        found.append(("orders", str(len(one.orders)), str(len(other.orders))))
+    if one.map is not None and other.map is not None:
+        sides = one.map.sides_m, other.map.sides_m
+        if any(abs(mine - theirs) > SIDE_M for mine, theirs in zip(*sides, strict=True)):
+            mine, theirs = (f"{width:.1f} x {depth:.1f} m" for width, depth in sides)
+            found.append(("building", mine, theirs))
     return found
 
 
-def do_compare(setup: list[Difference]) -> bool:
-    """Return whether both runs solved the same problem, by how their set-ups differ."""
-    return not any(name in ANOTHER_PROBLEM for name, _, _ in setup)
+def other_problem(setup: list[Difference]) -> str:
+    """Return what makes two runs ones of different problems; "" for nothing."""
+    return ", ".join(name for name, _, _ in setup if name in ANOTHER_PROBLEM)
 
 
-def setup_words(one: ReviewDocument, other: ReviewDocument) -> str:
+def setup_words(setup: list[Difference]) -> str:
     """Return a sentence on whether two runs compare."""
-    setup = setup_differences(one, other)
-    if not setup:
-        return "Both had the same setup."
-    if do_compare(setup):
-        return "They had different setups:"
-    another = ", ".join(name for name, _, _ in setup if name in ANOTHER_PROBLEM)
-    return (
-        f"These are not two runs of one problem: {another} differ. Figures that depend on that "
-        "are shown, but not compared."
-    )
+    if other := other_problem(setup):
+        return f"These are not two runs of one problem: {other} differ, and figures with them."
+    return "They had different setups:" if setup else "Both had the same setup."
 
 
 def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object]:
     """Return two documents, the differences of their set-ups and of their numbers.
 
-    A difference is the first less the second, of each number that both have and that compares.
+    A difference is the first less the second, of each number that both have.
     """
     setup = setup_differences(one, other)
     this, that = (msgspec.to_builtins(document) for document in (one, other))
-    mine = this if do_compare(setup) else {name: this[name] for name in ANYWAY}
     return {
         "recording": this,
         "against": that,
         "setup": [dict(zip(("what", "recording", "against"), each, strict=True)) for each in setup],
-        "compare": do_compare(setup),
-        "difference": differences(mine, that),
+        "compare": not other_problem(setup),
+        "difference": differences(this, that),
     }
 
 
@@ -150,15 +125,9 @@ def differences(one: Mapping[str, object], other: Mapping[str, object]) -> dict[
 
 
 def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
-    """Return the figures of two runs side by side, with the difference if they compare."""
-    mine, theirs = ({figure.name: figure for figure in figures(each)} for each in (one, other))
-    compares = do_compare(setup_differences(one, other))
-    anyway = {name for name, member, _ in NUMBERS if member in ANYWAY}
-    return [
-        _compared(mine[name], theirs[name], compares=compares or name in anyway)
-        for name in mine
-        if name in theirs
-    ]
+    """Return the figures of two runs side by side, with the difference of numbers."""
+    pairs = zip(figures(one), figures(other), strict=True)
+    return [(mine.name, mine.text, theirs.text, mine.less(theirs)) for mine, theirs in pairs]
 
 
 def reason_counts(documents: Sequence[ReviewDocument]) -> list[tuple[str, list[int]]]:
@@ -168,59 +137,8 @@ def reason_counts(documents: Sequence[ReviewDocument]) -> list[tuple[str, list[i
     return [(kind, [count.get(kind, 0) for count in counts]) for kind in kinds]
 
 
-def _compared(mine: Figure, theirs: Figure, *, compares: bool) -> Row:
-    if mine.value is None or theirs.value is None or not compares:
-        return mine.name, mine.text, theirs.text, ""
-    less = round(mine.value - theirs.value, 1)
-    text = f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}"
-    return mine.name, mine.text, theirs.text, text if less else "0"
-
-
 def _is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def _is_one_building(one: ReviewDocument, other: ReviewDocument) -> bool:
-    if one.map is None or other.map is None:
-        return True
-    pairs = zip(one.map.sides_m, other.map.sides_m, strict=True)
-    if any(abs(mine - theirs) > SIDE_M for mine, theirs in pairs):
-        return False
-    # A line also sweeps cells whose centres the robot cannot reach.
-    if _line(one) != _line(other):
-        return True
-    mine, theirs = _cells_m2(one), _cells_m2(other)
-    if mine is None or theirs is None:
-        return True
-    return abs(mine - theirs) <= CELLS_SHARE * max(mine, theirs)
-
-
-def _line(document: ReviewDocument) -> str:
-    """Return the form of path that was driven; older recordings only know cells."""
-    return str(document.config.get("planner.line", "cells"))
-
-
-def _lane_m(document: ReviewDocument) -> float | None:
-    """Return the spacing of lanes, the edge of a cell [m]; None if not stated."""
-    width_m, overlap = (
-        document.config.get(f"robot.{name}", 0.0) for name in ("tool_width_m", "overlap")
-    )
-    if not isinstance(width_m, int | float) or not isinstance(overlap, int | float) or not width_m:
-        return None
-    return width_m if _line(document) == "cells" else width_m * (1.0 - overlap)
-
-
-def _cells_m2(document: ReviewDocument) -> float | None:
-    """Return the area of all cells that were coverable at the end [m2]."""
-    cells, edge_m = document.coverable_cells, _lane_m(document)
-    return None if cells is None or edge_m is None else cells * edge_m**2
-
-
-def _building(document: ReviewDocument) -> str:
-    width, depth = document.map.sides_m if document.map else (0.0, 0.0)
-    cells_m2 = _cells_m2(document)
-    cells = "" if cells_m2 is None else f", {cells_m2:.1f} m2 of cells to cover"
-    return f"{width:.1f} x {depth:.1f} m{cells}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,6 +149,20 @@ class Figure:
     text: str
     value: float | None = None
 
+    def less(self, other: Figure) -> str:
+        """Return the difference to another one, as text; "" where one is no number."""
+        if self.value is None or other.value is None:
+            return ""
+        less = round(self.value - other.value, 1)
+        return (f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}") if less else "0"
+
+
+def floor_words(document: ReviewDocument) -> str:
+    """Return swept and reachable floor in words; "" where they are not known."""
+    if document.swept_m2 is None or document.reachable_m2 is None:
+        return ""
+    return swept_words(document.swept_m2, document.reachable_m2)
+
 
 def figures(document: ReviewDocument) -> Iterator[Figure]:
     """Yield the figures used to compare two runs."""
@@ -240,11 +172,7 @@ def figures(document: ReviewDocument) -> Iterator[Figure]:
     yield Figure("duration", clock(document.duration_s), document.duration_s)
     text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
     yield Figure("covered", text, covered)
-    swept_m2, reachable_m2 = document.swept_m2, document.reachable_m2
-    text = NOT_KNOWN
-    if swept_m2 is not None and reachable_m2 is not None:
-        text = swept_words(swept_m2, reachable_m2)
-    yield Figure("floor swept", text, swept_m2)
+    yield Figure("floor swept", floor_words(document) or NOT_KNOWN, document.swept_m2)
     patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
     yield Figure("patches left, over 4 dm2", count(patches, ""), patches)
     yield Figure("largest patch left", count(largest_m2, "m2"), largest_m2)

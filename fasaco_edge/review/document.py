@@ -12,11 +12,10 @@ import msgspec
 from fasaco_edge.client.phrases import percent
 
 if TYPE_CHECKING:
-    from fasaco_edge.review.moments import Moment
+    from fasaco_edge.review.moments import Stand
     from fasaco_edge.review.orders import CommandThen, OrderChapter
     from fasaco_edge.review.rooms import RoomChapter
     from fasaco_edge.review.spot import LeftPatch
-    from fasaco_edge.wire.documents.path_documents import Rectangle
 
 
 class RecordedFile(msgspec.Struct):
@@ -39,22 +38,6 @@ class MapSize(msgspec.Struct):
     def sides_m(self) -> tuple[float, float]:
         """Width and depth [m]."""
         return self.cols * self.resolution_m, self.rows * self.resolution_m
-
-
-class Replan(msgspec.Struct):
-    """A replan that became a path."""
-
-    at_s: float | None
-    revision: int
-    reason: str
-    plan_ms: float | None
-    steps: int
-    planned_steps: int | None
-    lower_bound_steps: int | None
-    lower_bound_cost_s: float | None
-    gap: float | None
-    cost_s: float | None
-    changed: Rectangle | None
 
 
 class TimesTaken(msgspec.Struct):
@@ -80,14 +63,6 @@ class Charge(msgspec.Struct, frozen=True):
     seconds: float
     level_from: float | None
     level_to: float | None
-
-
-class PheromoneFigures(msgspec.Struct, frozen=True):
-    """The recorded pheromone; None if unknown."""
-
-    fields: int
-    cells_share: float | None
-    branching: float | None
 
 
 class ReviewDocument(msgspec.Struct):
@@ -119,7 +94,8 @@ class ReviewDocument(msgspec.Struct):
             none did), skip (whether orders for everything leave it out).
         complete: of the last order: whether the mission reached `done` with every reachable cell
             (of its zones) covered.
-        covered_cells, coverable_cells: at the end: covered cells, and all reachable cells.
+        covered_cells, coverable_cells: at the end, by the daemon's last recorded count: covered
+            cells, and all reachable cells.
         recovered_cells: cells covered more than once.
         unreachable_cells: cells where the robot would fit, but that it cannot get to.
         reachable_m2, swept_m2: floor at the end, by pixels of the last map: all that the tool's
@@ -135,13 +111,7 @@ class ReviewDocument(msgspec.Struct):
         left_by_reason: reachable floor not swept at the end, by the daemon's reasons [m2].
         out_of_reach_by_reason: free floor that the tool cannot reach, by reason [m2]; null if the
             robot drives through the centres of cells.
-        coverage_from: source of the counts: `status` (the daemon) or `trail` (recorded poses and
-            the last map, if the daemon's last recorded count is outdated).
-        reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s];
-            by the statuses where a line over the floor is driven.
-        steps: moves from cell to cell; a cell counts when the tool passes over its centre.
-        revisits: visits of cells after each one's first.
-        turns_90, turns_180: quarter-turns and about-turns between steps.
+        reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s].
         driven_m: length of the trail, without jumps [m].
         paths: paths that were published.
         replans: paths from a plan, without the first after each start of the daemon.
@@ -153,14 +123,9 @@ class ReviewDocument(msgspec.Struct):
             itself, from where the robot was then: planned_steps, lower_bound_steps, cost_s (driving
             it, by the configuration), lower_bound_cost_s and gap (cost_s over that bound, as a
             share of it); changed, the changed rectangle of the map that caused it [m].
-        plans, plans_unused: by the turn log: all plans; plans that became no path, as they equalled
-            the current one or were outdated.
-        plan_ms_p50, plan_ms_p99, plan_ms_max: their times, including unused ones [ms].
+        plans, plans_unused: by the daemon's count: all plans; plans that became no path, as they
+            equalled the current one or were outdated.
         attempts, attempts_used: plans made to improve the path; those that did.
-        pheromone: fields (number of recorded fields), cells_share (cells that the last field spans
-            over those that have a stand, a place from which the robot sweeps them, reachable or
-            not, by the last status), branching (at the end: mean number of directions of a cell
-            within reach of its strongest).
         memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
         processor_s, recorder_processor_s: total processor time of daemon and recorder, by the
             computer's clock [s].
@@ -173,7 +138,8 @@ class ReviewDocument(msgspec.Struct):
             full`, `recorder: stalled`): state, reason, at_s, seconds.
         charges: each time the robot charged: at_s, seconds, level_from, level_to (0 to 1; null
             where not known).
-        worst: moments that stand out: what, value, unit, at_s, note.
+        longest_stand: the longest time at work that the robot neither drove nor turned: at_s,
+            seconds, place (x, y) [m], and the states of the mission meanwhile; null without any.
         faults: messages refused by the daemon.
         faults_by_code: the same by code.
         recorder_lost: samples that the recorder could not write, by its own count.
@@ -211,12 +177,7 @@ class ReviewDocument(msgspec.Struct):
     ledger_swept_m2: float | None = None
     left_by_reason: dict[str, float] | None = None
     out_of_reach_by_reason: dict[str, float] | None = None
-    coverage_from: str | None = None
     reached_s: dict[str, float | None] | None = None
-    steps: int | None = None
-    revisits: int | None = None
-    turns_90: int | None = None
-    turns_180: int | None = None
     driven_m: float | None = None
     paths: int = 0
     replans: int = 0
@@ -226,15 +187,11 @@ class ReviewDocument(msgspec.Struct):
     replan_ms_p99: float | None = None
     replan_ms_max: float | None = None
     replan_ms_by_reason: dict[str, TimesTaken] = {}
-    replan_list: list[Replan] = []
+    replan_list: list[dict[str, object]] = []
     plans: int | None = None
     plans_unused: int | None = None
-    plan_ms_p50: float | None = None
-    plan_ms_p99: float | None = None
-    plan_ms_max: float | None = None
     attempts: int | None = None
     attempts_used: int | None = None
-    pheromone: PheromoneFigures = PheromoneFigures(0, None, None)
     memory_mb_max: float | None = None
     recorder_memory_mb_max: float | None = None
     processor_s: float | None = None
@@ -245,7 +202,7 @@ class ReviewDocument(msgspec.Struct):
     states: dict[str, float] = {}
     troubles: list[Trouble] = []
     charges: list[Charge] = []
-    worst: list[Moment] = []
+    longest_stand: Stand | None = None
     faults: int = 0
     faults_by_code: dict[str, int] = {}
     recorder_lost: int | None = None

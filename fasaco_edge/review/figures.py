@@ -9,15 +9,13 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.document import (
     Charge,
     MapSize,
-    PheromoneFigures,
     RecordedFile,
-    Replan,
     ReviewDocument,
     TimesTaken,
     Trouble,
@@ -75,7 +73,7 @@ def document_of(review: Review) -> ReviewDocument:
             for s in review.troubles
         ],
         charges=charges_of(review),
-        worst=[replace(m, value=round(m.value, 3), at_s=round(m.at_s, 3)) for m in review.moments],
+        longest_stand=review.longest_stand,
         faults=faults.total,
         faults_by_code=faults.by_code,
         recorder_lost=faults.lost,
@@ -86,10 +84,10 @@ def document_of(review: Review) -> ReviewDocument:
     )
     _add_coverage(document, review)
     _add_plans(document, review)
-    document.pheromone = _pheromone(review)
     for member, entity in PLOTTED.items():
         if (points := record.plots.get(entity)) is not None:
             setattr(document, member, _rounded(float(points[:, 1].max())))
+    document.threads_max = max((each.status.threads for each in data.statuses), default=0) or None
     document.processor_s = _rounded(_used([each.status.cpu_s for each in data.statuses]))
     of_recorder = record.plots.get(entities.RECORDER_CPU_S)
     if of_recorder is not None:
@@ -127,7 +125,6 @@ PLOTTED = {
     "memory_mb_max": f"{entities.MEMORY}/planner",
     "recorder_memory_mb_max": f"{entities.MEMORY}/recorder",
     "processor_percent_max": entities.PROCESSOR,
-    "threads_max": entities.THREADS,
 }
 """Members that are the most of a curve, and the curve."""
 
@@ -135,10 +132,9 @@ PLOTTED = {
 def _add_coverage(document: ReviewDocument, review: Review) -> None:
     if (grid := review.data.grid) is not None:
         document.map = MapSize(grid.geometry.rows, grid.geometry.cols, grid.geometry.resolution)
-    if (counts := review.counts) is not None:
+    if (counts := review.data.counts) is not None:
         document.covered_cells, document.coverable_cells = counts.covered, counts.coverable
         document.recovered_cells, document.unreachable_cells = counts.recovered, counts.unreachable
-        document.coverage_from = counts.source
     document.swept_before_m2 = round(review.data.swept_before_m2, 3)
     if (floor := review.floor) is not None:
         figures = floor.figures
@@ -151,11 +147,8 @@ def _add_coverage(document: ReviewDocument, review: Review) -> None:
         document.ledger_swept_m2 = ledger.swept_m2
         document.left_by_reason = _by_reason(ledger.left)
         document.out_of_reach_by_reason = _by_reason(ledger.out_of_reach)
-    if (walk := review.walk) is not None:
-        document.steps, document.revisits = walk.steps, walk.revisits
-        document.turns_90, document.turns_180 = walk.turns_90, walk.turns_180
-    if review.drive is not None:
-        document.driven_m = round(review.drive.driven_m, 2)
+    if review.data.poses:
+        document.driven_m = round(float(review.data.ways_m.sum()), 2)
     if (reached := review.reached_s) is not None:
         document.reached_s = {str(percent): _rounded(at_s) for percent, at_s in reached.items()}
 
@@ -165,50 +158,33 @@ def _by_reason(floor: tuple[FloorLeft, ...] | None) -> dict[str, float] | None:
 
 
 def _add_plans(document: ReviewDocument, review: Review) -> None:
-    """Add counts and times of plans by the turn log, if there is one."""
-    made = review.data.plan_log.plans
-    if not made:
+    """Add the daemon's counts of plans."""
+    plans = [each.status.plan for each in review.data.statuses]
+    if not plans:
         return
-    plans = [plan for plan in made if not plan.is_attempt]
-    attempts = [plan for plan in made if plan.is_attempt]
-    took = [plan.took_ms for plan in plans]
-    document.plans, document.plans_unused = len(plans), sum(not plan.is_used for plan in plans)
-    document.plan_ms_p50, document.plan_ms_p99, document.plan_ms_max = (
-        _rounded(percentile(took, percent)) for percent in (50, 99, 100)
-    )
-    document.attempts, document.attempts_used = (
-        len(attempts),
-        sum(plan.is_used for plan in attempts),
-    )
+    document.plans = _total([plan.plans for plan in plans])
+    document.plans_unused = _total([plan.unchanged + plan.outdated for plan in plans])
+    document.attempts = _total([plan.attempts for plan in plans])
+    document.attempts_used = sum(path.about.reason == BETTER for path in review.data.paths)
 
 
-def _pheromone(review: Review) -> PheromoneFigures:
-    plots = review.record.plots
-    spanned, branching = (
-        float(points[-1, 1]) if (points := plots.get(entity)) is not None else None
-        for entity in (entities.TRAIL_CELLS, entities.BRANCHING)
-    )
-    # Along the track only cells count whose centre fits the robot; more cells have a stand.
-    counted = [each.status.coverage for each in review.data.statuses if each.status.coverage]
-    stands = counted[-1].coverable + counted[-1].unreachable if counted else 0
-    share = spanned / stands if spanned is not None and stands else None
-    return PheromoneFigures(len(review.record.field_ns), _rounded(share), _rounded(branching))
+def _total(counts: Sequence[int]) -> int:
+    """Return the total of a count that restarts at 0 with each process."""
+    return counts[-1] + sum(before for before, now in pairwise(counts) if now < before)
 
 
-def _replan(path: PathSample) -> Replan:
+# Members of a path's attachment in the list of replans.
+REPLAN = (
+    *("revision", "reason", "steps", "planned_steps", "lower_bound_steps", "lower_bound_cost_s"),
+    *("gap", "changed"),
+)
+
+
+def _replan(path: PathSample) -> dict[str, object]:
     about = path.about
-    return Replan(
-        at_s=_rounded(path.at_s),
-        revision=about.revision,
-        reason=about.reason,
-        plan_ms=_rounded(path.plan_ms),
-        steps=about.steps,
-        planned_steps=about.planned_steps,
-        lower_bound_steps=about.lower_bound_steps,
-        lower_bound_cost_s=about.lower_bound_cost_s,
-        gap=about.gap,
-        cost_s=about.planned_cost_s,
-        changed=about.changed,
+    times = {"at_s": _rounded(path.at_s), "plan_ms": _rounded(path.plan_ms)}
+    return (
+        times | {"cost_s": about.planned_cost_s} | {name: getattr(about, name) for name in REPLAN}
     )
 
 
@@ -218,32 +194,25 @@ FLOOR = "reachable_m2, swept_m2, patches_over_4_dm2, largest_patch_m2"
 def _not_recorded(review: Review) -> dict[str, str]:
     data, why = review.data, {}
     if not data.statuses:
-        why["robot, version, config, state"] = "no status of the daemon was recorded"
-    if review.drive is None:
-        why["steps, revisits, turns_90, turns_180, driven_m, reached_s"] = review.no_lattice
+        why["robot, version, config, state, plans, attempts"] = (
+            "no status of the daemon was recorded"
+        )
+    if review.lattice is None:
         why[FLOOR] = review.no_lattice
     elif review.data.restored_cells:
         restored = review.data.restored_cells
-        before = (
-            f"{restored} cells were covered before the recording, which does not show which ones"
-        )
-        why["reached_s"] = why[FLOOR] = before
+        before = f"{restored} cells were covered before the recording"
+        why[FLOOR] = f"{before}, which does not show which ones"
     elif review.floor is None:
         why[FLOOR] = "no pose lies on the map"
     if data.ledger_floor is None:
         why["ledger_swept_m2, left_by_reason, out_of_reach_by_reason"] = (
             "no recorded status has figures of the floor"
         )
-    if review.counts is None:
-        why["covered_cells, coverable_cells, recovered_cells"] = (
-            "the daemon's last recorded count is outdated, and the poses are incomplete"
-        )
+    if data.counts is None:
+        why["covered_cells, coverable_cells, recovered_cells"] = "no recorded status counts cells"
     if not review.replans.later:
         why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"
-    if not data.plan_log.plans:
-        why["plans, plans_unused, plan_ms_p50, plan_ms_p99, plan_ms_max, attempts"] = (
-            "there is no turn log"
-        )
     if review.faults.lost is None:
         why["recorder_lost"] = "no recorded status has figures of the recorder"
     return why

@@ -20,6 +20,7 @@ from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLabel, DrawnLine, drawings
 from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
+from fasaco_edge.review.drive import nearest_points
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.path_documents import Rectangle
@@ -245,10 +246,7 @@ def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float
     """
     if len(line) < 2:
         return None
-    starts, ways = line[:-1], np.diff(line, axis=0)
-    squares = np.maximum((ways**2).sum(axis=1), 1e-12)
-    shares = np.clip(((np.array(place) - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
-    nearest = starts + shares[:, None] * ways
+    nearest = nearest_points(line, place)
     index = int(np.argmin(np.hypot(*(nearest - place).T)))
     rest = np.vstack([nearest[index], line[index + 1 :]])
     far = np.hypot(*(rest - rest[0]).T) >= AHEAD_M
@@ -335,7 +333,7 @@ def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapTh
     since_s = max(at_s - MAP_S, 0.0)
     old: OccupancyGrid | None = None
     new: OccupancyGrid | None = None
-    for came_s, grid in maps_of(RecordedSamples.of(record.batches), record.clock):
+    for came_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
         if came_s > at_s:
             break
         new = grid
@@ -346,7 +344,10 @@ def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapTh
 
 
 def _map_change(old: OccupancyGrid, new: OccupancyGrid, since_s: float) -> MapThen:
-    before = _resampled(old, new)
+    rows, cols = np.indices(new.cells.shape).reshape(2, -1) + 0.5
+    places = np.column_stack(new.geometry.to_map(cols, rows))
+    # Beyond the older map all was as unknown, -1.
+    before = (old.geometry.values_at(old.cells + 1, places) - 1).reshape(new.cells.shape)
     known, free, was_free = new.cells >= FREE, new.cells < 50, before < 50
     seen = known & (before < FREE)
     blocked = known & (before >= FREE) & was_free & ~free
@@ -360,19 +361,3 @@ def _map_change(old: OccupancyGrid, new: OccupancyGrid, since_s: float) -> MapTh
     if window is not None:
         around = Rectangle(*(round(edge, 2) for edge in new.geometry.bounds(window)))
     return MapThen(round(since_s, 3), seen_m2, blocked_m2, freed_m2, around)
-
-
-def _resampled(old: OccupancyGrid, new: OccupancyGrid) -> NDArray[np.int8]:
-    """Return an older map's values on the pixels of a newer one, int8 (rows, cols); -1 outside."""
-    found = np.full(new.cells.shape, -1, np.int8)
-    if abs(old.geometry.resolution - new.geometry.resolution) > 1e-9:
-        return found
-    x, y = new.geometry.origin.x, new.geometry.origin.y
-    col, row = (round(at) for at in old.geometry.to_pixels(x, y))
-    rows, cols = new.cells.shape
-    here = Window(row, col, row + rows, col + cols)
-    common = here.intersection(Window(0, 0, *old.cells.shape))
-    if common is not None:
-        theirs = old.cells[common.row0 : common.row1, common.col0 : common.col1]
-        found[common.slices_in(here)] = theirs
-    return found

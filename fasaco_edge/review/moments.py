@@ -1,14 +1,15 @@
-"""Extremes of a recording: states and their durations, replans, worst moments, faults."""
+"""States of a recording and their durations, the longest stand, replans, faults."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
+import msgspec
 import numpy as np
 from msgspec import UNSET
 from numpy.typing import NDArray
@@ -27,18 +28,14 @@ AT_REST = (
     *("loading", "charging", "done", "silent"),
 )
 TROUBLES = ("degraded", "blocked", "silent")
-# The effect of a command is published at most this long after it, by the recorder's clock [s].
-COMMAND_S = 1.5
 RECORDER_IN_ORDER = ("recording", "stopping")
 # "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
 # Texts of ``mission.map.reachable_area.AreaChange``.
 _MAP = "map: "
 _CHANGES = ("more", "fewer", "passages changed")
-_ERROR = re.compile(r"error (\d+): ")
 # Log lines of a recorder without a fault.
 IN_ORDER = tuple(f"{state}: " for state in RECORDER_IN_ORDER)
-NOT_RECORDED = "code not recorded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,22 +53,14 @@ class Span:
         return self.end_s - self.begin_s
 
 
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """An extreme of some figure.
+class Stand(msgspec.Struct, frozen=True):
+    """A time [s] that the robot stood at a place (x, y) [m], and what the mission did meanwhile."""
 
-    Attributes:
-        what: name of the figure.
-        value, unit: of the extreme.
-        at_s: when it began [s].
-        note: context of it.
-    """
-
-    what: str
-    value: float
-    unit: str
     at_s: float
-    note: str = ""
+    seconds: float
+    x: float
+    y: float
+    states: list[str]
 
 
 def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[Span, ...]:
@@ -111,79 +100,32 @@ def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
     return tuple(Span("under way", run[0].begin_s, run[-1].end_s) for run in runs)
 
 
-def longest_stand(
-    at_s: NDArray[np.float64],
-    track: NDArray[np.float64],
-    during: Span,
-    states: Sequence[Span] = (),
-) -> Moment | None:
-    """Return the longest time the robot neither drove nor turned.
+def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
+    """Return the longest time at work that the robot neither drove nor turned."""
+    found = [stand for during in under_way(states) if (stand := _stand(data, during))]
+    longest = max(found, key=lambda stand: stand[1], default=None)
+    if longest is None:
+        return None
+    since, seconds, x, y = (round(value, 3) for value in longest)
+    meanwhile = [s.name for s in states if since < s.end_s and s.begin_s < since + seconds]
+    return Stand(since, seconds, x, y, list(dict.fromkeys(meanwhile)))
 
-    Args:
-        at_s: float64 (n,), when each pose came [s].
-        track: float64 (n, 3), x [m], y [m], yaw [rad].
-        during: the time to look at.
-        states: what the mission did meanwhile.
-    """
-    chosen = (at_s >= during.begin_s) & (at_s <= during.end_s)
-    times, poses = at_s[chosen].tolist(), track[chosen].tolist()
+
+def _stand(data: RunData, during: Span) -> tuple[float, float, float, float] | None:
+    """Return begin and length of the longest stand [s], and its place [m]; None without a pose."""
+    chosen = (data.times >= during.begin_s) & (data.times <= during.end_s)
+    times, poses = data.times[chosen].tolist(), data.track[chosen].tolist()
     if not times:
         return None
-    best, anchor = (0.0, times[0], poses[0]), 0
+    best, anchor = (times[0], 0.0, *poses[0][:2]), 0
     for index, (x, y, yaw) in enumerate(poses):
         x0, y0, yaw0 = poses[anchor]
         turned = abs(math.remainder(yaw - yaw0, math.tau))
         if math.hypot(x - x0, y - y0) > STILL_M or turned > STILL_RAD:
             anchor = index
-        best = max(best, (times[index] - times[anchor], times[anchor], poses[anchor]))
-    seconds, since, (x, y, _) = best
-    until = since + seconds
-    meanwhile = [s.name for s in states if since < s.end_s and s.begin_s < until]
-    note = f"at ({x:.2f}, {y:.2f}) m: {', '.join(dict.fromkeys(meanwhile))}".rstrip(": ")
-    return Moment("longest stand", seconds, "s", since, note)
-
-
-def longest_gap(what: str, at_s: Sequence[float], during: Span) -> Moment | None:
-    """Return the longest gap between samples, including the ends of the span."""
-    inside = [at for at in at_s if during.begin_s <= at <= during.end_s]
-    ends = [during.begin_s, *inside, during.end_s]
-    gaps = [(after - before, before) for before, after in pairwise(ends)]
-    seconds, since = max(gaps)
-    return Moment(what, seconds, "s", since)
-
-
-def largest_drop(
-    fractions: NDArray[np.float64],
-    map_s: Sequence[float],
-    command_s: Sequence[float] = (),
-    scale: float = 1.0,
-) -> Moment | None:
-    """Return the largest drop of the covered share that was caused by a new map.
-
-    Args:
-        fractions: float64 (n, 2), times [s] and covered shares as published by the daemon.
-        map_s: arrivals of maps and updates [s].
-        command_s: arrivals of commands [s]: a drop at a command is not caused by a map.
-        scale: seconds of the robot, in which the times are, per second.
-    """
-    arrivals = np.array(sorted(map_s)), np.array(sorted(command_s))
-    drops = list(_drops(fractions, *arrivals, scale * COMMAND_S))
-    return max(drops, key=lambda drop: drop.value, default=None)
-
-
-def _drops(
-    fractions: NDArray[np.float64],
-    map_s: NDArray[np.float64],
-    command_s: NDArray[np.float64],
-    late_s: float,
-) -> Iterator[Moment]:
-    for (since, before), (until, after) in pairwise(fractions.tolist()):
-        maps = np.searchsorted(map_s, (since, until), side="right")
-        commands = np.searchsorted(command_s, (since - late_s, until), side="right")
-        if after < before and maps[1] > maps[0] and commands[1] == commands[0]:
-            points = 100 * (before - after)
-            note = f"from {100 * before:.1f} % to {100 * after:.1f} % of what was known"
-            yield Moment("largest drop of coverage after a map", points, "%", until, note)
+        elif (seconds := times[index] - times[anchor]) > best[1]:
+            best = times[anchor], seconds, x0, y0
+    return best
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,15 +165,11 @@ class Replans:
                 took[kind_of(path.about.reason)].append(path.plan_ms)
         return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
 
-    def slowest_first(self, most: int) -> list[PathSample]:
-        """Return up to ``most`` of them, the slowest first."""
-        return sorted(self.later, key=lambda path: -(path.plan_ms or 0.0))[:most]
-
     @property
-    def slowest(self) -> PathSample | None:
-        """The slowest one."""
+    def slowest_first(self) -> list[PathSample]:
+        """Those whose duration is known, the slowest first."""
         timed = [path for path in self.later if path.plan_ms is not None]
-        return max(timed, key=lambda path: path.plan_ms or 0.0, default=None)
+        return sorted(timed, key=lambda path: -(path.plan_ms or 0.0))
 
     def milliseconds(self, percent: float) -> float | None:
         """Return a percentile of their durations [ms], by nearest rank."""
@@ -247,58 +185,18 @@ def kind_of(reason: str) -> str:
     return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason given"
 
 
-def worst_moments(
-    data: RunData,
-    states: tuple[Span, ...],
-    replans: Replans,
-    fractions: NDArray[np.float64],
-) -> tuple[Moment, ...]:
-    """Return the worst of each kind of moment there was.
-
-    Args:
-        data: of the samples.
-        states: of the mission, in order.
-        replans: plans after the first.
-        fractions: float64 (n, 2), when [s] and the covered share as the daemon published it.
-    """
-    found: list[Moment | None] = []
-    for during in under_way(states):
-        found += [
-            longest_stand(data.times, data.track, during, states),
-            longest_gap("longest time without a pose", data.pose_s, during),
-            longest_gap("longest time without a map", data.map_s, during),
-        ]
-    slowest = replans.slowest
-    if slowest is not None and slowest.plan_ms is not None:
-        reason = slowest.about.reason
-        found.append(Moment("slowest replan", slowest.plan_ms, "ms", slowest.at_s, reason))
-    command_s = [at_s for at_s, _, _ in data.commands]
-    found.append(largest_drop(fractions, data.map_s, command_s, data.time_scale))
-    # A restarted mission has such moments several times: the worst one counts.
-    worst: dict[str, Moment] = {}
-    for moment in found:
-        if moment is not None and (
-            moment.what not in worst or moment.value > worst[moment.what].value
-        ):
-            worst[moment.what] = moment
-    return tuple(worst.values())
-
-
 @dataclass(frozen=True, slots=True)
 class Faults:
     """Refused messages and losses.
 
     Attributes:
-        by_code: messages refused by the daemon; ``NOT_RECORDED``: those that it counted after the
-            last recorded counts by code.
+        by_code: messages refused by the daemon.
         lost: samples that the recorder could not write; None where that is not recorded.
-        torn_bytes: what a crash tore off the files [bytes].
         complaints: warnings in the recorder's log.
     """
 
     by_code: dict[str, int]
     lost: int | None
-    torn_bytes: int
     complaints: tuple[str, ...]
 
     @property
@@ -309,18 +207,11 @@ class Faults:
 
 def faults_of(data: RunData, record: RunRecord) -> Faults:
     """Return the faults in a recording."""
-    by_code = _over_restarts(each.status.errors.by_code for each in data.statuses)
-    # Curves have counts up to the end, but after a restart of the daemon not each count.
-    by_code |= _plotted(record.plots)
-    total = _counted(line for _, line in record.log.get(entities.MISSION_LOG, ()))
-    if total > by_code.total():
-        by_code[NOT_RECORDED] = total - by_code.total()
     recorders = [each.status.recorder for each in data.statuses]
     lost = [recorder.lost for recorder in recorders if recorder and recorder.lost is not UNSET]
     return Faults(
-        by_code=dict(sorted(by_code.items())),
+        by_code=dict(sorted(_plotted(record.plots).items())),
         lost=max(lost, default=None),
-        torn_bytes=sum(part.torn_bytes for part in record.parts),
         complaints=tuple(
             line
             for log in (entities.BUS_LOG, entities.RECORDER_LOG)
@@ -330,36 +221,12 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     )
 
 
-def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> Counter[str]:
-    """Return the counts by code by their curves, over restarts."""
-    counts: Counter[str] = Counter()
+def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> dict[str, int]:
+    """Return the counts of curves by code; a restart of the daemon resets them."""
+    counts: dict[str, int] = {}
     for entity, points in plots.items():
         if entity.startswith(f"{entities.ERRORS}/"):
             values = points[:, 1]
             ended = values[:-1][np.diff(values) < 0]
             counts[entity.removeprefix(f"{entities.ERRORS}/")] = round(ended.sum() + values[-1])
     return counts
-
-
-def _over_restarts(counts: Iterable[Mapping[str, int]]) -> Counter[str]:
-    """Return the sum of counts that a restart of the daemon resets."""
-    ended: Counter[str] = Counter()
-    newest: Counter[str] = Counter()
-    for count in counts:
-        now = Counter(dict(count))
-        if now.total() < newest.total():
-            ended += newest
-        newest = now
-    return ended + newest
-
-
-def _counted(lines: Iterable[str]) -> int:
-    """Return how many errors the log counts, over restarts."""
-    ended = newest = 0
-    for line in lines:
-        match = _ERROR.match(line)
-        if match:
-            now = int(match[1])
-            ended += newest if now <= newest else 0
-            newest = now
-    return ended + newest

@@ -6,17 +6,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.mission.orders.order import MissionOrder, OrderDocument, order_document
 from fasaco_edge.mission.orders.passes import passes_words
 from fasaco_edge.review.moments import Span
-from fasaco_edge.review.run_data import RunData, StatusSample
+from fasaco_edge.review.run_data import RunData
 from fasaco_edge.wire.documents.replies import UnreachedArea
+from fasaco_edge.wire.documents.status import Status
 
-# Samples this soon after a status are of the same step, by the recorder's clock [s].
-SAME_STEP_S = 1.5
 ENDS = ("cancel", "reset")
 # States in which an order is over, or there is none: the same order would start again.
 OVER = ("done", "idle")
@@ -24,22 +21,7 @@ OVER = ("done", "idle")
 
 @dataclass(frozen=True, slots=True)
 class OrderChapter:
-    """An order, from its command to the next one.
-
-    Attributes:
-        ordered: "command", or "itself" for one that was given before the recording.
-        at_s, until_s: period in force [s].
-        ended_by: "cancel" or "reset"; "start" if another replaced it; None for the end of the
-            recording.
-        state: of the mission, the last one; None without any.
-        covered_cells, coverable_cells: by the last status; None if that is outdated.
-        complete: whether it reached ``done`` with nothing missing; None if not recorded.
-        order: its content as in a command; None for one from before the recording.
-        replans: paths from a plan while it was in force.
-        paused_s: time paused [s].
-        driven_m: distance driven meanwhile, without jumps [m].
-        unreached: uncovered areas by its last status: position, area and reason of each.
-    """
+    """An order, from its command to the next one; ``ReviewDocument`` describes its members."""
 
     ordered: str
     at_s: float
@@ -92,37 +74,29 @@ def order_words(order: OrderDocument) -> str:
     return ", ".join(asked)
 
 
-def chapters(
-    data: RunData, states: Sequence[Span], fractions: NDArray[np.float64], end_s: float
-) -> tuple[OrderChapter, ...]:
+def chapters(data: RunData, states: Sequence[Span], end_s: float) -> tuple[OrderChapter, ...]:
     """Return the chapters of a recording, in order; one at least.
 
     Args:
         data: of its samples.
         states: of the mission, in order.
-        fractions: float64 (n, 2), when [s], and the covered share as the daemon published it.
         end_s: of the recording [s].
     """
     held = list(_held(data, states, end_s))
-    track = data.track[:, :2]
-    ways = np.hypot(*np.diff(track, axis=0).T) if len(track) > 1 else np.zeros(0)
-    ways[ways > data.jump_m] = 0.0
     return tuple(
-        _chapter(data, states, fractions, ways, *one)
+        _chapter(data, states, *one)
         for one in held
         # Before the first command there may have been nothing.
         if len(held) == 1 or one[0] == "command" or _has_begun(states, one[1], one[2])
     )
 
 
-def is_complete(state: str, sample: StatusSample | None, covered: int, coverable: int) -> bool:
-    """Return whether an order is done with nothing left uncovered."""
-    if state != "done":
-        return False
-    zones = sample.status.mission.zones if sample else ()
-    if zones:
+def _is_complete(status: Status) -> bool:
+    """Return whether an order is done with nothing left uncovered, by its last status."""
+    if zones := status.mission.zones:
         return all(zone.covered == zone.cells for zone in zones)
-    return covered == coverable > 0
+    count = status.coverage
+    return count is not None and count.covered == count.coverable > 0
 
 
 def _held(
@@ -162,8 +136,6 @@ def _has_begun(states: Sequence[Span], begin_s: float, end_s: float) -> bool:
 def _chapter(
     data: RunData,
     states: Sequence[Span],
-    fractions: NDArray[np.float64],
-    ways: NDArray[np.float64],
     ordered: str,
     begin_s: float,
     end_s: float,
@@ -172,22 +144,13 @@ def _chapter(
 ) -> OrderChapter:
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
-    counted = [
-        each
-        for each in data.statuses
-        if begin_s <= each.at_s < until and each.status.coverage is not None
-    ]
-    own = fractions[(fractions[:, 0] >= begin_s) & (fractions[:, 0] < until)]
-    last = counted[-1] if counted and is_still_true(counted[-1], own, data.time_scale) else None
-    coverage = last.status.coverage if last else None
-    covered, coverable = (coverage.covered, coverage.coverable) if coverage else (None, None)
+    statuses = [each.status for each in data.statuses if begin_s <= each.at_s < until]
+    counted = [status for status in statuses if status.coverage is not None]
     complete: bool | None = None
-    if state and state != "done":
-        complete = False
-    elif state and covered is not None and coverable is not None:
-        complete = is_complete(state, last, covered, coverable)
+    if state and (state != "done" or counted):
+        complete = state == "done" and _is_complete(counted[-1])
+    count = counted[-1].coverage if counted else None
     times = data.times[1:]
-    reports = [each.status for each in data.statuses if begin_s <= each.at_s < until]
     return OrderChapter(
         ordered,
         begin_s,
@@ -195,8 +158,8 @@ def _chapter(
         ended_by,
         state or None,
         complete,
-        covered,
-        coverable,
+        count.covered if count else None,
+        count.coverable if count else None,
         order=msgspec.convert(order_document(order), OrderDocument) if order else None,
         replans=sum(
             begin_s <= path.at_s < until for path in data.paths if path.about.planner is not None
@@ -206,21 +169,6 @@ def _chapter(
             for span in states
             if span.name == "paused"
         ),
-        driven_m=round(float(ways[(times >= begin_s) & (times < until)].sum()), 2),
-        unreached=list(reports[-1].mission.unreached.areas) if reports else [],
+        driven_m=round(float(data.ways_m[(times >= begin_s) & (times < until)].sum()), 2),
+        unreached=list(statuses[-1].mission.unreached.areas) if statuses else [],
     )
-
-
-def is_still_true(sample: StatusSample, fractions: NDArray[np.float64], scale: float) -> bool:
-    """Return whether the covered share has not changed since a status came.
-
-    The curve is drawn up to two seconds late, its last point at the end of the recording: after the
-    end of an order, which covers no more, it says nothing. ``scale``: seconds of the robot, in
-    which the times are, per second.
-    """
-    if sample.status.state in OVER:
-        return True
-    until_s = sample.at_s + scale * SAME_STEP_S
-    later = fractions[fractions[:, 0] > until_s]
-    then = fractions[fractions[:, 0] <= until_s]
-    return not len(later) or (len(then) > 0 and bool((later[:, 1] == then[-1, 1]).all()))

@@ -23,31 +23,22 @@ from fasaco_edge.recording.read.run import (
     count_frames,
     read_run_record,
 )
-from fasaco_edge.review.drive import (
-    Drive,
-    WalkFigures,
-    drive_over,
-    first_covered,
-    milestones,
-    swept_floor,
-    walk_figures,
-)
+from fasaco_edge.review.drive import MILESTONES, swept_floor, visits_of
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
     Faults,
-    Moment,
     Replans,
     Span,
+    Stand,
     faults_of,
+    longest_stand,
     spans_of,
     troubles_at_rest,
-    worst_moments,
 )
-from fasaco_edge.review.orders import OrderChapter, chapters, is_complete, is_still_true
+from fasaco_edge.review.orders import OVER, OrderChapter, chapters
 from fasaco_edge.review.rooms import RoomChapter, room_chapters
-from fasaco_edge.review.run_data import RunData, first_counted, gather
-from fasaco_edge.wire.documents.settings import known_settings
+from fasaco_edge.review.run_data import RunData, gather
 
 # Progress is reported with every n-th sample.
 REPORT_EVERY = 200
@@ -70,7 +61,7 @@ def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> 
     """
     total, numbers = count_frames(paths), count(1)
     record = read_run_record(paths, lambda: progress("reading", next(numbers), total))
-    samples = RecordedSamples.of(record.batches)
+    samples = RecordedSamples((), record.batches)
     # Samples are numbered: the last batch shows their approximate number.
     about = max(batch.place.first for batch in record.batches) + 1
     data = gather(_reported(samples, progress, "decoding", about), record.clock)
@@ -89,17 +80,6 @@ Entered = tuple[float, str, str]
 """Time [s] at which a state was entered, the state, and the reason."""
 
 
-@dataclass(frozen=True, slots=True)
-class CoverageCounts:
-    """Cells at the end of a recording, and their source: "status" or "trail", the track."""
-
-    covered: int
-    coverable: int
-    recovered: int | None
-    unreachable: int | None
-    source: str
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Review:
     """All figures of a recording; times are the robot's [s] since it began.
@@ -110,17 +90,13 @@ class Review:
         lattice: over the last map; None without a map or a configuration, or if the map is too
             large or too far away.
         no_lattice: why there is none; "" if there is one.
-        drive, walk: the robot's drive over it.
-        floor: the swept part of the reachable floor; None without a drive, or if some was swept
+        visits: uint16, its shape: how often the tool passed over each cell.
+        floor: the swept part of the reachable floor; None without a lattice, or if some was swept
             before.
-        first_s: float64 (n,), when each cell was first covered, ascending; by the daemon's counts
-            if a line over the floor was driven, because the track then passes beside centres.
-        first_of: number of cells that could be covered at the end, by the same count.
-        counts: of cells; None if not recorded.
         replans: plans after the first.
         states: of the mission, in order.
         recorder_states: of the recorder.
-        moments: the worst ones.
+        longest_stand: the longest time at work that the robot stood; None without any.
         faults: refused messages and losses.
         missing: samples that were lost before they were written.
     """
@@ -129,16 +105,12 @@ class Review:
     data: RunData
     lattice: CoverageLattice | None
     no_lattice: str
-    drive: Drive | None
+    visits: NDArray[np.uint16] | None
     floor: JudgedFloor | None
-    walk: WalkFigures | None
-    first_s: NDArray[np.float64]
-    first_of: int
-    counts: CoverageCounts | None
     replans: Replans
     states: tuple[Span, ...]
     recorder_states: tuple[Span, ...]
-    moments: tuple[Moment, ...]
+    longest_stand: Stand | None
     faults: Faults
     missing: int
 
@@ -154,20 +126,34 @@ class Review:
         return names[-1] if names else ""
 
     @property
-    def known_fractions(self) -> NDArray[np.float64]:
-        """Times [s] and covered shares of the cells known then; float64 (n, 2)."""
-        nothing = np.zeros((0, 2))
-        return self.record.plots.get(entities.COVERED_FRACTION, nothing)
+    def covered_share(self) -> NDArray[np.float64]:
+        """Times [s] and covered shares of the cells that could be covered at the end, (n, 2).
+
+        They are drawn every two seconds, of the cells known then; statuses, recorded four times a
+        minute and at the end, say how many these were.
+        """
+        known = [
+            (each.at_s, count.covered, count.coverable, each.status.state in OVER)
+            for each in self.data.statuses
+            if (count := each.status.coverage) is not None
+        ]
+        if not known or not known[-1][2]:
+            return np.zeros((0, 2))
+        at_s, covered, coverable, is_over = np.array(known, np.float64).T
+        drawn = self.record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
+        # It is drawn a little late: once an order is over, it says nothing new.
+        before = np.searchsorted(at_s, drawn[:, 0], side="right") - 1
+        drawn = drawn[(before < 0) | (is_over[before] == 0)]
+        more = drawn[:, 1] * np.interp(drawn[:, 0], at_s, coverable)
+        points = np.vstack([np.column_stack((drawn[:, 0], more)), np.column_stack((at_s, covered))])
+        points[:, 1] /= coverable[-1]
+        found: NDArray[np.float64] = points[np.argsort(points[:, 0], kind="stable")]
+        return found
 
     @property
     def complete(self) -> bool | None:
         """Whether the last order reached ``done`` with nothing missing; None if not recorded."""
-        if not self.state or (self.state == "done" and self.counts is None):
-            return None
-        if self.counts is None:
-            return False
-        last = self.data.statuses[-1] if self.data.statuses else None
-        return is_complete(self.state, last, self.counts.covered, self.counts.coverable)
+        return self.orders[-1].complete
 
     @property
     def troubles(self) -> list[Span]:
@@ -192,15 +178,18 @@ class Review:
 
     @property
     def reached_s(self) -> dict[int, float | None] | None:
-        """When each of ``MILESTONES`` was reached [s]; None if not recorded."""
-        if self.drive is None or self.data.restored_cells:
+        """When each of ``MILESTONES`` was reached for good [s]; None if not recorded."""
+        at_s, shares = self.covered_share.T
+        if not len(at_s):
             return None
-        return milestones(self.first_s, self.first_of)
+        below = {p: np.flatnonzero(shares < p / 100 - 1e-9) for p in MILESTONES}
+        first = {p: int(found[-1]) + 1 if len(found) else 0 for p, found in below.items()}
+        return {p: float(at_s[index]) if index < len(at_s) else None for p, index in first.items()}
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:
         """The orders, and the outcome of each."""
-        return chapters(self.data, self.states, self.known_fractions, self.duration_s)
+        return chapters(self.data, self.states, self.duration_s)
 
     @property
     def rooms(self) -> tuple[RoomChapter, ...]:
@@ -218,30 +207,21 @@ def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
     """
     end_s = _end_s(record, data)
     lattice, no_lattice = _lattice(data)
-    drive = drive_over(lattice, data.times, data.track, data.lost_pose_s) if lattice else None
-    floor = swept_floor(data, lattice) if lattice else None
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
-    fractions = record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
-    counts = _counts(data, drive, fractions)
-    first_s, first_of = _first_covered(data, drive, lattice, counts)
     return Review(
         record=record,
         data=data,
         lattice=lattice,
         no_lattice=no_lattice,
-        drive=drive,
-        floor=floor,
-        walk=walk_figures(drive.cells) if drive else None,
-        first_s=first_s,
-        first_of=first_of,
-        counts=counts,
+        visits=visits_of(data, lattice) if lattice else None,
+        floor=swept_floor(data, lattice) if lattice else None,
         replans=replans,
         states=states,
         recorder_states=spans_of(
             _entered(record, entities.RECORDER_STATE, entities.RECORDER_LOG), end_s
         ),
-        moments=worst_moments(data, states, replans, fractions),
+        longest_stand=longest_stand(data, states),
         faults=faults_of(data, record),
         missing=missing,
     )
@@ -289,40 +269,3 @@ def _reason(lines: tuple[TimedText, ...], at_ns: int, state: str) -> str:
     prefix = f"{state}: "
     found = (line for at, line in lines if at == at_ns and line.startswith(prefix))
     return next(found, prefix).removeprefix(prefix)
-
-
-def _counts(
-    data: RunData, drive: Drive | None, fractions: NDArray[np.float64]
-) -> CoverageCounts | None:
-    """Return the daemon's counts if its last status still holds, else those of the track."""
-    counted = [each for each in data.statuses if each.status.coverage is not None]
-    own = counted[-1].status.coverage if counted else None
-    if own is not None and is_still_true(counted[-1], fractions, data.time_scale):
-        return CoverageCounts(
-            own.covered, own.coverable, own.recovered, own.unreachable, source="status"
-        )
-    # Cells covered before the recording began are not in the track.
-    if drive is None or data.restored_cells:
-        return None
-    cover = drive.coverage
-    return CoverageCounts(
-        cover.covered, cover.coverable, cover.recovered, cover.unreachable, source="trail"
-    )
-
-
-def _first_covered(
-    data: RunData,
-    drive: Drive | None,
-    lattice: CoverageLattice | None,
-    counts: CoverageCounts | None,
-) -> tuple[NDArray[np.float64], int]:
-    """Return when each cell was first covered [s], float64 (n,), and how many could be at the end.
-
-    A line over the floor covers cells without passing their centres: only the daemon counted them.
-    """
-    is_line = known_settings(data.config).planner.line != "cells"
-    if is_line and counts is not None and counts.source == "status":
-        return first_counted(data.statuses), counts.coverable
-    if drive is None or lattice is None:
-        return np.zeros(0), 0
-    return first_covered(drive, lattice), drive.coverage.coverable

@@ -24,20 +24,7 @@ RESTS = ("idle", "done", "paused", "charging", "loading", "waiting for map", "wa
 
 @dataclass(frozen=True, slots=True)
 class RoomChapter:
-    """A room, with the outline that it had at the end.
-
-    Attributes:
-        room: its number.
-        name: its name; "" for none.
-        area_m2: its area, by the daemon [m2].
-        seconds: time in it at work, standing too, but not in pauses and charging [s].
-        entered: how often the robot came into it, its first pose included.
-        swept_share: swept share of its reachable floor, by recorded poses; None if not known.
-        left_m2: its reachable floor that was not swept [m2]; None if not known.
-        counted_share: swept share as the daemon counted last, in that pass; None if not known.
-        passes: the newest pass of the last order that named it; None if none did.
-        skip: whether orders for everything leave it out.
-    """
+    """A room at the end of the recording; ``ReviewDocument`` describes its members."""
 
     room: int
     name: str
@@ -49,6 +36,11 @@ class RoomChapter:
     counted_share: float | None
     passes: int | None
     skip: bool
+
+    @property
+    def share(self) -> float | None:
+        """Its swept share, by recorded poses, or else as the daemon counted it."""
+        return self.counted_share if self.swept_share is None else self.swept_share
 
     @property
     def title(self) -> str:

@@ -18,80 +18,22 @@ from fasaco_edge.errors import BadConfiguration, FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import BETTER, SPARE
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
-from fasaco_edge.wire.documents.replies import FloorReport
+from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import Settings, known_settings
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.documents.turns import Cycle, TurnBatch, decode_turns
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 # Smaller areas are within the noise of poses and times [m2].
 SURELY_SWEPT_M2 = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class MadePlan:
-    """A plan that was made.
-
-    Attributes:
-        at_s: when it was finished, since the recording began [s].
-        took_ms: duration of planning [ms].
-        reason: why it was requested; "" if not recorded.
-        is_attempt: whether it was only an attempt to improve the path.
-        is_used: whether it became a path.
-    """
-
-    at_s: float
-    took_ms: float
-    reason: str
-    is_attempt: bool
-    is_used: bool
-
-
-@dataclass(slots=True)
-class PlanLog:
-    """Matches plan requests with their results, batch by batch."""
-
-    plans: list[MadePlan] = field(default_factory=list)
-    _asked: dict[int, str] = field(default_factory=dict)
-
-    def take(self, batch: TurnBatch, at_s: float, scale: float = 1.0) -> None:
-        """Take the turns of a batch that came at ``at_s`` [s]; ``scale``: of the robot's clock."""
-        if batch.beginning is not None:
-            self._asked = {}  # another daemon numbers from 1 again
-        last = batch.times[-1] if batch.times else 0.0
-        for turn in batch.turns:
-            index = turn.number - batch.first
-            ago_s = last - batch.times[index] if 0 <= index < len(batch.times) else 0.0
-            self._take(turn, max(at_s - scale * ago_s, 0.0))
-
-    def _take(self, turn: Cycle, at_s: float) -> None:
-        decided, ready = turn.decided, turn.plan
-        if ready is not None:
-            reason = self._asked.pop(ready.number, "")
-            path = decided.path if decided else None
-            became = reason if reason != SPARE else BETTER
-            self.plans.append(
-                MadePlan(
-                    at_s=at_s,
-                    took_ms=1e3 * ready.seconds,
-                    reason=reason,
-                    is_attempt=reason == SPARE,
-                    is_used=path is not None and path[1] == became,
-                )
-            )
-        if decided is not None and decided.asked is not None:
-            number, reason = decided.asked
-            self._asked[number] = reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +66,6 @@ class RunData:
         map_s: arrival of each map and update.
         paths, statuses: in order.
         commands: arrival and name of each, and the order of a ``start``.
-        plan_log: plans, by the turn log.
         grid: the map at the end, with all updates.
         ordered_keep_out: polygons of the last order.
         zones: of the last order; empty without an order, or if it is for everything.
@@ -141,7 +82,6 @@ class RunData:
     paths: list[PathSample] = field(default_factory=list)
     statuses: list[StatusSample] = field(default_factory=list)
     commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
-    plan_log: PlanLog = field(default_factory=PlanLog)
     grid: OccupancyGrid | None = None
     ordered_keep_out: tuple[Polygon, ...] = ()
     zones: tuple[Zone, ...] = ()
@@ -171,11 +111,16 @@ class RunData:
         if not swept or anew:
             return 0.0
         at_s, m2 = swept[0]
-        driven = self.track[self.times <= at_s, :2]
         tool_m = known_settings(self.config).robot.tool_width_m or 0.0
-        length_m = float(np.hypot(*np.diff(driven, axis=0).T).sum()) if len(driven) > 1 else 0.0
+        length_m = float(self.lengths_m[self.times[1:] <= at_s].sum())
         before_m2 = m2 - tool_m * (length_m + tool_m)
         return before_m2 if before_m2 > SURELY_SWEPT_M2 else 0.0
+
+    @property
+    def counts(self) -> CoverageReport | None:
+        """The daemon's last count of cells; None if there is none."""
+        counted = (each.status.coverage for each in reversed(self.statuses))
+        return next((count for count in counted if count is not None), None)
 
     @property
     def ledger_floor(self) -> FloorReport | None:
@@ -211,9 +156,20 @@ class RunData:
         )
 
     @property
-    def jump_m(self) -> float:
-        """Two poses further apart than this are a jump [m]."""
-        return JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
+    def lengths_m(self) -> NDArray[np.float64]:
+        """Distance from each pose to the next [m], float64 (n - 1,)."""
+        return np.asarray(np.hypot(*np.diff(self.track[:, :2], axis=0).T), np.float64)
+
+    @property
+    def jumps(self) -> NDArray[np.bool_]:
+        """Which ways between poses are jumps, bool (n - 1,)."""
+        jump_m = JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
+        return self.lengths_m > jump_m
+
+    @property
+    def ways_m(self) -> NDArray[np.float64]:
+        """Driven distance from each pose to the next, 0 for jumps [m], float64 (n - 1,)."""
+        return np.where(self.jumps, 0.0, self.lengths_m)
 
     @property
     def lost_pose_s(self) -> float:
@@ -227,9 +183,7 @@ class RunData:
 
         Over the others, jumps and gaps without a pose, no floor counts as swept.
         """
-        lengths_m = np.hypot(*np.diff(self.track[:, :2], axis=0).T)
-        driven: NDArray[np.bool_] = lengths_m <= self.jump_m
-        return driven & (np.diff(self.times) <= (self.lost_pose_s or math.inf))
+        return ~self.jumps & (np.diff(self.times) <= (self.lost_pose_s or math.inf))
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -240,25 +194,6 @@ class RunData:
     def track(self) -> NDArray[np.float64]:
         """All poses: x [m], y [m], yaw [rad], float64 (n, 3)."""
         return np.array(self.poses, np.float64).reshape(-1, 3)
-
-
-def first_counted(statuses: Iterable[StatusSample]) -> NDArray[np.float64]:
-    """Return when the daemon had counted each number of covered cells, float64 (n,) [s], rising.
-
-    A recording has a status each quarter of a minute: cells are interpolated evenly between two of
-    them. Cells that stopped counting, as after a reset or a loop closure, count from their next
-    coverage.
-    """
-    at_s: list[float] = []
-    before_s: float | None = None
-    for each in statuses:
-        if (coverage := each.status.coverage) is None:
-            continue
-        del at_s[coverage.covered :]
-        since_s, more = each.at_s if before_s is None else before_s, coverage.covered - len(at_s)
-        at_s += np.linspace(since_s, each.at_s, more + 1)[1:].tolist()
-        before_s = each.at_s
-    return np.array(at_s, np.float64)
 
 
 def gather(samples: Iterable[Arrival], clock: RobotClock) -> RunData:
@@ -294,7 +229,6 @@ class _SampleReader:
             "tf_static": self._pose,
             "command": self._command,
             "status": self._status,
-            "turns": self._turns,
             "rooms": self._rooms,
             PATH_DIGEST: self._path,
         }
@@ -348,10 +282,6 @@ class _SampleReader:
         if frames := known.ros2.frames:
             self._poses.follow((frames.map, frames.robot))
         data.statuses.append(StatusSample(self._now, status))
-
-    def _turns(self, arrival: Arrival) -> None:
-        turns = decode_turns(arrival.sample.payload)
-        self.data.plan_log.take(turns, self._now, self.data.time_scale)
 
     def _rooms(self, arrival: Arrival) -> None:
         self.data.rooms = decode_tolerant(arrival.sample.payload, Rooms)

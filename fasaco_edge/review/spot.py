@@ -22,17 +22,17 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window
+from fasaco_edge.grid.geometry import GridGeometry, Polygon
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
+from fasaco_edge.grid.polygons import is_near
 from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.core.events import BETTER
-from fasaco_edge.mission.orders.zones import cells_inside
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLine, drawings
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.review.drive import swept_floor
+from fasaco_edge.review.drive import nearest_points, swept_floor
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.settings import known_settings
@@ -114,28 +114,26 @@ def explain(review: Review, places: Sequence[tuple[float, float]]) -> list[Spot]
     Raises:
         UnreadableRecording: a file of the recording is gone.
     """
-    drawn = _DrawnLater(review, places)
-    return [_Judge(review, drawn, number).spot() for number in range(len(places))]
+    recorded = _Recorded(review, np.array(places, np.float64).reshape(-1, 2))
+    return [_Judge(review, recorded, number).spot() for number in range(len(places))]
 
 
-class _DrawnLater:
-    """Data read again from a recording on demand, once for all positions."""
+class _Recorded:
+    """Data read again from a recording on demand, once for all positions, float64 (n, 2) [m]."""
 
-    def __init__(self, review: Review, places: Sequence[tuple[float, float]]) -> None:
+    def __init__(self, review: Review, places: NDArray[np.float64]) -> None:
         self._review, self.places = review, places
 
     @cached_property
-    def seen_s(self) -> list[float | None]:
-        """When the map first showed each position free, to the end [s]."""
+    def seen_s(self) -> NDArray[np.float64]:
+        """When the map first showed each position free, to the end [s]; NaN for never."""
         record, footprint = self._review.record, self._review.data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
-        since: list[float | None] = [None] * len(self.places)
-        for at_s, grid in maps_of(RecordedSamples.of(record.batches), record.clock):
-            for number, (x, y) in enumerate(self.places):
-                value = _value(grid.cells, grid.geometry, x, y)
-                is_free = value is not None and FREE <= value <= free_at_most
-                before = since[number]
-                since[number] = (at_s if before is None else before) if is_free else None
+        since = np.full(len(self.places), np.nan)
+        for at_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
+            free = (grid.cells >= FREE) & (grid.cells <= free_at_most)
+            is_free = grid.geometry.values_at(free, self.places)
+            since = np.where(is_free, np.fmin(since, at_s), np.nan)
         return since
 
     @cached_property
@@ -149,9 +147,9 @@ class _DrawnLater:
 class _Judge:
     """Finds the reason for one position."""
 
-    def __init__(self, review: Review, drawn: _DrawnLater, number: int) -> None:
-        self._review, self._drawn, self._number = review, drawn, number
-        self._x, self._y = drawn.places[number]
+    def __init__(self, review: Review, recorded: _Recorded, number: int) -> None:
+        self._review, self._recorded, self._number = review, recorded, number
+        self._x, self._y = recorded.places[number].tolist()
         self._data = review.data
         known = known_settings(self._data.config).robot
         self._tool_m, self._radius_m = known.tool_width_m, known.radius_m
@@ -170,101 +168,92 @@ class _Judge:
         if floor is None:
             words = "floor was swept before the recording began, or no pose lies on the map"
             return self._spot("not known", words, swept=None)
-        if not _is_in(floor.reachable, floor.geometry, self._x, self._y):
-            return self._out_of_reach(grid)
+        if not self._is_in(floor.reachable, floor.geometry):
+            return self._out_of_reach(grid, footprint)
         return self._within_reach(floor)
+
+    def _is_in(self, mask: Mask, geometry: GridGeometry) -> bool:
+        return bool(geometry.values_at(mask, np.array([(self._x, self._y)]))[0])
 
     def _off_the_floor(self, grid: OccupancyGrid, footprint: Footprint) -> Spot | None:
         """Return why map or order exclude it; None if they do not."""
-        value = _value(grid.cells, grid.geometry, self._x, self._y)
-        if value is None:
-            return self._spot("never seen", "outside of the map at the end")
+        # Beyond the map it is as unknown, -1.
+        (value,) = grid.geometry.values_at(grid.cells + 1, np.array([(self._x, self._y)])) - 1
         if value < FREE:
             return self._spot("never seen", "unknown to the map at the end")
         if value > footprint.free_at_most:
             what = "an obstacle" if value >= footprint.occupied_at_least else "not surely free"
             return self._spot("not floor", f"the map at the end shows {what} ({value} %)")
-        if (zone := self._zone(self._data.keep_out)) is not None:
-            ordered = zone < len(self._data.ordered_keep_out)
-            which = (
-                f"keep-out zone {zone + 1} of the order" if ordered else "a standing keep-out zone"
-            )
-            return self._spot("keep-out", f"in {which}")
+        ordered = self._data.ordered_keep_out
+        if self._is_within(ordered):
+            return self._spot("keep-out", "in a keep-out zone of the order")
+        if self._is_within(self._data.keep_out):
+            return self._spot("keep-out", "in a standing keep-out zone")
         return None
 
-    def _out_of_reach(self, grid: OccupancyGrid) -> Spot:
+    def _out_of_reach(self, grid: OccupancyGrid, footprint: Footprint) -> Spot:
         """Return why the tool cannot reach it."""
-        lattice, footprint = self._review.lattice, self._data.footprint
-        assert lattice is not None
-        assert footprint is not None
-        if self._data.keep_out:
+        lattice = self._review.lattice
+        if self._data.keep_out and lattice is not None:
             free = swept_floor(self._data, lattice, keep_out=())
-            if free is not None and _is_in(free.reachable, free.geometry, self._x, self._y):
+            if free is not None and self._is_in(free.reachable, free.geometry):
                 return self._spot("keep-out", "a keep-out zone is in the way, or too near")
         geometry = grid.geometry
         free_mask = (grid.cells >= FREE) & (grid.cells <= footprint.free_at_most)
         # As in the judge: a disc fits if all pixels that it touches are free.
         radius_px, tool_px = (m / geometry.resolution for m in (self._radius_m, self._tool_m / 2))
         fits = ~within(~np.pad(free_mask, 1), radius_px + 0.5)[1:-1, 1:-1]
-        could = within(fits, tool_px)
-        if _is_in(could, geometry, self._x, self._y):
+        if self._is_in(within(fits, tool_px), geometry):
             words = "the robot would fit, but no way leads there that it fits through"
             return self._spot("closed off", words)
-        room_m, place = _nearest(~free_mask, geometry, self._x, self._y)
-        stand_m, _ = _nearest(fits, geometry, self._x, self._y)
-        near = "" if room_m is None else f"; an obstacle or unknown ground {room_m:.2f} m away"
-        near += "" if place is None else f" at ({place[0]:.2f}, {place[1]:.2f})"
-        stand = ""
-        if stand_m is not None:
-            stand = (
-                f": it fits {stand_m:.2f} m away at the nearest, "
+        words = f"too narrow for the robot (radius {self._radius_m:g} m)"
+        if fits.any():
+            rows, cols = np.nonzero(fits)
+            col, row = geometry.to_pixels(self._x, self._y)
+            away_m = np.hypot(cols + 0.5 - col, rows + 0.5 - row).min() * geometry.resolution
+            words += (
+                f": it fits {away_m:.2f} m away at the nearest, "
                 f"its tool reaches {self._tool_m / 2:.2f} m"
             )
-        words = f"too narrow for the robot (radius {self._radius_m:g} m){stand}{near}"
         return self._spot("too narrow", words)
 
     def _within_reach(self, floor: JudgedFloor) -> Spot:
-        times, track = self._data.times, self._data.track[:, :2]
-        away_m, at_s = _passed(track, times, self._data.driven, (self._x, self._y))
+        data = self._data
+        away_m, at_s = _distances(data.track[:, :2], (self._x, self._y)), data.times
+        if len(away_m) < len(at_s):  # pieces: when each ended
+            away_m[~data.driven], at_s = math.inf, at_s[1:]
         first = int(np.argmin(away_m))
-        nearest_m, nearest_s = float(away_m[first]), float(at_s[first])
-        if _is_in(floor.swept, floor.geometry, self._x, self._y):
+        if self._is_in(floor.swept, floor.geometry):
             passed = at_s[away_m <= self._tool_m / 2 + floor.geometry.resolution]
             words = "swept" + (f", first at {clock(float(passed[0]))}" if len(passed) else "")
             return self._spot("swept", words, swept=True)
-        missed_m = max(nearest_m - self._tool_m / 2, 0.0)
-        spot = self._missed(missed_m, nearest_s)
-        spot.missed_m, spot.nearest_s = round(missed_m, 3), round(nearest_s, 3)
+        missed_m = max(float(away_m[first]) - self._tool_m / 2, 0.0)
+        spot = self._missed(missed_m, float(at_s[first]))
+        spot.missed_m, spot.nearest_s = round(missed_m, 3), round(float(at_s[first]), 3)
         patches = Patches.of(floor.unswept)
         here = patches.nearest_to(*floor.geometry.to_pixels(self._x, self._y))
-        m2 = int(np.count_nonzero(here)) * floor.geometry.resolution**2
-        spot.patch_m2 = round(m2, 3)
+        spot.patch_m2 = round(int(np.count_nonzero(here)) * floor.geometry.resolution**2, 3)
         return spot
 
     def _missed(self, missed_m: float, nearest_s: float) -> Spot:
         """Return why the tool missed it."""
         by = f"the tool's edge passed {100 * missed_m:.0f} cm from it at {clock(nearest_s)}"
-        gap = self._gap()
-        if self._data.zones and self._zone([zone.polygon for zone in self._data.zones]) is None:
-            words = f"in no zone of the last order; {by}"
-            for at_s, _, order in self._data.commands:
-                if (zone := self._zone(order.keep_out)) is not None:
-                    words += f"; in keep-out zone {zone + 1} of the order at {clock(at_s)}"
-            return self._spot("not ordered", words)
-        if gap is not None:
+        if self._data.zones and not self._is_within([zone.polygon for zone in self._data.zones]):
+            return self._spot("not ordered", f"in no zone of the last order; {by}")
+        if (gap := self._gap()) is not None:
             words = (
                 f"no pose came between {clock(gap[0])} and {clock(gap[1])}: the robot may have "
                 "swept it meanwhile, and such floor does not count"
             )
             return self._spot("poses missing", f"{words}; {by}", swept=None)
         over = self._last_path_over()
-        seen_s = self._drawn.seen_s[self._number]
-        if over is not None and over is self._drawn.paths[-1] and not self._review.complete:
+        seen_s = float(self._recorded.seen_s[self._number])
+        if over is not None and over is self._recorded.paths[-1] and not self._review.complete:
             words = f"the last path, {over.revision}, leads over it; the robot did not get there"
             why = "still to come"
         elif over is not None:
             why, words = self._left_by(over)
-        elif seen_s is not None and seen_s > nearest_s:
+        elif seen_s > nearest_s:
             why = "seen late"
             words = f"the map showed it free from {clock(seen_s)} on, and then no path led there"
         elif before_m2 := self._data.swept_before_m2:
@@ -277,15 +266,14 @@ class _Judge:
             why = "not worth it"
             words = "no path led over it: a detour was not worth the way, or did not fit"
         spot = self._spot(why, f"{words}; {by}")
-        spot.seen_s = None if seen_s is None else round(seen_s, 3)
+        spot.seen_s = None if math.isnan(seen_s) else round(seen_s, 3)
         return spot
 
     def _gap(self) -> tuple[float, float] | None:
         """Return the first time without poses in which the robot can have come here [s]."""
         data = self._data
-        starts, ends = (data.track[part, :2] for part in (slice(-1), slice(1, None)))
-        way_m = np.hypot(*(ends - starts).T)
-        via_m = sum(np.hypot(*(end - (self._x, self._y)).T) for end in (starts, ends))
+        away_m = np.hypot(*(data.track[:, :2] - (self._x, self._y)).T)
+        via_m, way_m = away_m[:-1] + away_m[1:], data.lengths_m
         # At its speed it can have made a detour; if it hardly moved, it rather stood.
         speed_m_s = known_settings(data.config).robot.speed_m_s
         detour_m = np.clip(speed_m_s * np.diff(data.times) - way_m, 0.0, way_m)
@@ -296,13 +284,9 @@ class _Judge:
 
     def _last_path_over(self) -> DrawnLine | None:
         """Return the last path that would have swept it; None without any."""
-        reach_m = self._tool_m / 2 - NEAR_M
-        for one in reversed(self._drawn.paths):
-            stamps, whole = np.zeros(len(one.xy)), np.ones(max(len(one.xy) - 1, 0), np.bool_)
-            away_m, _ = _passed(one.xy, stamps, whole, (self._x, self._y))
-            if float(away_m.min()) <= reach_m:
-                return one
-        return None
+        reach_m, place = self._tool_m / 2 - NEAR_M, (self._x, self._y)
+        paths = reversed(self._recorded.paths)
+        return next((one for one in paths if _distances(one.xy, place).min() <= reach_m), None)
 
     def _left_by(self, over: DrawnLine) -> tuple[str, str]:
         """Return the fate of a path that led over it."""
@@ -314,60 +298,11 @@ class _Judge:
         # A shorter line leaves floor that is not worth the distance.
         return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words
 
-    def _zone(self, polygons: Sequence[Polygon | None]) -> int | None:
-        """Return the number of the first polygon around the spot; None without any."""
-        for number, polygon in enumerate(polygons):
-            if polygon is not None and is_inside(polygon, self._x, self._y):
-                return number
-        return None
+    def _is_within(self, polygons: Sequence[Polygon | None]) -> bool:
+        return any(p is not None and is_near(p, (self._x, self._y), 0.0) for p in polygons)
 
 
-def is_inside(polygon: Polygon, x: float, y: float) -> bool:
-    """Return whether a polygon contains a point [m]."""
-    # Tested as one cell of a lattice with its centre at the point.
-    moved = tuple((px - x + 0.5, py - y + 0.5) for px, py in polygon)
-    return bool(cells_inside(moved, Window(0, 0, 1, 1), 1.0)[0, 0])
-
-
-def _value(cells: NDArray[np.int8], geometry: GridGeometry, x: float, y: float) -> int | None:
-    col, row = (math.floor(at) for at in geometry.to_pixels(x, y))
-    rows, cols = cells.shape
-    return int(cells[row, col]) if 0 <= row < rows and 0 <= col < cols else None
-
-
-def _is_in(mask: Mask, geometry: GridGeometry, x: float, y: float) -> bool:
-    return bool(_value(mask.view(np.int8), geometry, x, y))
-
-
-def _nearest(
-    mask: Mask, geometry: GridGeometry, x: float, y: float
-) -> tuple[float | None, tuple[float, float] | None]:
-    """Return the distance to the nearest marked pixel [m] and its position; None without any."""
-    rows, cols = np.nonzero(mask)
-    if not len(rows):
-        return None, None
-    col, row = geometry.to_pixels(x, y)
-    away = np.hypot(cols + 0.5 - col, rows + 0.5 - row)
-    best = int(np.argmin(away))
-    place = geometry.to_map(cols[best] + 0.5, rows[best] + 0.5)
-    return float(away[best]) * geometry.resolution, place
-
-
-def _passed(
-    line: NDArray[np.float64],
-    at_s: NDArray[np.float64],
-    driven: NDArray[np.bool_],
-    place: tuple[float, float],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the distance of each piece of a line to a point [m], and when it ended [s].
-
-    ``driven``: bool (n - 1,), which pieces were driven; others are infinitely far.
-    """
-    if len(line) < 2:
-        return np.hypot(*(line - place).T), at_s
-    starts, ways = line[:-1], np.diff(line, axis=0)
-    squares = np.maximum((ways**2).sum(axis=1), 1e-12)
-    shares = np.clip(((np.array(place) - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
-    away = np.hypot(*(starts + shares[:, None] * ways - place).T)
-    away[~driven] = math.inf
-    return away, at_s[1:]
+def _distances(line: NDArray[np.float64], place: tuple[float, float]) -> NDArray[np.float64]:
+    """Return the distance of each piece of a line (n, 2) to a place, or of its only point [m]."""
+    points = nearest_points(line, place) if len(line) > 1 else line
+    return np.asarray(np.hypot(*(points - place).T), np.float64)

@@ -15,10 +15,15 @@ WORDS = {
 _POSSIBLE = re.compile(r", or of [\d.]+ m2 if walls are a pixel thinner than on the map")
 
 
+# "Every cell" beside "47 of 49 m2" would contradict itself: a cell counts by its centre.
+_ALL_COVERED = re.compile(r"every reachable cell( of the zones)? is covered")
+
+
 def plain(text: str) -> str:
     """Return a text with the reasons in it in plain words."""
     for reason, words in WORDS.items():
         text = text.replace(reason, words)
+    text = _ALL_COVERED.sub(r"the tool has passed the centre of every cell\1 that it reaches", text)
     return _POSSIBLE.sub("", text)
 
 

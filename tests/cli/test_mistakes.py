@@ -92,7 +92,6 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --planner mine.py:f --png mine.py", 78, "cannot write mine.py: it is read"),
         ("simulate map.yaml --trail-out map.png", 78, "cannot write map.png: it is read from"),
         ("review a.rrd --png a.rrd", 78, "cannot write a.rrd: it is read from"),
-        ("review a.rrd --html a.html", 78, "hint: fasaco-edge serve FILE.rrd shows"),
         ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is read from"),
         (
             "mission start --order o --zone a --passes 2",
@@ -117,6 +116,8 @@ def folder(tmp_path, monkeypatch):
         ("simulate office --connect office", 78, "'office': no protocol before the address"),
         (f"record --out . --connect {NOBODY}", 1, "Unable to connect to any of"),
         (f"record --out . --base /x --connect {NOBODY}", 78, "base must be chunks"),
+        (f"record --out . --quota-mb -5 --connect {NOBODY}", 78, "disk space: Expected `int` >= 0"),
+        (f"record --out . --quota-mb 100 --connect {NOBODY}", 78, "at least two parts, 128 MB"),
         (
             'record --out . --fleet hall --ros2 {"kind":"bridge"}',
             78,

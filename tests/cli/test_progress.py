@@ -75,7 +75,7 @@ def test_a_review_shows_what_it_reads(recording):
     with Terminal("review", recording, columns=120) as shell:
         text = ended_well(shell)
         assert "recording ━" in COLOURS.sub("", shell.written)
-        assert re.match("complete: every reachable cell", text)
+        assert re.match("complete: every cell covered", text)
 
 
 def test_the_simulation_shows_its_robot_in_one_line():

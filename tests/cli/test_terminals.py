@@ -51,7 +51,7 @@ TO_THE_END = [
     ("mission status", {0}, "everything reachable"),
     ("rooms list", {0}, "room"),
     ("watch --once", {0}, "COVERING"),
-    ("review night.rrd", {0}, "complete: every reachable cell"),
+    ("review night.rrd", {0}, "complete: every cell covered"),
     ("review night.rrd --at 0:02", {0}, "robot "),
     ("review night.rrd --against night.rrd", {0}, "Both had the same setup."),
     ("replay night.rrd", {0, 1}, "covering: path"),

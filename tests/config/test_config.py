@@ -20,7 +20,7 @@ from fasaco_edge.config.loading import decode_config, load_config
 from fasaco_edge.config.ros import RosConfig, RosFrames
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.registry import PLANNER_NAMES
-from fasaco_edge.recording.write.quota import Quota, budget_of
+from fasaco_edge.recording.write.quota import budget_of
 from tests.support.examples import examples
 
 
@@ -423,7 +423,8 @@ def test_the_recorder_gets_its_settings_from_the_configuration(tmp_path):
     assert handed == config
     budget = budget_of(handed)
     assert (budget.part_bytes, budget.part_s) == (10_000_000, 150.0)
-    assert (budget.quota, budget.least_free_bytes) == (Quota("left", 100_000_000), 7_000_000)
+    assert (budget.robot, budget.quota_bytes) == ("left", 100_000_000)
+    assert budget.least_free_bytes == 7_000_000
     assert handed.pose.schema == "nav_msgs/msg/Odometry"
     assert handed.ros2.frames == RosFrames(map="floor", robot="base_link")
     assert list(handed.ros2.inputs) == ["map", "map_update", "battery", "tf_static", "pose"]

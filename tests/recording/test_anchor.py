@@ -43,7 +43,7 @@ def recorded(tmp_path_factory):
     return Path(report["file"]), mission
 
 
-GRIDS = [entities.MAP, entities.COVERAGE, entities.FLOOR, entities.PHEROMONE]
+GRIDS = [entities.MAP, entities.FLOOR, entities.PHEROMONE]
 
 
 def test_near_zero_nothing_is_moved():
@@ -82,7 +82,7 @@ def test_where_it_is_drawn_from_is_told(recorded):
     path, _ = recorded
     (where,) = read_static(path, entities.WORLD, "Transform3D:translation")[-1]
     assert np.allclose(where, [*DRAWN_FROM, 0.0])
-    card = str(read_static(path, entities.RUN_CARD, "TextDocument:text")[-1][0])
+    card = str(read_column(path, entities.RUN_CARD, "TextDocument:text").values[-1])
     assert "| drawn from | x 500000 m, y 5500000 m of the map's frame |" in card
 
 

@@ -17,6 +17,8 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, size_in_file
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.wire.documents.path_documents import TrailAttachment
+from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 SECOND_NS = 1_000_000_000
 RATE = RATES[entities.MAP]
@@ -110,3 +112,22 @@ def test_a_line_keeps_its_corners_and_loses_the_rest():
     assert archetypes.corners(lanes[[0, 1, 1, 2]]).tolist()[-1] == [2, 0]
     for count in (0, 1, 2):
         assert len(archetypes.corners(lanes[:count])) == count
+
+
+@pytest.mark.parametrize(
+    ("steps", "words"),
+    [
+        (
+            9,
+            "9 steps to drive\nbranching factor 1.75 "
+            "(1: one way in each cell, 4: none is preferred)",
+        ),
+        (0, "nothing left to drive"),
+    ],
+)
+def test_the_trail_s_label_leaves_out_what_says_nothing(steps, words):
+    geometry = GridGeometry(2, 2, 0.3, Pose2D(0.0, 0.0))
+    field = PheromoneMessage(geometry, np.ones((2, 2), np.uint8), 0.1, 0.2, 0, 1, 1, steps)
+    label = archetypes.trail_label(field, TrailAttachment(7, 4, 1.75))
+    assert label.labels is not None
+    assert label.labels.as_arrow_array().to_pylist() == [f"pheromone at path 7, {words}"]

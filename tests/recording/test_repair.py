@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import fcntl
 import io
-import os
 import struct
 from pathlib import Path
 
@@ -57,15 +56,6 @@ def test_trailing_zeros_are_cut_with_the_frame_they_are_in(tmp_path_factory, siz
     assert repair_recording(path) is not None
     solid = len(WHOLE[:size].rstrip(b"\0")) + MOST_ZEROS
     assert path.read_bytes() == content[: max(end for end in ENDS if end <= solid)]
-
-
-def test_a_hole_at_the_end_is_not_read(tmp_path):
-    """It takes no space: of a file that claims a terabyte, hours of zeros would be read."""
-    path = written(tmp_path, WHOLE + bytes(70_000))
-    os.truncate(path, 10**12)
-    repair = repair_recording(path)
-    assert path.read_bytes() == WHOLE
-    assert repair.cut_bytes == 10**12 - len(WHOLE)
 
 
 @pytest.mark.parametrize("kept", [0, 4, 9])

@@ -61,7 +61,7 @@ def test_maps_and_transforms_are_in_the_recording(domain, tmp_path):
     assert not story.undecodable
     # A replay without the turn log finds the pose, too: by static transforms.
     run = read_run(samples)
-    replay = Replay(run.daemon_config(), run, work=0)
+    replay = Replay(run.daemon_config(), run.ready_ns, work=0)
     assert [step for step in replay.steps(samples) if step.refused] == []
     assert replay.mission.pose is not None
     assert np.allclose((replay.mission.pose.pose.x, replay.mission.pose.pose.y), WAY[-1])

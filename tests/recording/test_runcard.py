@@ -6,7 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.recording.scene.runcard import RunDescription
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
+from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
+from fasaco_edge.wire.documents.status import Status
+from tests.support.statuses import FULL
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=20),
@@ -15,35 +19,26 @@ JSON = st.recursive(
 )
 
 
-def test_settings_that_matter_come_first():
-    robot = {"name": "r2", "radius_m": 0.2, "tool_width_m": 0.3}
-    config = {"alpha": 1, "robot": robot, "planner": {"ants": 8, "name": "fasaco", "seed": 7}}
+def test_settings_stand_below_by_their_names():
+    robot = {"name": "r2", "radius_m": 0.2}
+    config = {"alpha": 1, "robot": robot, "planner": {"name": "fasaco", "seed": 7}}
     card = RunDescription("r2", "2026-01-01", "1.0", config).markdown().partition("| setting |")[2]
-    first = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed", "alpha")
-    order = [card.index(name) for name in ("r2", *first, "planner.ants")]
+    first = ("alpha", "planner.name", "planner.seed", "robot.name", "robot.radius_m")
+    order = [card.index(name) for name in ("r2", *first)]
     assert order == sorted(order)
 
 
-def test_a_value_cannot_break_the_table():
-    card = RunDescription("r2", "now", "1.0", {"planner": "a|b\nc"}).markdown()
-    assert r"| planner | a\|b\\nc |" in card.splitlines()
-
-
-def test_a_value_is_no_link_and_no_picture():
-    card = RunDescription("[a](file:b)", "now", "![](c)", {"planner": "<img src=d>\x1b"}).markdown()
-    assert r"**\[a\](file:b)**, version \!\[\](c)" in card
-    assert r"| planner | \<img src=d\>\\x1b |" in card.splitlines()
-
-
-def test_properties_are_text():
-    config = {"robot": {"radius": 0.2}, "planner": "fasaco", "limits": [1, 2]}
-    assert RunDescription("r2", "now", "", config).properties() == {
-        "robot": "r2",
-        "began": "now",
-        "robot_radius": "0.2",
-        "planner": "fasaco",
-        "limits": "1, 2",
-    }
+@pytest.mark.parametrize(
+    ("words", "value", "line"),
+    [
+        (("r2", "now", "1.0"), "a|b\nc", r"| planner | a\|b\\nc |"),
+        (("[a](file:b)", "now", "![](c)"), "", r"**\[a\](file:b)**, version \!\[\](c)"),
+        (("r2", "now", "1.0"), "<img src=d>\x1b", r"| planner | \<img src=d\>\\x1b |"),
+    ],
+)
+def test_a_value_breaks_no_table_and_is_no_link(words, value, line):
+    card = RunDescription(*words, {"planner": value}).markdown()
+    assert line in card.splitlines()
 
 
 @given(st.dictionaries(st.sampled_from("abc"), JSON))
@@ -56,30 +51,41 @@ def test_what_is_asked_for_first_stands_in_a_line():
     assert card.startswith("**r2**, version 1.0, seed 7\n")
 
 
-def test_the_range_of_the_pheromone_is_a_property():
-    told = RunDescription("r2", "2026-01-01", pheromone_range=(0.1, 0.25)).properties()
-    assert (told["trail_min"], told["trail_max"]) == ("0.1", "0.25")
-    assert "trail_min * (trail_max / trail_min)" in told["trail"]
-    assert "trail" not in RunDescription("r2", "2026-01-01").properties()
+FLOOR = {"swept_m2": 47.7, "reachable_m2": 49.4, "left": None, "out_of_reach": None}
+SIMULATED = {"config": {"robot": {"time_scale": 20.0}}}
+
+
+def outcome(*states, driven_s=90.0, first_ns=5_000_000_000, **members):
+    """Return the line after a drive, and these states with their reasons."""
+    one = Outcome()
+    for stamp_ns in (first_ns, first_ns + round(driven_s * 1e9) if first_ns else 0):
+        one.add_pose(StampedPose(Pose2D(1.0, 1.0), stamp_ns=stamp_ns))
+    for state, reason in states:
+        known = FULL | {"floor": None} | members | {"state": state, "reason": reason}
+        one.add_status(decode_tolerant(encode_json(known), Status))
+    return one.text
 
 
 @pytest.mark.parametrize(
-    ("field", "known"),
+    ("said", "line"),
     [
-        ((0.15, 0.3), (0.1, 0.5)),
-        ((0.095, 0.54), (0.1, 0.5)),  # not by a tenth
-        ((0.0, 0.0), (0.1, 0.5)),  # no cell is coverable
-        ((0.05, 0.3), (0.05, 0.5)),
-        ((0.15, 0.6), (0.1, 0.6)),
+        (outcome(), ""),
+        (outcome(("covering", "")), "**under way**"),
+        (outcome(("done", "all is covered")), "**done** after 1 min 30 s: all is covered"),
+        (outcome(("done", "all is covered"), first_ns=0), "**done**: all is covered"),
+        (
+            outcome(("done", "every reachable cell is covered; 47.7 of 49.4 m2 of floor swept")),
+            "**done** after 1 min 30 s: the tool has passed the centre of every cell that it "
+            "reaches; 47.7 of 49.4 m2 of floor swept",
+        ),
+        (outcome(("done", "9 m2 swept"), floor=FLOOR), "**done** after 1 min 30 s: 9 m2 swept"),
+        (
+            outcome(("degraded", "it stands"), floor=FLOOR, **SIMULATED),
+            "**degraded** after 1 min 30 s (simulated at 20 times real time): it stands; "
+            "47.7 of 49.4 m2 swept",
+        ),
+        (outcome(("degraded", "it stands"), ("covering", "")), "**under way**"),
     ],
-)
-def test_the_range_of_the_pheromone_widens(field, known):
-    first = RunDescription("r2", "2026-01-01").with_pheromone(0.1, 0.5)
-    assert first.pheromone_range == (0.1, 0.5)
-    after = first.with_pheromone(*field)
-    assert after.pheromone_range == known
-    assert (after is first) == (known == (0.1, 0.5))
-
-
-def test_a_field_without_coverable_cells_has_no_range():
-    assert RunDescription("r2", "2026-01-01").with_pheromone(0.0, 0.0).pheromone_range is None
+)  # fmt: skip
+def test_the_outcome_is_said_where_there_is_one(said, line):
+    assert said == line

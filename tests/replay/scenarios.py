@@ -3,40 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from msgspec.structs import asdict
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import COVERABLE
-from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.grid.occupancy import UNKNOWN
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.replay.mission_drive import ReplayStep
 from fasaco_edge.replay.replay import Replay, read_run
-from fasaco_edge.wire.documents.json_text import encode_json
-from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PlanFigures, digest
-from fasaco_edge.wire.messages.maps import (
-    decode_map_update,
-    decode_occupancy_grid,
-    encode_occupancy_grid,
-)
 from fasaco_edge.wire.messages.poses import decode_pose
-from fasaco_edge.wire.schemas import OCCUPANCY_GRID, POSE_STAMPED
+from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests import naive
 
 Cell = tuple[int, int]
 Samples = list[Arrival]
 # Two poses further apart than so many cells are no drive.
 JUMP_CELLS = 2.0
-# How far a mapper that was started anew has seen around the robot [m].
-SIGHT_M = 1.2
-# It sends a map with every so many-th pose, with so much around it.
-MAP_EVERY, MARGIN_PX = 5, 2
 
 
 @dataclass(frozen=True)
@@ -68,7 +55,6 @@ class Story:
                 step.decision.plan and step.decision.plan.reason,
                 step.decision.path and (step.decision.path.revision, step.decision.path.reason),
                 step.decision.path and step.decision.path.cells.tobytes(),
-                step.as_recorded,
             )
             for step in self.news
         ]
@@ -76,7 +62,7 @@ class Story:
 
 def played(samples: Samples, config: DaemonConfig) -> Story:
     """Play ``samples``; whatever they are, no path is illegal and no claim false."""
-    replay = Replay(config, read_run(samples))
+    replay = Replay(config, read_run(samples).ready_ns)
     mission, news, map_revision = replay.mission, [], 0
     for step in replay.steps(samples):
         if step.is_news:
@@ -158,20 +144,6 @@ def without(samples: Samples, dropped: Sequence[int]) -> Samples:
     return [sample for index, sample in enumerate(samples) if index not in set(dropped)]
 
 
-def repeated(samples: Samples, index: int, later: int) -> Samples:
-    """Let one come again at the time of one that came ``later``."""
-    again = moved(samples[index], samples[later].wall_ns - samples[index].wall_ns)
-    return [*samples[: later + 1], again, *samples[later + 1 :]]
-
-
-def swapped(samples: Samples, one: int, other: int) -> Samples:
-    """Exchange what came at two times."""
-    result = list(samples)
-    for index, source in ((one, other), (other, one)):
-        result[index] = replace(samples[index], sample=samples[source].sample)
-    return result
-
-
 def late(samples: Samples, topic: str, by_ns: int) -> Samples:
     """Let all of a topic come later."""
     result = [moved(s, by_ns) if s.topic == topic else s for s in samples]
@@ -187,81 +159,6 @@ def changed(samples: Samples, index: int, change: Callable[[bytes], bytes]) -> S
     return result
 
 
-def mapper_restarted(samples: Samples, index: int) -> Samples:
-    """Start the mapper anew before sample ``index``: from there on it sends whole maps.
-
-    It knows only what it has seen since, so its maps have another origin.
-    """
-    return [*samples[:index], *_new_mapper(samples, index)]
-
-
-def with_paths(samples: Samples, story: Story) -> Samples:
-    """Record with the samples the paths that they led to."""
-    lattice = story.mission.lattice
-    paths = []
-    for step in story.news:
-        if (update := step.decision.path) is None:
-            continue
-        at_ns = samples[0].at_ns + round(1e9 * step.at_s)
-        about = {
-            "revision": update.revision,
-            "reason": update.reason,
-            **asdict(PlanFigures.of(update.plan)),
-        }
-        points = lattice.centres(update.cells).tobytes()
-        sample = Sample("robot/path", digest(points), attachment=encode_json(about))
-        wall_ns = at_ns + samples[0].wall_ns - samples[0].at_ns
-        paths.append(Arrival(PATH_DIGEST, sample, at_ns, wall_ns))
-    return sorted([*samples, *paths], key=lambda sample: sample.wall_ns)
-
-
 def moved(sample: Arrival, by_ns: int) -> Arrival:
     """Return a sample at a later time."""
     return replace(sample, at_ns=sample.at_ns + by_ns, wall_ns=sample.wall_ns + by_ns)
-
-
-def _new_mapper(samples: Samples, index: int) -> Iterator[Arrival]:
-    known: OccupancyGrid | None = None
-    seen: set[Cell] = set()
-    poses = 0
-    for number, arrival in enumerate(samples):
-        sample = arrival.sample
-        if arrival.topic == "map":
-            known = decode_occupancy_grid(sample.payload)
-        elif arrival.topic == "map_update":
-            known = known.patched(decode_map_update(sample.payload))
-        elif arrival.topic == "pose" and number >= index:
-            pose = decode_pose(sample.payload, POSE_STAMPED).pose
-            resolution = known.geometry.resolution
-            seen |= _disc(pose.x / resolution, pose.y / resolution, SIGHT_M / resolution)
-            poses += 1
-            if poses % MAP_EVERY == 1:
-                payload = encode_occupancy_grid(_cropped(known, seen))
-                whole = Sample(sample.key, payload, OCCUPANCY_GRID)
-                yield replace(arrival, topic="map", sample=whole)
-        if number >= index and arrival.topic not in ("map", "map_update"):
-            yield arrival
-
-
-def _disc(x: float, y: float, radius: float) -> set[Cell]:
-    rows = range(math.floor(y - radius), math.ceil(y + radius) + 1)
-    cols = range(math.floor(x - radius), math.ceil(x + radius) + 1)
-    return {(r, c) for r in rows for c in cols if math.hypot(c - x, r - y) < radius}
-
-
-def _cropped(grid: OccupancyGrid, seen: set[Cell]) -> OccupancyGrid:
-    """Return what was seen of a map, pixels (row, col) counted from the frame's origin."""
-    geometry = grid.geometry
-    row0 = round(geometry.origin.y / geometry.resolution)
-    col0 = round(geometry.origin.x / geometry.resolution)
-    mask = np.zeros(grid.cells.shape, bool)
-    for row, col in seen:
-        if 0 <= row - row0 < geometry.rows and 0 <= col - col0 < geometry.cols:
-            mask[row - row0, col - col0] = True
-    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    window = slice(rows[0], rows[-1] + 1), slice(cols[0], cols[-1] + 1)
-    cells = np.where(mask, grid.cells, UNKNOWN).astype(np.int8)[window]
-    cells = np.pad(cells, MARGIN_PX, constant_values=UNKNOWN)
-    origin = Pose2D(*geometry.to_map(int(cols[0]) - MARGIN_PX, int(rows[0]) - MARGIN_PX))
-    placed = GridGeometry(*cells.shape, geometry.resolution, origin)
-    return OccupancyGrid(placed, cells, grid.frame, grid.stamp_ns)

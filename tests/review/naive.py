@@ -1,4 +1,4 @@
-"""What a trail comes to, told slowly: sample by sample along it, a millimetre apart."""
+"""The cells that a trail passes, found slowly: sample by sample along it, a millimetre apart."""
 
 from __future__ import annotations
 
@@ -32,16 +32,6 @@ def passed_cells(trail, cell_m, reach=0.5):
             passed.append((now, way))
         under = now
     return passed
-
-
-def quarter_turns(cells):
-    """Return how often a walk turns left or right between two steps to a neighbouring cell."""
-    turns = 0
-    for (r0, c0), (r1, c1), (r2, c2) in zip(cells, cells[1:], cells[2:], strict=False):
-        before, after = (r1 - r0, c1 - c0), (r2 - r1, c2 - c1)
-        if abs(before[0]) + abs(before[1]) == abs(after[0]) + abs(after[1]) == 1:
-            turns += abs(before[0] * after[1] - before[1] * after[0])
-    return turns
 
 
 def nearest_rank(values, percent):

@@ -5,90 +5,66 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fasaco_edge.cli.review.screen import curve
+from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.run import RunRecord
-from fasaco_edge.review.drive import milestones, walk_figures
 from fasaco_edge.review.moments import (
-    Span,
     faults_of,
     kind_of,
-    largest_drop,
-    longest_gap,
     longest_stand,
     spans_of,
 )
-from fasaco_edge.review.output.panels import curve
-from fasaco_edge.review.run_data import PlanLog, RunData, StatusSample, first_counted
+from fasaco_edge.review.review import review_of
+from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.documents.turns import Cycle, Decided, LogStart, PlanTaken, TurnBatch
-
-ALL = Span("under way", 0.0, 100.0)
 
 
-def test_a_walk_is_counted():
-    cells = np.array([(0, 0), (0, 1), (0, 2), (1, 2), (1, 1), (1, 2), (3, 5), (3, 6)], np.int32)
-    figures = walk_figures(cells)
-    assert (figures.steps, figures.revisits) == (7, 1)
-    # Up, and left; what comes before and after the jump is no turn.
-    assert (figures.turns_90, figures.turns_180) == (2, 1)
-    nothing = walk_figures(cells[:0])
-    assert (nothing.steps, nothing.revisits, nothing.turns_90) == (0, 0, 0)
-    assert walk_figures(cells[:1]).steps == 0
+def shares(drawn, counted):
+    """Return a review of drawn shares, (time, share), and of counts, (time, covered, coverable).
+
+    The mission is done once all is covered.
+    """
+    plots = {entities.COVERED_FRACTION: np.array(drawn, np.float64)}
+    statuses = [
+        StatusSample(
+            at_s,
+            Status(
+                state="done" if covered == cells else "covering",
+                coverage=CoverageReport(coverable=cells, covered=covered),
+            ),
+        )
+        for at_s, covered, cells in counted
+    ]
+    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
+    return review_of(record, RunData(statuses=statuses), 0)
 
 
-def test_milestones_need_whole_cells():
-    first_s = np.array([1.0, 2.0, 3.0, 4.0])
-    assert milestones(first_s, 5) == {50: 3.0, 90: None, 99: None, 100: None}
-    assert milestones(first_s, 4) == {50: 2.0, 90: 4.0, 99: 4.0, 100: 4.0}
-    assert milestones(np.zeros(0), 0) == dict.fromkeys((50, 90, 99, 100))
-
-
-@pytest.mark.parametrize(
-    ("counted", "first_s"),
-    [
-        ([(1.0, 0), (2.0, 2), (3.0, 3)], [1.5, 2.0, 3.0]),
-        # A loop closure: one of three counts no more, then others do.
-        ([(1.0, 3), (2.0, 2), (3.0, 2), (4.0, 4)], [1.0, 1.0, 3.5, 4.0]),
-        ([(1.0, 3), (2.0, 0), (3.0, 1)], [3.0]),
-    ],
-    ids=["rising", "a loop closure", "a reset"],
-)
-def test_cells_that_stopped_counting_count_once_covered_again(counted, first_s):
-    statuses = (
-        StatusSample(at_s, Status(coverage=CoverageReport(covered=covered)))
-        for at_s, covered in counted
-    )
-    assert first_counted(statuses).tolist() == first_s
+def test_shares_are_of_the_cells_known_at_the_end():
+    drawn, begun = [(0.0, 0.0), (2.0, 0.5), (5.0, 0.6), (6.0, 0.4), (9.0, 0.9)], (0.0, 0, 50)
+    found = shares(drawn, [begun, (4.0, 50, 100), (8.0, 100, 100)])
+    assert found.covered_share[:, 0].tolist() == [0.0, 0.0, 2.0, 4.0, 5.0, 6.0, 8.0]
+    assert found.covered_share[:, 1] == pytest.approx([0.0, 0.0, 0.375, 0.5, 0.6, 0.4, 1.0])
+    # What was reached and then lost, as by a loop closure, counts once it is reached again.
+    assert found.reached_s == dict.fromkeys((50, 90, 99, 100), 8.0)
+    found = shares(drawn[:3], [begun, (4.0, 50, 100)])
+    assert found.reached_s == {50: 4.0, 90: None, 99: None, 100: None}
+    assert shares(drawn, []).reached_s is None
 
 
 def test_the_longest_stand_neither_drives_nor_turns():
-    at_s = np.arange(12.0)
-    x = np.array([0, 1, 2, 2.01, 2.02, 2.02, 2.02, 3, 4, 4, 4, 4.0])
-    yaw = np.array([0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3.0])
-    trail = np.column_stack((x, np.zeros(12), yaw))
-    stand = longest_stand(at_s, trail, ALL, [Span("paused", 4.0, 5.0)])
-    assert (stand.at_s, stand.value) == (2.0, 4.0)
-    assert stand.note == "at (2.00, 0.00) m: paused"
-    assert longest_stand(at_s, trail, Span("", 50.0, 60.0)) is None
-
-
-def test_gaps_reach_from_end_to_end():
-    assert longest_gap("", [10.0, 30.0, 95.0], ALL).value == 65.0
-    assert longest_gap("", [60.0, 70.0], ALL).at_s == 0.0
-    assert longest_gap("", [], ALL).value == 100.0
-
-
-def test_only_a_map_makes_coverage_drop():
-    fractions = np.array([(0, 0.1), (1, 0.5), (2, 0.3), (3, 0.4), (4, 0.1), (5, 0.1)])
-    drop = largest_drop(fractions, [1.5, 2.5])
-    assert (drop.at_s, drop.value) == (2.0, pytest.approx(20.0))
-    assert largest_drop(fractions, []) is None
-    # A `mission start` makes it drop, too: that is no map's doing.
-    assert largest_drop(fractions, [1.5, 3.5], [1.4]).at_s == 4.0
-    assert largest_drop(fractions, [1.5], [1.4]) is None
-    assert largest_drop(np.zeros((0, 2)), [1.0]) is None
+    x = [0, 1, 2, 2.01, 2.02, 2.02, 2.02, 3, 4, 4, 4, 4.0]
+    yaw = [0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 2, 3.0]
+    poses = [(at_x, 0.0, at_yaw) for at_x, at_yaw in zip(x, yaw, strict=True)]
+    data = RunData(pose_s=[float(at) for at in range(12)], poses=poses)
+    states = spans_of([(0.0, "covering", ""), (4.0, "paused", ""), (5.0, "covering", "")], 12.0)
+    stand = longest_stand(data, states)
+    assert (stand.at_s, stand.seconds, stand.x, stand.y) == (2.0, 4.0, 2.0, 0.0)
+    assert stand.states == ["covering", "paused"]
+    assert longest_stand(data, spans_of([(0.0, "done", "")], 12.0)) is None
+    assert longest_stand(data, spans_of([(50.0, "covering", "")], 60.0)) is None
 
 
 def test_states_said_again_go_on():
@@ -136,39 +112,6 @@ def test_times_are_told_as_on_a_clock():
         "1:00:00.0",
         "2:02:05.2",
     ]
-
-
-def turn(number, *, ready=None, asked=None, path=None):
-    plan = ready and PlanTaken(ready, 0.002 * ready, [], (1, 0, 0), 7)
-    decided = Decided("covering", "", asked, path) if asked or path else None
-    return Cycle(number, plan=plan, decided=decided)
-
-
-def test_plans_are_told_from_those_that_became_a_path():
-    log = PlanLog()
-    first = [
-        turn(1, asked=(1, "first plan")),
-        turn(2, ready=1, path=(1, "first plan", 7), asked=(2, "spare time")),
-    ]
-    log.take(TurnBatch(1, [10.0, 10.5], first, LogStart("1", {})), at_s=3.0)
-    # A path that was cut off just then is not the one that was planned.
-    second = [
-        turn(3, ready=2, path=(2, "better further on", 8), asked=(3, "map: 1 cell more")),
-        turn(4, ready=3, path=(3, "path blocked at cell (1, 2)", 9)),
-        turn(5, ready=4),
-    ]
-    log.take(TurnBatch(3, [11.0, 11.5, 12.0], second), at_s=5.0)
-    assert [(p.reason, p.is_attempt, p.is_used) for p in log.plans] == [
-        ("first plan", False, True),
-        ("spare time", True, True),
-        ("map: 1 cell more", False, False),
-        ("", False, False),
-    ]
-    assert [p.at_s for p in log.plans] == [3.0, 4.0, 4.5, 5.0]
-    assert [p.took_ms for p in log.plans] == [2.0, 4.0, 6.0, 8.0]
-    # A daemon that was started again counts from 1 again.
-    log.take(TurnBatch(1, [1.0], [turn(1, ready=3)], LogStart("1", {})), at_s=9.0)
-    assert log.plans[-1].reason == ""
 
 
 def test_counts_by_code_go_on_after_a_restart():

@@ -21,21 +21,21 @@ from fasaco_edge.cli.review.screen import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.figures import FLOOR, document_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.output.export import FORMATS, export
-from fasaco_edge.review.output.pictures import SIZE, draw_review, left_out_words
+from fasaco_edge.review.output.pictures import draw_review
 from fasaco_edge.review.output.rows import charge_rows, screen_rows
-from fasaco_edge.review.review import CoverageCounts, read_review, review_of
+from fasaco_edge.review.review import read_review, review_of
 from fasaco_edge.review.run_data import StatusSample
-from fasaco_edge.wire.documents.replies import MissionReport, ZoneReport
+from fasaco_edge.wire.documents.replies import CoverageReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.status import BatteryReport, LedgerReport, Status
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
 from tests.support.reviews import document
 
 TABLES = (
-    *("trail", "paths", "path_points", "plans", "commands", "states", "coverage", "plots"),
+    *("trail", "paths", "path_points", "commands", "states", "coverage", "plots"),
     *("floor", "pheromone", "rooms"),
 )
 ROOT = Path(__file__).parents[2]
@@ -52,50 +52,31 @@ def review(parts):
 
 
 def test_the_picture_shows_map_and_trail(review):
-    picture = draw_review(review)
-    assert picture.height == SIZE[1]
-    colours = {colour for _, colour in picture.getcolors(maxcolors=1 << 20)}
+    colours = {colour for _, colour in draw_review([review]).getcolors(maxcolors=1 << 20)}
     assert {palette.OCCUPIED, palette.COVERED, palette.RECOVERED[0], palette.START} <= colours
     assert palette.UNSWEPT in colours
-
-
-def test_the_picture_is_as_wide_as_what_it_shows(review):
-    pixels = np.asarray(draw_review(review).convert("RGB"))
-    is_blank = (pixels == palette.PAPER).all(axis=(0, 2))
-    edges = np.flatnonzero(np.diff(np.pad(is_blank, 1).astype(int)))
-    widest = max(end - begin for begin, end in zip(edges[::2], edges[1::2], strict=True))
-    assert widest < pixels.shape[1] / 8
 
 
 def test_a_line_over_the_floor_is_drawn_by_what_it_sweeps(review):
     """Its track passes beside the centres of cells that the daemon counts as covered."""
     config = {**review.data.config, "planner": {"line": "thorough"}}
     line = replace(review, data=replace(review.data, config=config))
-    colours = {colour for _, colour in draw_review(line).getcolors(maxcolors=1 << 20)}
+    colours = {colour for _, colour in draw_review([line]).getcolors(maxcolors=1 << 20)}
     assert {palette.COVERED, palette.UNSWEPT} <= colours
     assert not {palette.LEFT_OUT, *palette.RECOVERED} & colours
 
 
-def test_cells_that_the_daemon_has_counted_are_not_called_left(review):
-    assert left_out_words(review) == "not covered"
-    assert review.counts is not None
-    more = replace(review.counts, covered=review.drive.coverage.covered + 1)
-    assert left_out_words(replace(review, counts=more)) == "not passed while it was recorded"
-
-
-def test_without_map_and_poses_there_are_still_charts(review):
+def test_without_a_map_there_is_no_picture(review):
     bare = replace(
         review,
         lattice=None,
         no_lattice="there is no map",
-        drive=None,
+        visits=None,
         floor=None,
-        walk=None,
-        counts=None,
     )
-    assert draw_review(bare).height == SIZE[1]
+    assert draw_review([bare]) is None
     told = document(bare)
-    assert told["steps"] is told["covered_cells"] is None
+    assert told["swept_m2"] is None
     assert len(told["not_recorded"]) >= 2
 
 
@@ -118,8 +99,7 @@ def test_a_map_without_a_lattice_is_named(review, changes, why):
     without = review_of(review.record, data, 0)
     assert without.lattice is None
     told = document(without)
-    assert told["steps"] is None
-    assert why in told["not_recorded"]["steps, revisits, turns_90, turns_180, driven_m, reached_s"]
+    assert why in told["not_recorded"][FLOOR]
 
 
 def zone(cells, covered):
@@ -138,13 +118,13 @@ def zone(cells, covered):
     ],
 )
 def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, complete):
-    last = StatusSample(0.0, Status(mission=MissionReport(zones=zones)))
+    count = CoverageReport(24, covered)
+    last = StatusSample(0.0, Status(mission=MissionReport(zones=zones), coverage=count))
     told = replace(
         review,
         data=replace(review.data, statuses=[last]),
         # A daemon that is ended after the mission says nothing any more.
         states=(Span(state, 0, 1), Span("silent", 1, 2)) if state else (),
-        counts=CoverageCounts(covered, 24, 0, 0, "status"),
     )
     assert told.complete is complete
 
@@ -153,9 +133,8 @@ def test_what_was_covered_before_is_not_guessed_at(review):
     before = StatusSample(0.0, Status(ledger=LedgerReport(restored_cells=7)))
     data = replace(review.data, statuses=[before, *review.data.statuses])
     told = document(review_of(review.record, data, 0))
-    assert told["covered_cells"] is told["reached_s"] is told["swept_m2"] is None
-    assert told["steps"] == 5
-    assert "7 cells were covered before" in told["not_recorded"]["reached_s"]
+    assert told["swept_m2"] is None
+    assert "7 cells were covered before" in told["not_recorded"][FLOOR]
 
 
 def test_a_recorder_in_trouble_is_told(review):
@@ -188,19 +167,19 @@ def test_what_begins_like_a_formula_is_text_to_a_table(review, tmp_path):
     assert told == ["'=1+1", "'+1+1", "'-1+1", "'@sum", "-1.5e-3", "a\\nb", "ok"]
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-def test_a_terminal_of_few_characters_is_told_everything(parts, tmp_path, encoding):
+def test_a_terminal_of_few_characters_is_told_everything(parts, tmp_path):
     """The curve is of ASCII there, and what a name has besides is escaped."""
     odd = shutil.copytree(parts[0].parent, tmp_path / "räum\u2192")
-    words = [*PROGRAM, "review", "--long", *map(str, odd.glob("*.rrd")), "--json"]
-    env = ENVIRONMENT | {"PYTHONIOENCODING": encoding}
-    for command in (words, words[:-1]):
+    words = [*PROGRAM, "review", "--long", *map(str, odd.glob("*.rrd"))]
+    for command, encoding in ((words, "ascii"), ([*words, "--json"], "latin-1")):
+        env = ENVIRONMENT | {"PYTHONIOENCODING": encoding}
         ended = subprocess.run(command, check=False, capture_output=True, env=env)
         assert ended.returncode == 0, ended.stderr
-    told = ended.stdout.decode(encoding)
-    assert "Coverage over time" in told
-    assert "##" in told
-    assert "\\u25" not in told
+        if encoding == "ascii":
+            told = ended.stdout.decode(encoding)
+            assert "Coverage over time" in told
+            assert "##" in told
+            assert "\\u25" not in told
 
 
 def test_the_command_writes_them(parts, tmp_path):
@@ -208,8 +187,7 @@ def test_the_command_writes_them(parts, tmp_path):
     ended = fasaco_edge("review", *parts, "--png", picture, "--export", folder, "--json")
     assert ended.code == 0, ended.err
     with Image.open(picture) as image:
-        assert image.height == SIZE[1]
-        assert image.width <= SIZE[0]
+        assert image.width > 300
     names = {file.name for file in folder.iterdir()}
     told = dict(line.split(maxsplit=1) for line in ended.err.splitlines() if str(folder) in line)
     assert set(told) == {str(folder / name) for name in names}
@@ -232,7 +210,6 @@ def test_exported_files_hold_what_was_driven(parts, tmp_path):
         visits = arrays["visits"]
         assert visits[1 - row0, 1 - col0 : 5 - col0].tolist() == [1, 2, 2, 1]
         assert visits.sum() == 6
-        assert arrays["reachable"].sum() == 24
 
 
 def test_parquet_holds_the_same_as_csv_and_describes_itself(parts, tmp_path):
@@ -277,15 +254,6 @@ def test_a_missing_folder_is_named_first(parts, tmp_path, capsys):
     told = capsys.readouterr()
     assert told.out == ""
     assert "there is no folder" in told.err
-
-
-def test_a_viewer_without_a_screen_is_named(parts, monkeypatch, capfd):
-    for name in ("DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"):
-        monkeypatch.delenv(name, raising=False)
-    assert main(["review", *map(str, parts), "--view"]) == 1
-    told = capfd.readouterr().err
-    assert "gRPC connections on 127.0.0.1" in told
-    assert "it needs a screen" in told
 
 
 def test_a_file_is_no_folder_to_export_to(parts, tmp_path, capsys):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import replace
-from itertools import groupby, pairwise
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,13 +12,10 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.errors import UnreadableRecording
-from fasaco_edge.review.drive import walk_figures
 from fasaco_edge.review.figures import _used
 from fasaco_edge.review.instant import scene_at
-from fasaco_edge.review.output.panels import covered_share
-from fasaco_edge.review.review import CoverageCounts, read_review
-from tests.benchmarks.judge import check_walk
-from tests.review.naive import nearest_rank, passed_cells, quarter_turns
+from fasaco_edge.review.review import read_review
+from tests.review.naive import nearest_rank, passed_cells
 from tests.support.processes import fasaco_edge
 from tests.support.recorded_mission import record_mission
 from tests.support.reviews import document
@@ -43,27 +39,14 @@ def told(review):
     return document(review)
 
 
-@pytest.fixture(scope="module")
-def truth(recording):
-    """The cells that the robot passed over in truth."""
-    return passed_cells(recording.trail, TOOL_M)
-
-
 def test_cells_are_those_of_the_status(told, recording):
     coverage = recording.status["coverage"]
-    assert told["coverage_from"] == "status"
     assert told["covered_cells"] == coverage["covered"] > 50
     assert told["coverable_cells"] == coverage["coverable"]
     assert told["recovered_cells"] == coverage["recovered"]
     assert told["unreachable_cells"] == coverage["unreachable"]
     assert told["complete"] is True
     assert told["state"] == "done"
-
-
-def test_the_trail_comes_to_the_same_cells(review, recording):
-    coverage, mine = recording.status["coverage"], review.drive.coverage
-    assert (mine.covered, mine.coverable) == (coverage["covered"], coverage["coverable"])
-    assert (mine.recovered, mine.unreachable) == (coverage["recovered"], coverage["unreachable"])
 
 
 def test_floor_is_that_under_the_tool_of_the_simulated_robot(told, review, recording):
@@ -79,57 +62,35 @@ def test_floor_is_that_under_the_tool_of_the_simulated_robot(told, review, recor
     assert review.floor.figures.illegal_share == 0.0
 
 
-def test_the_walk_is_that_of_the_simulated_robot(told, review, recording):
-    cells = [tuple(cell) for cell in review.drive.cells.tolist()]
+def test_the_cells_are_those_under_the_tool_of_the_simulated_robot(told, review, recording):
+    window = review.lattice.window
+    passed = {(row + window.row0, col + window.col0) for row, col in np.argwhere(review.visits)}
     # Poses come four times in a simulated second: the rim of the tool may pass a centre between
     # two of them. What it passes well inside is there, and nothing that it came not even near.
     well, nearly = (
-        [cell for cell, _ in passed_cells(recording.trail, TOOL_M, reach)] for reach in (0.42, 0.58)
+        {cell for cell, _ in passed_cells(recording.trail, TOOL_M, reach)} for reach in (0.42, 0.58)
     )
-    for some, more in ((well, cells), (cells, nearly)):
-        left = groupby(more)
-        assert all(any(cell == other for other, _ in left) for cell, _ in groupby(some))
-    assert told["steps"] == len(cells) - 1
-    assert told["revisits"] == len(cells) - len(set(cells))
-    assert told["turns_90"] == quarter_turns(cells)
+    assert well <= passed <= nearly
     driven = sum(np.hypot(*(b - a)) for a, b in pairwise(recording.trail))
-    # Poses come four times in a simulated second: corners are cut a little.
+    # Corners are cut a little, for the same reason.
     assert told["driven_m"] == pytest.approx(driven, rel=0.03)
 
 
-def test_the_walk_is_counted_as_the_benchmark_counts(review):
-    lattice, cells = review.lattice, review.drive.cells
-    local = cells - (lattice.window.row0, lattice.window.col0)
-    verdict = check_walk(lattice.steps, lattice.coverable, local, tuple(local[0].tolist()))
-    mine = walk_figures(cells)
-    assert (mine.steps, mine.revisits) == (verdict.steps, verdict.revisits)
-    assert (mine.turns_90, mine.turns_180) == (verdict.turns_90, verdict.turns_180)
-
-
-def test_shares_are_reached_when_they_were(told, review, truth, recording):
-    """By the statuses: one with fewer cells comes before, one with as many not long after."""
-    cells = list(dict.fromkeys(cell for cell, _ in truth))
-    assert len(review.first_s) == len(cells)
+def test_shares_are_reached_when_they_were(told, review, recording):
     began = _began(recording, review)
-    arrived = [at for at, _ in recording.statuses]
-    # A slow computer brings statuses late.
-    late_s = max(0.3, *np.diff(arrived))
-    for percent in (50, 90, 99, 100):
-        needed = -(-len(cells) * percent // 100)
-        at_s = told["reached_s"][str(percent)]
-        counts = [
-            (at - began, status["coverage"]["covered"])
-            for at, status in recording.statuses
-            if status["coverage"]
-        ]
-        assert all(count < needed for at, count in counts if at < at_s - late_s)
+    counts = [
+        (at - began, status["coverage"]["covered"])
+        for at, status in recording.statuses
+        if status["coverage"]
+    ]
+    # The share is drawn every two seconds; a slow computer brings statuses late.
+    late_s = 0.3 + max(np.diff([at for at, _ in counts]))
+    for percent, at_s in told["reached_s"].items():
+        needed = -(-told["coverable_cells"] * int(percent) // 100)
+        assert all(count < needed for at, count in counts if at < at_s - 2.0 - late_s)
         assert all(count >= needed for at, count in counts if at > at_s + late_s)
-
-
-def test_the_curve_ends_with_all(review):
-    at_s, shares = covered_share(review)
-    assert np.all(np.diff(at_s) >= 0)
-    assert np.all(np.diff(shares) > 0)
+    at_s, shares = review.covered_share.T
+    assert np.all(np.diff(at_s) >= 0.0)
     assert shares[-1] == 1.0
 
 
@@ -171,7 +132,6 @@ def test_plans_are_those_of_the_status(told, recording):
     assert told["attempts"] == plan["attempts"]
     notes = {note["revision"]: note["reason"] for _, note in recording.notes}
     assert told["attempts_used"] == list(notes.values()).count("better further on")
-    assert told["plan_ms_max"] >= told["first_plan_ms"] - 0.001
 
 
 def test_what_it_took_is_told(told, recording):
@@ -205,20 +165,6 @@ def test_states_are_those_heard(told, review, recording):
     assert sum(told["states"].values()) <= told["duration_s"] + 0.01
 
 
-def test_the_living_trail_spans_the_building(told):
-    pheromone = told["pheromone"]
-    assert pheromone["fields"] > 10
-    assert 0.95 <= pheromone["cells_share"] <= 1.0
-    assert 1.0 <= pheromone["branching"] <= 4.0
-
-
-def test_the_living_trail_s_share_is_of_cells_that_have_a_stand(review, told):
-    """By the track fewer cells are counted, those in whose centre the robot fits."""
-    assert review.counts is not None
-    fewer = CoverageCounts(covered=10, coverable=10, recovered=0, unreachable=0, source="trail")
-    assert document(replace(review, counts=fewer))["pheromone"] == told["pheromone"]
-
-
 def test_a_moment_tells_what_the_colony_held(review):
     instant = scene_at(review, 0.6 * review.duration_s).instant
     assert instant.trail.startswith("pheromone at path ")
@@ -242,38 +188,18 @@ def test_the_card_says_what_was_run(told, recording):
     assert told["config"]["planner.budget_s"] == config["planner"]["budget_s"] == 0.05
     assert told["map"]["rows"] == recording.status["map"]["rows"]
     assert told["not_recorded"] == {}
+    # It was not said to be simulated: times are the recorder's.
+    assert (told["time_scale"], told["duration_s"]) == (1.0, told["recorded_s"])
 
 
-def test_moments_lie_within_the_mission(review):
-    found = {moment.what: moment for moment in review.moments}
-    assert len(found) >= 4
-    for moment in found.values():
-        assert 0 <= moment.at_s <= review.duration_s
-    slowest = max(p.plan_ms for p in review.data.paths[1:] if p.plan_ms is not None)
-    assert found["slowest replan"].value == slowest
-    # Brute force: each moment between two poses at which the robot had something to do.
-    ends = sorted({0.0, *review.data.pose_s, *(at for s in review.states for at in _ends(s))})
-    gaps, last = [], None
-    for before, after in pairwise(ends):
-        busy = any(
-            s.begin_s <= before < s.end_s and s.name in ("planning", "covering", "paused")
-            for s in review.states
-        )
-        last = (before if last is None or before in review.data.pose_s else last) if busy else None
-        gaps.append(after - last if last is not None else 0.0)
-    assert found["longest time without a pose"].value == pytest.approx(max(gaps))
-
-
-def test_the_longest_stand_is_one(review):
-    (stand,) = (moment for moment in review.moments if moment.what == "longest stand")
-    poses = [
-        pose
-        for at, pose in zip(review.data.pose_s, review.data.poses, strict=True)
-        if stand.at_s <= at <= stand.at_s + stand.value
-    ]
-    xy = np.array(poses)[:, :2]
-    assert len(xy) > 1
-    assert np.hypot(*(xy - xy[0]).T).max() <= 0.05
+def test_the_longest_stand_is_one(review, told):
+    stand = told["longest_stand"]
+    begin_s, end_s = stand["at_s"], stand["at_s"] + stand["seconds"]
+    assert stand["seconds"] > 0.0
+    # Times are in milliseconds: on a busy computer several poses come within one.
+    for at_s, (x, y, _) in zip(review.data.pose_s, review.data.poses, strict=True):
+        if begin_s + 0.002 < at_s < end_s - 0.002:
+            assert np.hypot(x - stand["x"], y - stand["y"]) <= 0.05
 
 
 def frame_ends(content: bytes) -> list[int]:
@@ -286,8 +212,7 @@ def frame_ends(content: bytes) -> list[int]:
 
 
 # Bytes behind the last whole frame: a cut may fall between two frames as well as into one.
-@pytest.mark.parametrize("behind", [0, 1, 17])
-@pytest.mark.parametrize("share", [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.99])
+@pytest.mark.parametrize(("share", "behind"), [(0.2, 0), (0.3, 17), (0.6, 1), (0.9, 0), (0.99, 17)])
 def test_a_torn_file_is_read_as_far_as_it_is_whole(recording, review, tmp_path, share, behind):
     (whole,) = recording.paths
     content = whole.read_bytes()
@@ -301,16 +226,13 @@ def test_a_torn_file_is_read_as_far_as_it_is_whole(recording, review, tmp_path, 
     told = document(cut)
     assert told["files"][0]["torn_bytes"] == behind
     assert told["files"][0]["ended"] is False
-    if cut.drive is None:
-        assert told["steps"] is told["covered_cells"] is None
+    if cut.visits is None:
+        assert told["swept_m2"] is None
         assert told["not_recorded"]
         return
-    # What is there is the beginning of the same walk.
-    cells = [tuple(cell) for cell in cut.drive.cells.tolist()]
-    assert cells == [tuple(cell) for cell in review.drive.cells[: len(cells)].tolist()]
-    assert told["complete"] is (len(cells) == len(review.drive.cells) and told["state"] == "done")
-    if told["coverage_from"] == "trail":
-        assert told["covered_cells"] == len(set(cells))
+    # What is there is the beginning of the same drive.
+    assert cut.data.poses == review.data.poses[: len(cut.data.poses)]
+    assert (told["covered_cells"] or 0) <= review.data.counts.covered
     assert cut.duration_s <= review.duration_s
 
 
@@ -337,7 +259,6 @@ def test_the_command_prints_a_report(recording, told):
         f"{told['covered_cells']} of {told['coverable_cells']} cells",
         "Coverage over time",
         "Reasons of replans",
-        "slowest replan",
         "malformed_message",
         ": complete",
     ):
@@ -349,10 +270,6 @@ def _began(recording, review):
     done = next(at for at, status in recording.statuses if status["state"] == "done")
     span = next(span for span in review.states if span.name == "done")
     return done - span.begin_s
-
-
-def _ends(span):
-    return span.begin_s, span.end_s
 
 
 def _groups(names):

@@ -29,18 +29,17 @@ SCALE, SPEED_M_S = 20.0, 0.25
 # The robot drives for 10 s of its own, with poses each half second.
 DRIVES_S, EVERY_S = 10.0, 0.5
 WORDS = "simulated at 20 times real time"
-CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18, "speed_m_s": SPEED_M_S}}
+ROBOT = {"tool_width_m": 0.3, "radius_m": 0.18, "speed_m_s": SPEED_M_S, "time_scale": SCALE}
 
 
-def record(folder, scale):
+def record(folder):
     """Record a robot on a straight line, which is faster than its clock says; return the files."""
     folder.mkdir()
-    config = {"robot": CONFIG["robot"] | {"time_scale": scale}} if scale else CONFIG
     with bus_on_free_port() as (bus, endpoint), recorder_process(bus, endpoint, folder) as recorder:
         names = ("map", "pose", "status")
         put = {name: Sender(bus, getattr(topics, name.upper())) for name in names}
         put["map"].put(map_bytes(room(4.0, 3.0)))
-        status = {"robot": "one", "state": "covering", "config": config}
+        status = {"robot": "one", "state": "covering", "config": {"robot": ROBOT}}
         put["status"].put(encode_json(status))
         ticks = np.arange(0.0, DRIVES_S + 0.1, EVERY_S).tolist()
         for at_s in ticks:
@@ -55,7 +54,7 @@ def record(folder, scale):
 
 @pytest.fixture(scope="module")
 def parts(tmp_path_factory):
-    return record(tmp_path_factory.mktemp("simulated") / "runs", SCALE)
+    return record(tmp_path_factory.mktemp("simulated") / "runs")
 
 
 def test_times_and_speeds_are_the_robots(parts):
@@ -94,15 +93,6 @@ def test_the_page_of_it_is_in_the_robots_time(parts):
         half = float(clock.robot_s[0]) + DRIVES_S / 2
         pose = next(m for m in playback.at(half) if '"kind":"pose"' in str(m))
         assert json.loads(pose)["x"] == pytest.approx(0.5 + SPEED_M_S * DRIVES_S / 2, abs=0.13)
-
-
-def test_without_a_scale_times_stay_the_recorders(tmp_path):
-    parts = record(tmp_path / "runs", 0)
-    review = read_review(parts)
-    assert document(review)["time_scale"] == 1.0
-    assert document(review)["duration_s"] == document(review)["recorded_s"]
-    assert np.ptp(review.data.times) < DRIVES_S / 2
-    assert "simulated" not in fasaco_edge("review", *parts).out
 
 
 def test_a_second_simulation_counts_on_from_the_first():

@@ -37,9 +37,9 @@ from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.recorder import run_recorder
 told = json.loads(sys.argv[1])
 bus = BusSettings(connect=(told.pop("endpoint"),))
-out, serve = pathlib.Path(told.pop("out")), told.pop("serve", None)
+out = pathlib.Path(told.pop("out"))
 budget = DiskBudget(**{"part_bytes": 64_000_000, "least_free_bytes": 50_000_000} | told)
-sys.exit(run_recorder(DaemonConfig(), bus, Output(out, budget, serve)))
+sys.exit(run_recorder(DaemonConfig(), bus, Output(out, budget)))
 """
 TIMEOUT_S = 120.0
 

@@ -22,15 +22,17 @@ from fasaco_edge.recording.read.repair import open_part
 from fasaco_edge.review.document import explanations
 
 if TYPE_CHECKING:
+    from PIL import Image
+
     from fasaco_edge.review.review import Review
 
 DESCRIPTION = """\
 Report what happened in a recorded mission, on one screen; with --long all figures, orders,
-commands, replans, floor left and why, worst moments and faults. With --at and --point it answers a
+commands, replans, floor left and why, and faults. With --at and --point it answers a
 question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
 balance, floor swept again or only driven through, waiting and messages; such a recording takes
---json, --png and --view only. Parts of one run are read together. Files are only read; of files
-that a crash cut short, the whole part is used.
+--json and --png only. Parts of one run are read together. Files are only read; of files that a
+crash cut short, the whole part is used.
 """
 
 
@@ -106,8 +108,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write a picture of the run, with --against of both",
     )
-    # An option of earlier releases.
-    parser.add_argument("--html", nargs="?", const=True, help=argparse.SUPPRESS)
     parser.add_argument(
         "--export",
         type=Path,
@@ -123,17 +123,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="what the tables are written as; Parquet keeps types and describes its columns itself "
         "(default: %(default)s)",
     )
-    parser.add_argument("--view", action="store_true", help="open the recording in Rerun's viewer")
 
 
 def run(args: argparse.Namespace) -> int:
     """Review."""
     recordings = [*args.recordings, *(args.against or ())]
-    if args.html:
-        raise BadConfiguration(
-            "--html: review writes no page",
-            hint="fasaco-edge serve FILE.rrd shows the recording in a browser",
-        )
     check_outputs((args.png,), recordings)
     for file in recordings:
         with open_part(file):  # reports a file that is no recording before loading the rest
@@ -164,11 +158,6 @@ def run(args: argparse.Namespace) -> int:
         print_comparison(document, document_of(other))
     else:
         print_review(review, document, full=args.long)
-    if args.png:
-        from fasaco_edge.review.output.pictures import draw_review
-
-        with writing(args.png) as file:
-            draw_review(review, other).save(file, "PNG")
     if args.export:
         from fasaco_edge.review.output.export import export
 
@@ -177,10 +166,10 @@ def run(args: argparse.Namespace) -> int:
         width = max(len(str(file)) for file, _ in written)
         for file, what in written:
             terminal.err().print(f"{file!s:{width}}  {what}", soft_wrap=True, highlight=False)
-    if args.view:
-        from fasaco_edge.recording.read.repair import view
+    if args.png:
+        from fasaco_edge.review.output.pictures import draw_review
 
-        view(recordings)
+        _save(draw_review([review, other] if other else [review]), review, args.png)
     return 0
 
 
@@ -216,14 +205,18 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
             console.print(terminal.figures(answer_rows.spot_rows(spot)))
     if args.png:
         picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
-        if picture is None:
-            raise BadConfiguration(
-                f"no picture: {review.no_lattice or 'there is no map yet'}",
-                hint="the answer is complete without --png",
-            )
-        with writing(args.png) as file:
-            picture.save(file, "PNG")
+        _save(picture, review, args.png)
     return 0
+
+
+def _save(picture: Image.Image | None, review: Review, path: Path) -> None:
+    if picture is None:
+        raise BadConfiguration(
+            f"no picture: {review.no_lattice or 'there is no map yet, or no pose'}",
+            hint="the answer is complete without --png",
+        )
+    with writing(path) as file:
+        picture.save(file, "PNG")
 
 
 def _read(paths: Sequence[Path], name: str) -> Review:

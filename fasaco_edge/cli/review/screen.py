@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -18,7 +20,6 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
-from fasaco_edge.review.output.panels import EIGHTHS, PLAIN_EIGHTHS, covered_share, curve
 from fasaco_edge.review.spot import spots_left
 from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
@@ -26,6 +27,7 @@ from fasaco_edge.text import one_line
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
 
+EIGHTHS, PLAIN_EIGHTHS = " ▁▂▃▄▅▆▇█", " ..::++##"
 PLOT_WIDTH, PLOT_HEIGHT, SCREEN_PLOT_HEIGHT = 64, 6, 4
 MOST_VERDICTS = 4
 
@@ -40,12 +42,16 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
         if full:
             console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
         else:
-            console.print(_fitting(verdict, console.width))
+            console.print(verdict)
+    if not full and len(verdicts) > MOST_VERDICTS:
+        console.print(f"and {len(verdicts) - MOST_VERDICTS} more orders")
+    _print_curve(console, review, PLOT_HEIGHT if full else SCREEN_PLOT_HEIGHT)
+    found = rows.screen_rows(review, document)
+    console.print(terminal.summary([*found, *rows.card_rows(document)] if full else found))
     if not full:
-        _print_screen(console, review, document, more=len(verdicts) - MOST_VERDICTS)
+        hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a browser: serve FILE"
+        console.print(hint)
         return
-    console.print(terminal.figures(rows.card_rows(document)))
-    _print_curve(console, review, PLOT_HEIGHT)
     console.print(terminal.figures(rows.figure_rows(document)))
     _print_table(console, "Orders", rows.ORDERS, rows.order_rows(document))
     _print_table(console, "Rooms", rows.ROOMS, rows.room_rows(document, review))
@@ -55,10 +61,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     _print_table(console, "Not reached", rows.UNREACHED, rows.unreached_rows(document))
     _print_table(console, "Floor left", rows.LEFT, rows.left_rows(document, spots_left(review)))
     _print_table(console, "Reasons of replans", rows.REASONS, rows.reason_rows(document))
-    _print_table(console, "The slowest replans", rows.REPLANS, rows.replan_rows(review))
-    _print_table(console, "Replans in order of time", rows.REPLANS, rows.replans_in_time(review))
-    moments = rows.moment_rows(review)
-    _print_table(console, "Worst moments", ("what", "how much", "at", "context"), moments)
+    _print_table(console, "Replans", rows.REPLANS, rows.replan_rows(review))
     troubles = rows.trouble_rows(review.troubles)
     _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles)
     _print_table(console, "Charges", rows.CHARGES, rows.charge_rows(document))
@@ -66,32 +69,13 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     _print_remarks(console, document)
 
 
-def _print_screen(console: Console, review: Review, document: ReviewDocument, *, more: int) -> None:
-    """Print the main results; with up to ``MOST_VERDICTS`` verdicts they take 24 lines."""
-    if more > 0:
-        console.print(f"and {more} more orders")
-    _print_curve(console, review, SCREEN_PLOT_HEIGHT)
-    for name, text in rows.screen_rows(review, document):
-        line = Text.assemble((f"{name:<12}", "cyan"), one_line(text))
-        console.print(_fitting(line, console.width))
-    hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a browser: serve FILE"
-    console.print(_fitting(Text(hint), console.width))
-
-
-def _fitting(text: Text, width: int) -> Text:
-    """Return a text that takes one line of the terminal."""
-    if text.cell_len > width:
-        text.truncate(width - 3)
-        text.append("...")
-    return text
-
-
 def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     """Print the figures of two documents side by side."""
     console = terminal.out()
     names = (one.recording, other.recording)
-    _say(console, setup_words(one, other), style="bold")
-    _print_table(console, "Set-up", ("", *names), setup_differences(one, other))
+    setup = setup_differences(one, other)
+    _say(console, setup_words(setup), style="bold")
+    _print_table(console, "Set-up", ("", *names), setup)
     compared = compared_rows(one, other)
     _print_table(console, "Two runs", ("", *names, "difference"), compared)
     counts = [
@@ -106,7 +90,7 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
 
 
 def _print_curve(console: Console, review: Review, height: int) -> None:
-    at_s, shares = covered_share(review)
+    at_s, shares = review.covered_share.T
     if not len(at_s):
         return
     marks = EIGHTHS if console.encoding.startswith("utf") else PLAIN_EIGHTHS
@@ -147,3 +131,33 @@ def _print_table(
     for row in cells:
         table.add_row(*row)
     console.print(table)
+
+
+def curve(
+    at_s: NDArray[np.float64],
+    shares: NDArray[np.float64],
+    end_s: float,
+    width: int,
+    height: int,
+    marks: str = EIGHTHS,
+) -> list[str]:
+    """Return a curve of a share over time as lines of text, the top one first.
+
+    Args:
+        at_s: float64 (n,), times of its changes [s], ascending.
+        shares: float64 (n,), its values from then on, 0 to 1; before the first time it is 0.
+        end_s: the right end of the picture [s]; the left one is 0.
+        width, height: of the picture [characters].
+        marks: nine characters, from an empty one to a full one.
+    """
+    places = (np.arange(width) + 1) / width * end_s
+    index = np.searchsorted(at_s, places, side="right")
+    levels = np.concatenate(([0.0], shares))[index]
+    eighths = np.rint(np.clip(levels, 0, 1) * height * 8).astype(int)
+    # A value above 0 never looks like 0, and a value below 1 never like 1.
+    eighths[(levels > 0) & (eighths == 0)] = 1
+    eighths[(levels < 1) & (eighths == 8 * height)] -= 1
+    return [
+        "".join(marks[min(max(eighth - 8 * row, 0), 8)] for eighth in eighths.tolist())
+        for row in reversed(range(height))
+    ]

@@ -46,10 +46,6 @@ def print_fleet(args: argparse.Namespace) -> int:
 
         with writing(args.png) as file:
             draw_fleet_review(review).save(file, "PNG")
-    if args.view:
-        from fasaco_edge.recording.read.repair import view
-
-        view(args.recordings)
     return 0
 
 

@@ -75,7 +75,7 @@ class FleetRecorder:
         self._writer, self._clock = recording.writer, recording.clock
         self._began_ns = recording.began_ns
         self._title = f"fleet {fleet} {recording.began} UTC"
-        self._writer.describe(self._title, {"fleet": fleet, "began": recording.began})
+        self._writer.describe(self._title)
         self._members = RecordedMembers()
         self._scene = FleetScene(self._writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)

@@ -1,4 +1,4 @@
-"""Repair of recordings torn by a crash: found, truncated after the last complete frame, shown.
+"""Repair of recordings torn by a crash: each is truncated after its last complete frame.
 
 A power failure or a full disk leaves a torn frame at the end, and a reader refuses the
 whole file for it. The format: 12 bytes of header, then frames, each two little-endian u64
@@ -8,23 +8,17 @@ than the last frame may be missing.
 
 from __future__ import annotations
 
-import errno
 import fcntl
-import importlib.util
 import os
-import shutil
 import struct
-import subprocess
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
-from fasaco_edge.errors import MalformedMessage, MissingExtra, ProcessEnded, UnreadableRecording
+from fasaco_edge.errors import MalformedMessage, UnreadableRecording
 from fasaco_edge.host.files import check_plain
-from fasaco_edge.host.processes import python_program
 
 MAGIC = b"RRF"
 HEADER_BYTES = 12
@@ -128,7 +122,6 @@ def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
 
 def _end_of_data(recording: BinaryIO, total: int) -> int:
     """Return the offset of the zeros at the end of a file [bytes]."""
-    total = _end_on_disk(recording.fileno(), total)
     while total:
         start = max(total - _BLOCK, 0)
         recording.seek(start)
@@ -136,24 +129,6 @@ def _end_of_data(recording: BinaryIO, total: int) -> int:
             return start + len(solid)
         total = start
     return 0
-
-
-def _end_on_disk(descriptor: int, total: int) -> int:
-    """Return the offset of the hole at the end of a file [bytes]; the file size if there is none.
-
-    A hole of 50 GB takes no space, but a minute to read.
-    """
-    before, low, high = os.lseek(descriptor, 0, os.SEEK_CUR), 0, total
-    while low < high:
-        middle = (low + high) // 2
-        try:
-            low = os.lseek(descriptor, middle, os.SEEK_DATA) + 1
-        except OSError as error:
-            if error.errno != errno.ENXIO:
-                return total
-            high = middle  # only a hole from there on
-    os.lseek(descriptor, before, os.SEEK_SET)
-    return high
 
 
 def repair_recording(path: Path) -> Repair | None:
@@ -197,54 +172,3 @@ def repair_folder(folder: Path) -> list[Repair]:
         if repair is not None:
             repairs.append(repair)
     return repairs
-
-
-# By default Rerun's server is open to the whole network, and does not start beside another viewer.
-VIEWER = python_program("rerun", "--bind", "127.0.0.1", "--port", "auto")
-
-
-def view(paths: Sequence[Path]) -> None:
-    """Show recordings until the viewer is closed; of torn ones the complete frames.
-
-    Raises:
-        MissingExtra: rerun is not installed.
-        ProcessEnded: the viewer cannot be shown, for example without a screen.
-    """
-    if importlib.util.find_spec("rerun") is None:
-        raise MissingExtra("the viewer comes with rerun, which is not installed")
-    with ExitStack() as copies:
-        whole = [copies.enter_context(_whole_part(path)) for path in paths]
-        ended = subprocess.run([*VIEWER, *filter(None, whole)], check=False)
-    if ended.returncode:
-        raise ProcessEnded(
-            f"Rerun's viewer ended with {ended.returncode}",
-            hint="it needs a screen: run it where there is one, or `fasaco-edge serve FILE.rrd`",
-        )
-
-
-@contextmanager
-def _whole_part(path: Path) -> Iterator[Path | None]:
-    """Yield ``path``, or for a torn file a copy of its complete frames, None if there are none.
-
-    Raises:
-        ValueError: it is no recording.
-        OSError: it cannot be read, or there is no space for the copy.
-    """
-    check_plain(path)
-    with path.open("rb") as recording:
-        scan = scan_recording(recording)
-        if scan is None:
-            raise ValueError("this is no recording")
-        if not scan.frames:
-            yield None
-            return
-        if scan.has_footer or not scan.torn_bytes:
-            yield path
-            return
-        with TemporaryDirectory() as folder:
-            copy = Path(folder, path.name)
-            recording.seek(0)
-            with copy.open("wb") as target:
-                shutil.copyfileobj(recording, target)
-                target.truncate(scan.whole_bytes)
-            yield copy

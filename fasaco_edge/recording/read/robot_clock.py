@@ -38,14 +38,14 @@ class RobotClock:
     Attributes:
         began_ns: beginning of the recording, by the recorder's clock [ns].
         scale: intended seconds of the robot per second; 1 for a real robot.
-        recorder_s, robot_s: both times of each pose [s], float64 (n,), not decreasing; n is 0 for
-            a real robot, whose seconds are the recorder's.
+        recorder_s, robot_s: both times of each pose [s], float64 (n,), not decreasing; just (0,)
+            for a real robot, whose seconds are the recorder's.
     """
 
     began_ns: int
     scale: float = 1.0
-    recorder_s: Seconds = field(default_factory=lambda: np.zeros(0))
-    robot_s: Seconds = field(default_factory=lambda: np.zeros(0))
+    recorder_s: Seconds = field(default_factory=lambda: np.zeros(1))
+    robot_s: Seconds = field(default_factory=lambda: np.zeros(1))
 
     @classmethod
     def of(cls, statuses: Iterable[Arrival], poses: Iterable[Arrival], began_ns: int) -> RobotClock:
@@ -86,25 +86,17 @@ class RobotClock:
 
     def seconds(self, at_ns: int) -> float:
         """Return a time of the recorder [ns] in the robot's seconds since the beginning."""
-        recorder_s = 1e-9 * (at_ns - self.began_ns)
-        if not len(self.robot_s):
-            return recorder_s
-        return float(_converted(np.array([recorder_s]), self.recorder_s, self.robot_s)[0])
+        return float(self.all_seconds(np.array([at_ns]))[0])
 
     def all_seconds(self, at_ns: NDArray[np.int64]) -> Seconds:
         """Return times of the recorder (n,) [ns] as ``seconds`` does, float64 (n,)."""
         recorder_s: Seconds = 1e-9 * (at_ns - self.began_ns).astype(np.float64)
-        if not len(self.robot_s):
-            return recorder_s
         return _converted(recorder_s, self.recorder_s, self.robot_s)
 
     def wall_ns(self, robot_s: float) -> int:
         """Return the recorder's time [ns] of the robot's seconds since the beginning."""
-        recorder_s = robot_s
-        if len(self.robot_s):
-            both = self.robot_s, self.recorder_s
-            recorder_s = float(_converted(np.array([robot_s]), *both)[0])
-        return self.began_ns + round(1e9 * recorder_s)
+        (recorder_s,) = _converted(np.array([robot_s]), self.robot_s, self.recorder_s)
+        return self.began_ns + round(1e9 * float(recorder_s))
 
 
 def _settings(arrival: Arrival) -> KnownSettings | None:

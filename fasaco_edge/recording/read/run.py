@@ -10,7 +10,6 @@ from collections import defaultdict
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,31 +41,25 @@ class RecordedSamples:
     Args:
         paths: the files, in any order. If parts are missing at the beginning, the samples
             begin with the map that was in force.
+        batches: those that were read of the files already, in any order; None to read them.
+        topics: those to decode, without counting any as missing; None for all.
 
     Raises:
         UnreadableRecording: a file is no recording, or none has samples.
     """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self._topics: Container[str] | None = None
-        batches = [batch for path in paths for batch in _batches(path)]
-        # A single part may have none: its recorder was killed just after it began.
-        if paths and not batches:
-            raise _no_samples(paths)
-        self._take(batches)
-
-    @classmethod
-    def of(cls, batches: Sequence[Batch], topics: Container[str] | None = None) -> Self:
-        """Return the samples of batches that were read already, in any order.
-
-        ``topics``: those to decode, without counting any as missing; None for all.
-        """
-        samples = cls(())
-        samples._topics = topics
-        samples._take(batches)
-        return samples
-
-    def _take(self, batches: Sequence[Batch]) -> None:
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        batches: Sequence[Batch] | None = None,
+        topics: Container[str] | None = None,
+    ) -> None:
+        if batches is None:
+            batches = [batch for path in paths for batch in _batches(path)]
+            # A single part may have none: its recorder was killed just after it began.
+            if not batches:
+                raise _no_samples(paths)
+        self._topics = topics
         # Runs are numbered by their beginning, so later ones follow.
         self._batches = sorted(batches, key=lambda batch: (batch.place.run, batch.place.first))
         self.missing = 0
@@ -164,7 +157,7 @@ class RunRecord:
         states: times and names of the states of each state entity.
         log: times and texts of each log entity.
         field_ns: times of the drawings of the pheromone field.
-        batches: samples, for ``RecordedSamples.of``.
+        batches: for ``RecordedSamples``.
     """
 
     recording_id: str
@@ -265,7 +258,9 @@ class _RunReader:
         began = min(self.span, default=0)
         for rows in self.rows.values():
             rows.sort(key=lambda row: row[0])
-        statuses, poses = (RecordedSamples.of(self.batches, topics) for topics in (STATUSES, POSES))
+        statuses, poses = (
+            RecordedSamples((), self.batches, topics) for topics in (STATUSES, POSES)
+        )
         clock = RobotClock.of(statuses, poses, began)
         return RunRecord(
             recording_id=next(iter(self.ids), ""),

@@ -10,7 +10,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -57,28 +57,31 @@ class Timeline:
     """What was drawn, and what came, in order of time.
 
     Attributes:
-        began_ns, ended_ns: of the recording, since the epoch [ns].
-        clock: the robot's time at any of these times.
+        clock: the robot's time at any of the recording's times.
+        ended_ns: of the recording, since the epoch [ns].
         samples: statuses, commands, rooms and digests of paths.
         pose_ns, poses: times int64 (n,) [ns], and float64 (n, 3): x [m], y [m], yaw [rad].
     """
 
-    began_ns: int
-    ended_ns: int
     clock: RobotClock
-    samples: tuple[Arrival, ...]
+    ended_ns: int
+    samples: Sequence[Arrival]
     pose_ns: NDArray[np.int64]
     poses: NDArray[np.float64]
-    _anchor: NDArray[np.float64]
-    _places: dict[str, list[Place]]
+    _drawn: _Drawn
+
+    @property
+    def began_ns(self) -> int:
+        """When the recording began, since the epoch [ns]."""
+        return self.clock.began_ns
 
     def newest(self, entity: str, at_ns: int) -> Place | None:
         """Return the last drawing of an entity up to a time; None before the first."""
-        places = self._places.get(entity, [])
+        places = self._drawn.places.get(entity, [])
         index = bisect_right(places, at_ns, key=lambda place: place.at_ns)
         return places[index - 1] if index else None
 
-    def samples_between(self, since_ns: int, until_ns: int) -> tuple[Arrival, ...]:
+    def samples_between(self, since_ns: int, until_ns: int) -> Sequence[Arrival]:
         """Return the samples that came after one time, up to another [ns]."""
         first, last = (
             bisect_right(self.samples, at_ns, key=lambda one: one.wall_ns)
@@ -97,11 +100,11 @@ class Timeline:
         Raises:
             UnreadableRecording: it is damaged, or its file was changed.
         """
-        return _first(partial(grids_in, anchor=self._anchor), place)
+        return _first(partial(grids_in, anchor=self._drawn.anchor), place)
 
     def line(self, place: Place) -> DrawnLine:
         """Read a drawn line; raises as ``grid``."""
-        return _first(partial(lines_in, anchor=self._anchor), place)
+        return _first(partial(lines_in, anchor=self._drawn.anchor), place)
 
 
 Drawn = TypeVar("Drawn")
@@ -123,28 +126,34 @@ def open_timeline(paths: Sequence[Path]) -> Iterator[Timeline]:
         DifferentRuns: the parts are not of one run.
     """
     record = read_run_record(paths, lambda: None)
-    samples = sorted(RecordedSamples.of(record.batches, KEPT), key=lambda one: one.wall_ns)
-    reader = _Reader()
+    samples = sorted(RecordedSamples((), record.batches, KEPT), key=lambda one: one.wall_ns)
+    drawn = _Drawn()
     with ExitStack() as files:
         for path in sorted(set(paths)):
             with open_part(path) as (recording, scan):
                 descriptor = files.enter_context(path.open("rb")).fileno()
                 left = scan.total_bytes // ROW_BYTES + FEW_ROWS
                 for chunk in chunks(recording, scan):
-                    left -= reader.take(chunk, descriptor) if chunk is not None else 0
+                    left -= drawn.take(chunk, descriptor) if chunk is not None else 0
                     if left < 0:
                         raise ValueError("holds more rows than its size allows")
-        yield reader.timeline(record.clock, record.ended_ns, tuple(samples))
+        for places in drawn.places.values():
+            places.sort(key=lambda place: place.at_ns)
+        pose_ns, poses = np.concatenate(drawn.pose_ns), np.concatenate(drawn.poses)
+        poses[:, :2] += drawn.anchor
+        order = np.argsort(pose_ns, kind="stable")
+        ended_ns = max([record.ended_ns, *(one.wall_ns for one in samples[-1:])])
+        yield Timeline(record.clock, ended_ns, samples, pose_ns[order], poses[order], drawn)
 
 
-@dataclass(slots=True)
-class _Reader:
-    """Collects the places of drawings, and the poses."""
+class _Drawn:
+    """Places of drawings, and the poses, in the order of the files."""
 
-    anchor: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
-    places: dict[str, list[Place]] = field(default_factory=lambda: defaultdict(list))
-    pose_ns: list[NDArray[np.int64]] = field(default_factory=list)
-    poses: list[NDArray[np.float64]] = field(default_factory=list)
+    def __init__(self) -> None:
+        self.anchor = np.zeros(2)
+        self.places: dict[str, list[Place]] = defaultdict(list)
+        self.pose_ns = [np.zeros(0, np.int64)]
+        self.poses = [np.zeros((0, 3))]
 
     def take(self, chunk: Chunk, descriptor: int) -> int:
         """Take a chunk; return the number of rows kept."""
@@ -161,23 +170,3 @@ class _Reader:
             rows = enumerate(times)
             self.places[entity] += [Place(at, descriptor, chunk.offset, row) for row, at in rows]
         return len(times)
-
-    def timeline(self, clock: RobotClock, ended_ns: int, samples: tuple[Arrival, ...]) -> Timeline:
-        """Return all of it, in order of time."""
-        for places in self.places.values():
-            places.sort(key=lambda place: place.at_ns)
-        pose_ns = np.concatenate([np.zeros(0, np.int64), *self.pose_ns])
-        poses = np.concatenate([np.zeros((0, 3)), *self.poses])
-        poses[:, :2] += self.anchor
-        order = np.argsort(pose_ns, kind="stable")
-        last_ns = max((one.wall_ns for one in samples), default=0)
-        return Timeline(
-            clock.began_ns,
-            max(ended_ns, last_ns),
-            clock,
-            samples,
-            pose_ns[order],
-            poses[order],
-            self.anchor,
-            self.places,
-        )

@@ -32,7 +32,6 @@ HEADING_COLOUR: Colour = (250, 204, 21)
 COVERED_COLOUR: Colour = (56, 152, 222)
 RECOVERED_COLOUR: Colour = (245, 140, 40)
 SWEPT_COLOUR: Colour = (45, 212, 191)
-BLOCKED_COLOUR: Colour = (120, 120, 130)
 LABEL_COLOUR: Colour = (255, 255, 255)
 # Bright, as their names are written in them on a dark ground.
 START_COLOUR: Colour = (74, 222, 128)
@@ -46,7 +45,7 @@ ARROW_Z, ROBOT_Z, LABEL_Z = 0.03, 0.06, 0.1
 # Sizes on the screen [points].
 ARROW_WIDTH = 1.0
 MARK_RADIUS = 5.0
-MAP_ORDER, FLOOR_ORDER, COVERAGE_ORDER = 0.0, 0.5, 1.0
+MAP_ORDER, FLOOR_ORDER = 0.0, 0.5
 # Distance of a label above its field, as a share of the field's height.
 LABEL_ABOVE = 0.1
 
@@ -63,20 +62,16 @@ class LineStyle:
     width: float
 
 
-CHANGE = LineStyle((8, 145, 178), z=0.02, width=1.6)
 WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 # They lie below all that moves; the colour is also that of their names, on dark labels.
 ROOM = LineStyle((251, 146, 60), z=0.015, width=1.0)
-OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
 DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
 ZONE = LineStyle((37, 99, 235), z=0.052, width=2.0)
 KEEP_OUT = LineStyle((234, 88, 12), z=0.053, width=2.4)
 LINES = {
-    entities.MAP_CHANGE: CHANGE,
     entities.REPLAN_WINDOW: WINDOW,
     entities.ROOMS: ROOM,
-    entities.OLD_PATH: OLD_PATH,
     entities.PATH: PATH,
     entities.DRIVEN_PATH: DRIVEN,
     entities.ZONES: ZONE,
@@ -89,16 +84,6 @@ def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
     # -1 becomes 255, unknown in the colour map.
     pixels = grid.cells.view(np.uint8)
     return grid_archetype(grid.geometry, pixels, rr.components.Colormap.RvizMap, MAP_ORDER)
-
-
-def coverage_archetype(grid: OccupancyGrid) -> rr.GridMap:
-    """Return a coverage grid as a layer over the map: blocked cells are tinted.
-
-    What is covered is drawn as swept floor, which cells exceed.
-    """
-    tints = np.zeros((256, 4), np.uint8)
-    tints[CoverageValue.BLOCKED] = (*BLOCKED_COLOUR, 40)
-    return grid_archetype(grid.geometry, tints[grid.cells.view(np.uint8)], None, COVERAGE_ORDER)
 
 
 def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
@@ -118,10 +103,13 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
 
 def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
     """Return the label over the living trail: its path, and how decided it is."""
-    text = (
-        f"pheromone at path {about.revision}, {message.best_steps} steps to drive\n"
-        f"branching factor {about.branching:.2f} (1: one way in each cell, 4: none is preferred)"
-    )
+    text = f"pheromone at path {about.revision}, "
+    if message.best_steps:
+        text += f"{message.best_steps} steps to drive\nbranching factor {about.branching:.2f} "
+        text += "(1: one way in each cell, 4: none is preferred)"
+    else:
+        # Without a way to drive it says nothing how many ways a cell has.
+        text += "nothing left to drive"
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 
 
@@ -285,7 +273,6 @@ STATES: dict[str, dict[str, int]] = {
         "done": BLUE,
         "silent": AMBER,
     },
-    entities.PLANNER_STATE: {"idle": GREY, "planning": VIOLET},
     entities.RECORDER_STATE: {
         "recording": GREEN,
         "disk full": RED,

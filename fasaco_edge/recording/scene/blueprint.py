@@ -17,7 +17,6 @@ MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
 # in this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
 VIEW_ASPECT, PHEROMONE_ASPECT = 1.3, 2.2
-CHANGE_S = 4.0
 # The plot of the gap ends here: that of the last metres says nothing of the mission.
 MOST_GAP = 2.0
 
@@ -59,10 +58,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
-        overrides={
-            entities.DRIVEN_PATH: so_far(),
-            entities.MAP_CHANGE: last_seconds(CHANGE_S),
-        },
+        overrides={entities.DRIVEN_PATH: so_far()},
     )
 
 

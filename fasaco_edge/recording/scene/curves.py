@@ -105,8 +105,6 @@ MOST_CODES = 50
 _CODE = re.compile(r"[a-z_]{1,40}")
 
 SAVED = (entities.SAVED_BY_ANTS, entities.SAVED_BY_LOCAL_SEARCH)
-CELLS = ("coverable", "covered", "recovered", "unreachable")
-PLANS = ("plans", "unchanged", "outdated", "attempts")
 
 
 class StatusFigures:
@@ -125,22 +123,16 @@ class StatusFigures:
             if milliseconds is not None:
                 self._curves.draw(f"{entities.LATENCY}/{name}", milliseconds, NOISE)
         self._add_process(status)
-        if status.coverage is not None:
-            for name in CELLS:
-                self._draw(f"{entities.CELLS}/{name}", getattr(status.coverage, name))
         if status.battery is not None and status.battery.level is not None:
             self._curves.draw(entities.BATTERY, 100 * status.battery.level, BATTERY_NOISE)
         if status.floor is not None:
             self._curves.draw(entities.SWEPT, status.floor.swept_m2, spacing_ns=COUNT_SPACING_NS)
-        if status.path is not None:
-            self._draw(entities.REMAINING_STEPS, status.path.remaining_steps)
-            if status.path.line_gap is not None:
-                self._curves.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
-        for name in PLANS:
-            self._draw(f"{entities.PLANS}/{name}", getattr(status.plan, name))
+        if status.path is not None and status.path.line_gap is not None:
+            self._curves.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
         by_code = status.errors.by_code
         for code in sorted(filter(_CODE.fullmatch, by_code))[:MOST_CODES]:
-            self._draw(f"{entities.ERRORS}/{code}", by_code[code])
+            entity = f"{entities.ERRORS}/{code}"
+            self._curves.draw(entity, by_code[code], spacing_ns=COUNT_SPACING_NS)
 
     def add_path(self, about: PathAttachment) -> None:
         """Draw the quality of a planned path; steps, bound, cost are in the log and the inputs."""
@@ -158,8 +150,6 @@ class StatusFigures:
             self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
         if status.uptime_s:
             self._add_processor(status.uptime_s, status.cpu_s)
-        if status.threads:
-            self._draw(entities.THREADS, status.threads)
 
     def _add_processor(self, uptime_s: float, cpu_s: float) -> None:
         since = self._since
@@ -169,6 +159,3 @@ class StatusFigures:
             percent = 100 * (cpu_s - since[1]) / (uptime_s - since[0])
             self._since = uptime_s, cpu_s
             self._curves.draw(entities.PROCESSOR, percent, NOISE)
-
-    def _draw(self, entity: str, count: int) -> None:
-        self._curves.draw(entity, count, spacing_ns=COUNT_SPACING_NS)

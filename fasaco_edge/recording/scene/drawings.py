@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from msgspec.structs import astuple
-from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
@@ -19,8 +18,8 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.reasons import plain
 
-# Bytes of a point in the file; each path is drawn twice, the second time as the previous path.
-POINT_BYTES = 2 * 12
+# Bytes of a point in the file.
+POINT_BYTES = 12
 
 
 class PathDrawing:
@@ -31,28 +30,22 @@ class PathDrawing:
         self._layers = layers
         self._log = PathLog(writer)
         self.catch_up, self.finish = self._log.catch_up, self._log.finish
-        self._revision = 0
-        self._count = 0
+        self._revision = -1
         self._has_window = False
-        # Number and line of the path that is drawn.
-        self._drawn: tuple[int, NDArray[np.float64] | None] = (0, None)
 
     def add(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw a path; a path that is published again is not drawn anew."""
         revision = about.revision
         if revision:
             self._writer.sequence(entities.REPLAN, revision)
-        if not self._count or revision != self._revision:
+        if self._revision != revision:
             self._log.add(about, _path_line(message, about))
             self._draw_window(about.changed, about.reason)
-            self._count += 1
-        self._revision, count, line = revision, self._count, draw.corners(message.xy)
+        self._revision, line = revision, draw.corners(message.xy)
 
         def draw_path() -> None:
-            (before, old), self._drawn = self._drawn, (count, line)
-            if old is not None and before != count:
-                self._draw(entities.OLD_PATH, old, draw.OLD_PATH)
-            self._draw(entities.PATH, line, draw.PATH)
+            archetype = draw.line_archetype(line, draw.PATH)
+            self._writer.log(entities.PATH, archetype, latched=True, size=line.nbytes)
 
         self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._writer.wall_ns)
 
@@ -70,10 +63,6 @@ class PathDrawing:
         self._has_window = changed is not None
         self._writer.log(entities.REPLAN_WINDOW, box, latched=True)
         self._writer.log(entities.REPLAN_REASON, label, latched=True)
-
-    def _draw(self, entity: str, line: NDArray[np.float64], style: draw.LineStyle) -> None:
-        archetype = draw.line_archetype(line, style)
-        self._writer.log(entity, archetype, latched=True, size=line.nbytes)
 
 
 # Plans of one kind that follow each other for this long are one line of the log.

@@ -1,4 +1,4 @@
-"""Layers of a recording: their origin, changes by a new map, rate limits.
+"""Layers of a recording: their origin and rate limits.
 
 A viewer draws in float32, whose resolution at a UTM northing is 0.5 m: far from 0 everything is
 drawn relative to whole kilometres near the first pose.
@@ -21,7 +21,7 @@ from msgspec.structs import replace as replace_members
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds, Pose2D
-from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid, marked_window
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.messages.paths import PathMessage
@@ -82,34 +82,6 @@ class Anchor:
         return replace_members(about, changed=moved)
 
 
-# Threshold of an obstacle [percent].
-OCCUPIED_FROM = 50
-
-
-def changed_bounds(before: OccupancyGrid, after: OccupancyGrid) -> Bounds | None:
-    """Return (x_min, y_min, x_max, y_max) [m] around the pixels that turned free or occupied.
-
-    Pixels that were unknown do not count, otherwise all of exploration would. None if no pixel
-    changed, or if the two rasters do not match.
-    """
-    (old_raster, placed), (raster, outer) = before.geometry.on_raster(), after.geometry.on_raster()
-    common = outer.intersection(placed) if raster == old_raster else None
-    if common is None:
-        return None
-    old, new = before.cells[common.slices_in(placed)], after.cells[common.slices_in(outer)]
-
-    def changed(rows: slice) -> NDArray[np.bool_]:
-        turned = (old[rows] >= OCCUPIED_FROM) != (new[rows] >= OCCUPIED_FROM)
-        marked: NDArray[np.bool_] = turned & (old[rows] != UNKNOWN) & (new[rows] != UNKNOWN)
-        return marked
-
-    window = marked_window(new.shape, changed)
-    if window is None:
-        return None
-    found = window.moved(common.row0 - outer.row0, common.col0 - outer.col0)
-    return after.geometry.bounds(found)
-
-
 def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:
     """Return whether bounds have moved away from ``framed`` by more than a share of its size."""
     size = max(framed[2] - framed[0], framed[3] - framed[1])
@@ -122,7 +94,6 @@ BURST_S = 60.0
 RATES = {
     entities.MAP: 3_000,
     entities.FLOOR: 1_000,
-    entities.COVERAGE: 1_000,
     entities.PHEROMONE: 3_500,
     entities.DIRECTIONS: 2_500,
     entities.PATH: 2_000,

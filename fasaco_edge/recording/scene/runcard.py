@@ -1,16 +1,17 @@
-"""The run card: the settings of a run and a legend, shown when its recording is opened."""
+"""The run card: the outcome of a run, a legend and its settings, beside the map."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from fasaco_edge.text import one_line
-from fasaco_edge.wire.documents.settings import Settings
-
-# The most important settings come first, the others by name.
-FIRST = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
+from fasaco_edge.client.phrases import scale_words
+from fasaco_edge.grid.geometry import StampedPose
+from fasaco_edge.text import duration, one_line
+from fasaco_edge.wire.documents.settings import Settings, known_settings
+from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.reasons import plain
 
 HEAD = (
     ("seed", "seed", ""),
@@ -18,27 +19,17 @@ HEAD = (
     ("radius_m", "radius", " m"),
 )
 
-# The range of the pheromone is updated if it grows by this factor.
-SLACK = 1.1
-
 # Markdown characters that end a cell, or make links, pictures and HTML.
 MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 
 LEGEND = """\
 - **Map** white free, black occupied, grey unknown; **turquoise** swept floor
 - **Robot** red, its front yellow; its **track** green, from **start** to **end**
-- **Path** to drive violet, the previous one pale
+- **Path** to drive violet
 - **Pink frame** around all changes of the map that led to this path, and its reason
-- **Cyan frame** an obstacle came or went
 - **Blue line** a zone of the order, **orange line** a keep-out zone
 - **Pheromone** left by the planner's ants, for its next ants: dark little, bright much
 - **Arrows** where most pheromone leads, bright if one way has nearly all"""
-
-# Each field has its own range, so that it is never flat.
-LEVELS = (
-    "level l from 1 to 255 is trail_min * (trail_max / trail_min) ** ((l - 1) / 254), by the "
-    "metrics/trail/min and max of that time; level 0 cannot be covered"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,49 +41,21 @@ class RunDescription:
         began: when the recording began, UTC, as text.
         version: of the planner; "" while unknown.
         config: its configuration from its status.
-        pheromone_range: least and greatest pheromone of all fields; None while there is none.
         anchor: point (x, y) [m] of the map frame that is drawn at 0; None for 0 itself.
-        outcome: of the mission; "" while it is under way.
+        outcome: of the mission, as far as known.
     """
 
     robot: str
     began: str
     version: str = ""
     config: Settings = field(default_factory=dict)
-    pheromone_range: tuple[float, float] | None = None
     anchor: tuple[float, float] | None = None
     outcome: str = ""
-
-    def with_pheromone(self, least: float, most: float) -> RunDescription:
-        """Return it with the range widened by a field's least and greatest pheromone; 0 for none.
-
-        A range that grows by less than ``SLACK`` stays.
-        """
-        if most <= 0:
-            return self  # no cell is coverable
-        low, high = self.pheromone_range or (least, most)
-        if self.pheromone_range and least * SLACK >= low and most <= high * SLACK:
-            return self
-        return replace(self, pheromone_range=(min(least, low), max(most, high)))
 
     @property
     def name(self) -> str:
         """The name of the run."""
         return f"{self.robot} {self.began}"
-
-    def properties(self) -> dict[str, str]:
-        """Return the run's properties, flat, all as text: another version's types may differ."""
-        known = {"robot": self.robot, "began": self.began, "version": self.version}
-        settings = {
-            name.replace(".", "_"): str(value) for name, value in flat_settings(self.config)
-        }
-        if self.pheromone_range:
-            least, most = self.pheromone_range
-            known |= {"trail_min": f"{least:.6g}", "trail_max": f"{most:.6g}", "trail": LEVELS}
-        if self.anchor:
-            x, y = self.anchor
-            known |= {"drawn_from_x_m": f"{x:.0f}", "drawn_from_y_m": f"{y:.0f}"}
-        return {name: value for name, value in (settings | known).items() if value}
 
     def markdown(self) -> str:
         """Return the run card."""
@@ -101,13 +64,10 @@ class RunDescription:
             ("began", self.began),
             ("version", self.version or "unknown until the first status"),
         ]
-        if self.pheromone_range:
-            least, most = self.pheromone_range
-            rows.append(("pheromone", f"{least:.3g} to {most:.3g}, log scale"))
         if self.anchor:
             x, y = self.anchor
             rows.append(("drawn from", f"x {x:.0f} m, y {y:.0f} m of the map's frame"))
-        rows += sorted(flat_settings(self.config), key=_rank)
+        rows += sorted(flat_settings(self.config))
         table = "\n".join(
             f"| {markdown_cell(name)} | {markdown_cell(value)} |" for name, value in rows
         )
@@ -137,11 +97,45 @@ def flat_settings(config: Settings, prefix: str = "") -> Iterator[tuple[str, str
             yield f"{prefix}{name}", ", ".join(str(item) for item in value)
 
 
-def _rank(setting: tuple[str, object]) -> tuple[int, str]:
-    name = setting[0]
-    return (FIRST.index(name) if name in FIRST else len(FIRST), name)
-
-
 def markdown_cell(value: object) -> str:
     """Return a value escaped for Markdown: no link, no picture, no HTML, no further cell."""
     return MARK_UP.sub(r"\\\g<0>", one_line(str(value)))
+
+
+# States in which there is no outcome yet.
+UNDER_WAY = ("planning", "covering")
+
+
+class Outcome:
+    """The outcome of a mission, as far as known at the time.
+
+    Attributes:
+        text: its line in the run card; "" before the first status.
+    """
+
+    def __init__(self) -> None:
+        self.text = ""
+        self._began_ns = self._now_ns = 0
+        self._state = ""
+
+    def add_pose(self, stamped: StampedPose) -> None:
+        """Note the robot's clock; a robot without one has stamps of 0."""
+        self._began_ns, self._now_ns = self._began_ns or stamped.stamp_ns, stamped.stamp_ns
+
+    def add_status(self, status: Status) -> None:
+        """Note the mission's state, once when it is entered."""
+        if status.state == self._state:
+            return
+        self._state, self.text = status.state, "**under way**"
+        if status.state in UNDER_WAY:
+            return
+        words = f"**{status.state}**"
+        if self._now_ns > self._began_ns:
+            words += f" after {duration(1e-9 * (self._now_ns - self._began_ns))}"
+        if simulated := scale_words(known_settings(status.config).robot.time_scale):
+            words += f" ({simulated})"
+        said = [plain(status.reason)] if status.reason else []
+        floor = status.floor
+        if floor is not None and floor.reachable_m2 and "swept" not in status.reason:
+            said.append(f"{floor.swept_m2:.1f} of {floor.reachable_m2:.1f} m2 swept")
+        self.text = ": ".join([words, *filter(None, ["; ".join(said)])])

@@ -28,12 +28,10 @@ from fasaco_edge.recording.scene.flows import flows_of
 from fasaco_edge.recording.scene.layers import (
     Anchor,
     Layers,
-    changed_bounds,
     is_far_from,
     size_in_file,
 )
-from fasaco_edge.recording.scene.outcome import UNDER_WAY, Outcome
-from fasaco_edge.recording.scene.runcard import RunDescription
+from fasaco_edge.recording.scene.runcard import UNDER_WAY, Outcome, RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.text import one_line
@@ -44,6 +42,7 @@ from fasaco_edge.wire.documents.status import TROUBLES, ErrorCounts, Recorder, S
 from fasaco_edge.wire.messages.maps import directions_of
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
+from fasaco_edge.wire.reasons import plain
 
 DEFAULT_RADIUS_M = 0.2
 # The view follows the growing map in steps of this fraction of its size: each blueprint
@@ -83,25 +82,19 @@ class Scene:
         self._draw_robot(DEFAULT_RADIUS_M)
 
     def add_map(self, grid: OccupancyGrid) -> None:
-        """Draw the map, and where it contradicts the previous one."""
+        """Draw the map."""
         self._draw_grid(self._anchored(grid.geometry.origin).grid(grid))
 
     def _draw_grid(self, grid: OccupancyGrid) -> None:
-        before, self._map = self._map, grid
-        if before is not None:
-            if before.geometry == grid.geometry and np.array_equal(before.cells, grid.cells):
-                return
-            changed = changed_bounds(before, grid)
-            if changed is not None:
-                self._writer.log(entities.MAP_CHANGE, draw.box_archetype(changed, draw.CHANGE))
+        self._map = grid
+        if self._comes_again(entities.MAP, grid.geometry, grid.cells):
+            return
 
-        def draw_map() -> None:
-            self._writer.log(
-                entities.MAP, draw.map_archetype(grid), latched=True, size=grid.cells.size
-            )
+        def draw_map() -> rr.GridMap:
             self._frame(grid)
+            return draw.map_archetype(grid)
 
-        self._draw(entities.MAP, size_in_file(grid.cells), draw_map)
+        self._draw(entities.MAP, size_in_file(grid.cells), draw_map, grid.cells.size)
 
     def add_map_update(self, patch: MapPatch) -> None:
         """Apply a patch to the map.
@@ -144,11 +137,10 @@ class Scene:
             return
         self._rooms = named
 
-        def draw_rooms() -> None:
-            self._draw_polygons(entities.ROOMS, draw.ROOM, named)
-
         points = sum(len(outline) for _, outline in named)
-        self._draw(entities.ROOMS, POINT_BYTES * points, draw_rooms)
+        self._draw(
+            entities.ROOMS, 2 * POINT_BYTES * points, lambda: self._polygons(draw.ROOM, named)
+        )
 
     def _draw_areas(self) -> None:
         """Draw the zones of the order, its keep-outs and the operator's."""
@@ -159,17 +151,17 @@ class Scene:
             (entities.ZONES, draw.ZONE, zones),
             (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
         ):
-            self._draw_polygons(entity, style, polygons)
+            self._writer.log(entity, self._polygons(style, polygons), latched=True)
 
-    def _draw_polygons(
-        self, entity: str, style: draw.LineStyle, polygons: Sequence[tuple[str, Polygon | None]]
-    ) -> None:
+    def _polygons(
+        self, style: draw.LineStyle, polygons: Sequence[tuple[str, Polygon | None]]
+    ) -> rr.LineStrips3D:
         placed = [
             (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
             for name, corners in polygons
             if corners
         ]
-        self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)
+        return draw.polygons_archetype(placed, style)
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw the path to drive, over the previous one, and log its reason."""
@@ -181,19 +173,7 @@ class Scene:
         self._figures.add_path(about)
 
     def add_coverage(self, grid: OccupancyGrid) -> None:
-        """Tint the blocked cells, and plot the share of the covered ones."""
-        grid = self._anchored(grid.geometry.origin).grid(grid)
-
-        def draw_coverage() -> None:
-            self._writer.log(
-                entities.COVERAGE,
-                draw.coverage_archetype(grid),
-                latched=True,
-                size=4 * grid.cells.size,
-            )
-
-        # Drawn with four bytes a cell, it is twice as large.
-        self._draw(entities.COVERAGE, 2 * size_in_file(grid.cells), draw_coverage)
+        """Plot the share of the covered cells."""
         covered, recovered = draw.coverage_fractions(grid)
         self._curves.draw(entities.COVERED_FRACTION, covered, spacing_ns=SHARE_SPACING_NS)
         self._curves.draw(entities.RECOVERED_FRACTION, recovered, spacing_ns=SHARE_SPACING_NS)
@@ -203,14 +183,9 @@ class Scene:
         if self._comes_again(entities.FLOOR, grid.geometry, grid.cells):
             return
         grid = self._anchored(grid.geometry.origin).grid(grid)
-
-        def draw_floor() -> None:
-            self._writer.log(
-                entities.FLOOR, draw.floor_archetype(grid), latched=True, size=4 * grid.cells.size
-            )
-
-        # As for the coverage, drawn with four bytes a cell.
-        self._draw(entities.FLOOR, 2 * size_in_file(grid.cells), draw_floor)
+        # Drawn with four bytes a pixel, it is twice as large.
+        size, drawn = 2 * size_in_file(grid.cells), 4 * grid.cells.size
+        self._draw(entities.FLOOR, size, lambda: draw.floor_archetype(grid), drawn)
 
     def add_pheromone(self, message: PheromoneMessage, about: TrailAttachment) -> None:
         """Draw the living trail; plot how decided it is."""
@@ -218,22 +193,17 @@ class Scene:
             return
         message = self._anchored(message.geometry.origin).grid(message)
         self._curves.draw(entities.BRANCHING, about.branching)
-        self._curves.draw(entities.TRAIL_CELLS, about.cells)
 
-        def draw_pheromone() -> None:
-            field = draw.pheromone_archetype(message)
-            self._writer.log(entities.PHEROMONE, field, latched=True, size=message.levels.size)
+        def draw_pheromone() -> rr.GridMap:
             label = draw.trail_label(message, about)
             self._writer.log(entities.TRAIL_LABEL, label, latched=True)
+            return draw.pheromone_archetype(message)
 
-        self._draw(entities.PHEROMONE, size_in_file(message.levels), draw_pheromone)
+        size = size_in_file(message.levels)
+        self._draw(entities.PHEROMONE, size, draw_pheromone, message.levels.size)
         # The scale of the levels, to decode them into trails.
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
-        known = self._run.with_pheromone(message.trail_min, message.trail_max)
-        if known is not self._run:
-            self._run = known
-            self._describe()
 
     def add_directions(self, grid: OccupancyGrid) -> None:
         """Draw the directions of the living trail."""
@@ -241,12 +211,8 @@ class Scene:
             return
         grid = self._anchored(grid.geometry.origin).grid(grid)
         flows = flows_of(grid.geometry, *directions_of(grid))
-
-        def draw_directions() -> None:
-            arrows = draw.arrows_archetype(flows)
-            self._writer.log(entities.DIRECTIONS, arrows, latched=True, size=flows.size_bytes)
-
-        self._draw(entities.DIRECTIONS, flows.size_bytes, draw_directions)
+        size = flows.size_bytes
+        self._draw(entities.DIRECTIONS, size, lambda: draw.arrows_archetype(flows), size)
 
     def add_status(self, status: Status) -> None:
         """Plot the planner's figures, show its states, log its errors."""
@@ -266,8 +232,7 @@ class Scene:
             # The plans came before, and a viewer orders lines of one time by entity.
             self._paths.finish()
             self._writer.at(self._writer.wall_ns + 1)
-        self.enter(entities.MISSION_STATE, status.state, status.reason)
-        self.enter(entities.PLANNER_STATE, "planning" if status.plan.planning else "idle")
+        self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
         self._add_troubles(status)
         self._add_errors(status.errors)
 
@@ -310,8 +275,15 @@ class Scene:
         if self._known is not None and self._known != self._framed:
             self._writer.show(build_blueprint(self._known))
 
-    def _draw(self, layer: str, size: int, draw_it: Callable[[], None]) -> None:
-        self._layers.draw(layer, size, draw_it, self._writer.wall_ns)
+    def _draw(
+        self, entity: str, in_file: int, drawn: Callable[[], rr.AsComponents], size: int = 0
+    ) -> None:
+        """Draw a layer once its rate allows; ``in_file``, ``size``: compressed, and not [bytes]."""
+
+        def log() -> None:
+            self._writer.log(entity, drawn(), latched=True, size=size)
+
+        self._layers.draw(entity, in_file, log, self._writer.wall_ns)
 
     def _comes_again(self, entity: str, about: object, pixels: NDArray[np.generic]) -> bool:
         """Return whether the newest grid of an entity is the one that was drawn last."""
@@ -355,8 +327,9 @@ class Scene:
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
-        self._writer.log_static(entities.RUN_CARD, card)
-        self._writer.describe(self._run.name, self._run.properties())
+        # With a time, as the outcome is not known before the end.
+        self._writer.log(entities.RUN_CARD, card, latched=True)
+        self._writer.describe(self._run.name)
 
     def _draw_robot(self, radius_m: float) -> None:
         body, heading = draw.body_archetypes(radius_m)

@@ -38,8 +38,8 @@ IN_FORCE_BYTES = 8_000_000
 class InputLog:
     """Writes samples into a writer; for the writer's thread only.
 
-    Of paths only a digest is kept; of statuses the changed ones, and one in ``STATUS_PERIOD_NS``,
-    so that the progress of the mission is known at that rate. So are rooms, and the last ones.
+    Of paths only a digest is kept; of statuses and rooms the changed ones, one in
+    ``STATUS_PERIOD_NS``, so that the progress of the mission is known at that rate, and the last.
     """
 
     def __init__(self, writer: RecordingWriter, run: int) -> None:
@@ -49,24 +49,17 @@ class InputLog:
         self._part = 0
         self._lost = 0
         self._next_ns = 0
-        self._logged: tuple[object, ...] = ()
-        self._logged_ns = 0
-        # The rooms that were kept, when, and later ones of which only swept shares differ.
-        self._rooms: tuple[object, ...] = ()
-        self._rooms_ns = 0
-        self._late_rooms: Arrival | None = None
+        # Of statuses and rooms: what the last kept one said, and when; and one after it.
+        self._kept: dict[str, tuple[object, int]] = {}
+        self._late: dict[str, Arrival] = {}
         self._now_ns = (0, 0)
 
     def add(self, arrival: Arrival) -> None:
         """Take a sample, if it is an input of the mission, or tells how it went."""
         self._now_ns = arrival.at_ns, arrival.wall_ns
-        if arrival.at_ns - self._rooms_ns >= STATUS_PERIOD_NS:
-            self._add_late_rooms()
         if arrival.topic == "path":
             arrival = _path_digest(arrival)
-        elif (arrival.topic == "rooms" and not self._are_new_rooms(arrival)) or (
-            arrival.topic not in (*RECORDED_INPUTS, "rooms") and not self._is_news(arrival)
-        ):
+        elif arrival.topic not in RECORDED_INPUTS and not self._is_due(arrival):
             return
         self._in_force.note(self._encoder.add(arrival))
         if self._encoder.waiting_bytes > WAITING_BYTES:
@@ -86,7 +79,10 @@ class InputLog:
 
     def finish(self) -> None:
         """Write the remaining samples; a part begun just before the end gets a batch, too."""
-        self._add_late_rooms()
+        at_ns, wall_ns = self._now_ns
+        for late in self._late.values():
+            # Samples are in order of time.
+            self._in_force.note(self._encoder.add(replace(late, at_ns=at_ns, wall_ns=wall_ns)))
         part = self._writer.part_number
         self._write(in_any_case=part > 1 and part != self._part)
 
@@ -103,45 +99,39 @@ class InputLog:
             # No digest may refer to a sample that was not written.
             self._part = 0
 
-    def _are_new_rooms(self, arrival: Arrival) -> bool:
+    def _is_due(self, arrival: Arrival) -> bool:
+        """Return whether a status or rooms say something new, or the last kept ones are old."""
+        topic = arrival.topic
+        if topic not in ("status", "rooms"):
+            return False
         try:
-            found = decode_tolerant(arrival.sample.payload, Rooms)
+            news = _status_news(arrival) if topic == "status" else _rooms_news(arrival)
         except MalformedMessage:
             return False
-        news = found.frame, found.revision
-        if news == self._rooms and arrival.at_ns - self._rooms_ns < STATUS_PERIOD_NS:
-            self._late_rooms = arrival
+        before, kept_ns = self._kept.get(topic, (None, 0))
+        if news == before and arrival.at_ns - kept_ns < STATUS_PERIOD_NS:
+            self._late[topic] = arrival
             return False
-        self._rooms, self._rooms_ns, self._late_rooms = news, arrival.at_ns, None
+        self._kept[topic] = news, arrival.at_ns
+        self._late.pop(topic, None)
         return True
 
-    def _add_late_rooms(self) -> None:
-        if (late := self._late_rooms) is not None:
-            # Samples are in order of time.
-            at_ns, wall_ns = self._now_ns
-            self._late_rooms, self._rooms_ns = None, at_ns
-            self._in_force.note(self._encoder.add(replace(late, at_ns=at_ns, wall_ns=wall_ns)))
 
-    def _is_news(self, arrival: Arrival) -> bool:
-        if arrival.topic != "status":
-            return False
-        try:
-            status = decode_tolerant(arrival.sample.payload, Status)
-        except MalformedMessage:
-            return False
+def _status_news(arrival: Arrival) -> object:
+    status = decode_tolerant(arrival.sample.payload, Status)
+    return (
         # A batch with a map: the mission has begun.
-        has_map = status.map is not None
-        news = (
-            *(status.state, has_map, status.version, status.config),
-            sorted(status.errors.by_code),
-            [trouble.code for trouble in status.troubles],
-            status.ledger.fault,
-            status.recorder and status.recorder.state,
-        )
-        if news == self._logged and arrival.at_ns - self._logged_ns < STATUS_PERIOD_NS:
-            return False
-        self._logged, self._logged_ns = news, arrival.at_ns
-        return True
+        *(status.state, status.map is not None, status.version, status.config),
+        sorted(status.errors.by_code),
+        [trouble.code for trouble in status.troubles],
+        status.ledger.fault,
+        status.recorder and status.recorder.state,
+    )
+
+
+def _rooms_news(arrival: Arrival) -> object:
+    found = decode_tolerant(arrival.sample.payload, Rooms)
+    return found.frame, found.revision
 
 
 def _path_digest(arrival: Arrival) -> Arrival:

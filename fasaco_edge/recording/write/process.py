@@ -17,7 +17,6 @@ from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.sdk import rrb
 from fasaco_edge.recording.write.inbox import RunClock
 from fasaco_edge.recording.write.quota import DiskBudget, next_run
-from fasaco_edge.recording.write.streams import serve_live
 from fasaco_edge.recording.write.writer import RecordingWriter
 
 TAKE_TIMEOUT_S = 0.1
@@ -51,12 +50,10 @@ class Output:
     Attributes:
         folder: for the recordings; made if missing.
         budget: of the disk.
-        serve: address and port to serve live viewers at; None for nowhere.
     """
 
     folder: Path
     budget: DiskBudget
-    serve: tuple[str, int] | None = None
 
     def begin(self, name: str, blueprint: rrb.Blueprint) -> Recording:
         """Return the recording that begins now, called after a robot or fleet."""
@@ -66,8 +63,6 @@ class Output:
         run = next_run(self.folder, name, began)
         writer = RecordingWriter(self.folder, run, self.budget, blueprint)
         writer.at(began_ns)
-        if self.serve is not None:
-            writer.serve(serve_live(run, *self.serve))
         return Recording(writer, clock, began_ns, f"{began:%Y-%m-%d %H:%M:%S}")
 
 

@@ -13,7 +13,7 @@ import os
 import re
 import shutil
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 from fasaco_edge.config.config import DaemonConfig
@@ -47,77 +47,40 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
     return f"run{newest + 1:05}-{began:{TIME}}-{robot}"
 
 
-@dataclass(frozen=True, slots=True)
-class Quota:
-    """Limit of the size of ``robot``'s recordings in a folder [bytes]; 0 for none."""
+def delete_oldest(folder: Path, robot: str, most_bytes: int) -> list[Path]:
+    """Delete the oldest of ``robot``'s parts until they take ``most_bytes``; return them.
 
-    robot: str
-    most_bytes: int
-
-    def keep(self, folder: Path, coming: int = 0) -> list[Path]:
-        """Delete the oldest parts until ``coming`` more bytes fit; return the deleted files.
-
-        Raises:
-            OSError: the folder cannot be read, or a file cannot be deleted.
-        """
-        if not self.most_bytes:
-            return []
-        parts = oldest_first(folder, self.robot)
-        total, deleted = sum(size for _, size in parts), []
-        for path, size in parts:
-            if total + coming <= self.most_bytes:
-                break
-            if _delete(path):
-                deleted.append(path)
-                total -= size
-        return deleted
+    Raises:
+        OSError: the folder cannot be read, or a file cannot be deleted.
+    """
+    parts = oldest_first(folder, robot)
+    total, deleted = sum(size for _, size in parts), []
+    for path, size in parts:
+        if total <= most_bytes:
+            break
+        if _delete(path):
+            deleted.append(path)
+            total -= size
+    return deleted
 
 
 def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     """Return the parts of a robot's recordings, each with its size [bytes], the oldest first.
 
-    Runs named by earlier releases, without a number, come first. Among themselves they are ordered
-    by their last write: the later of the file's time and the time in the name, which differ for a
-    copy.
+    Runs named by earlier releases, without a number, come first, by the times in their names.
 
     Raises:
         OSError: the folder cannot be read.
     """
-    named = re.compile(
-        # Without a leading number, a second run within a second has a trailing one.
-        r"(?P<run>(?:run(?P<order>\d{5,9})-)?(?P<when>\d{8}T\d{6}Z)-"
-        rf"{re.escape(robot)}(?(order)|(?:-(?P<again>\d+))?))-part(?P<number>\d+)\.rrd"
-    )
-    found, last = [], dict[str, float]()
-    matches = {path: match for path in folder.iterdir() if (match := named.fullmatch(path.name))}
-    runs = {match["run"] for match in matches.values()}
-    for path, match in matches.items():
-        # A number after the name may be the end of another robot's name: of two numbers the second
-        # is ours.
-        if match["again"] and f"{match['when']}-{robot}" not in runs:
-            continue
-        if path.is_file() and not path.is_symlink():
-            status = path.stat()
-            found.append((match, path, status.st_size))
-            written = max(_time(match["when"]), status.st_mtime)
-            last[match["run"]] = max(last.get(match["run"], 0.0), written)
-
-    def age(part: tuple[re.Match[str], Path, int]) -> tuple[int, float, int, int]:
-        match, _, _ = part
-        number = int(match["number"])
-        if match["order"]:
-            return int(match["order"]), 0.0, 1, number
-        return 0, last[match["run"]], int(match["again"] or 1), number
-
-    return [(path, size) for _, path, size in sorted(found, key=age)]
-
-
-def _time(when: str) -> float:
-    """Return the time in a name [s]; 0 for an invalid date."""
-    try:
-        return datetime.strptime(when, TIME).replace(tzinfo=UTC).timestamp()
-    except ValueError:
-        return 0.0
+    # The numbers of runs count on, whatever the clock says; parts have numbers, too.
+    named = re.compile(rf"(?:run(\d{{5,9}})-)?(\d{{8}}T\d{{6}}Z)-{re.escape(robot)}-part(\d+)\.rrd")
+    found = []
+    for path in folder.iterdir():
+        match = named.fullmatch(path.name)
+        if match and path.is_file() and not path.is_symlink():
+            run, began, part = match.groups()
+            found.append((int(run or 0), began, int(part), path, path.stat().st_size))
+    return [(path, size) for *_, path, size in sorted(found)]
 
 
 def _delete(path: Path) -> bool:
@@ -142,33 +105,14 @@ class DiskBudget:
         least_free_bytes: space that must stay free on the disk.
         part_s: age at which the next part begins [s]; 0 for never. Until the footer of a part is
             written, rerun's index of it grows by a megabyte a minute.
-        quota: of all recordings of the robot.
-
-    Raises:
-        BadConfiguration: a size is impossible.
+        robot, quota_bytes: name of the robot, and limit of all its recordings; 0 for none.
     """
 
     part_bytes: int
     least_free_bytes: int
     part_s: float = 0.0
-    quota: Quota | None = None
-
-    def __post_init__(self) -> None:
-        quota_bytes = self.quota.most_bytes if self.quota else 0
-        for name, given, least in (
-            ("part_bytes", self.part_bytes, 1),
-            ("least_free_bytes", self.least_free_bytes, 0),
-            ("part_s", self.part_s, 0),
-            ("quota_bytes", quota_bytes, 0),
-        ):
-            # Negated comparisons also catch NaN.
-            if not given >= least:
-                raise BadConfiguration(f"{name} must be at least {least}, got {given}")
-        if 0 < quota_bytes < 2 * self.part_bytes:
-            raise BadConfiguration(
-                f"quota_bytes must be 0 or at least two parts, {2 * self.part_bytes}, "
-                f"got {quota_bytes}"
-            )
+    robot: str = ""
+    quota_bytes: int = 0
 
     def is_full(self, folder: Path) -> bool:
         """Return whether ``folder`` has less free space than required."""
@@ -180,10 +124,11 @@ class DiskBudget:
 
     def keep_quota(self, folder: Path) -> None:
         """Delete the oldest parts in ``folder`` above the quota."""
-        if self.quota is None:
+        if not self.quota_bytes:
             return
         try:
-            deleted = self.quota.keep(folder, self.part_bytes)
+            # The part that is being written may become as large as any.
+            deleted = delete_oldest(folder, self.robot, self.quota_bytes - self.part_bytes)
         except OSError as error:
             LOG.warning("recordings above their quota stay: %s", error)
             return
@@ -198,11 +143,17 @@ def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
         BadConfiguration: a size is impossible, or the robot's name is no key.
     """
     limits, robot = config.recording, name or config.keys().robot
+    if 0 < limits.quota_mb < 2 * limits.part_mb:
+        raise BadConfiguration(
+            f"a quota has to be 0 or at least two parts, {2 * limits.part_mb} MB, "
+            f"got {limits.quota_mb} MB"
+        )
     return DiskBudget(
         limits.part_mb * MEGABYTE,
         limits.least_free_mb * MEGABYTE,
         60.0 * limits.part_min,
-        Quota(robot, limits.quota_mb * MEGABYTE),
+        robot,
+        limits.quota_mb * MEGABYTE,
     )
 
 

@@ -18,6 +18,7 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError, MalformedMessage
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import memory_limit, resident_mb
 from fasaco_edge.mission.orders.order import read_command
 from fasaco_edge.recording import entities
@@ -74,25 +75,23 @@ class Recorder:
         self._inbox = Inbox(capacity, self._clock.arrival)
         if capacity < QUEUE_BYTES:
             self.note(f"memory is limited: samples above {capacity / 1e6:.1f} MB are not recorded")
+        scene = self._scene
+        grids = {
+            "map": scene.add_map,
+            "coverage": scene.add_coverage,
+            "floor": scene.add_floor,
+            "directions": scene.add_directions,
+        }
         self._drawers: dict[str, Callable[[Sample], None]] = {
-            "map": lambda sample: self._scene.add_map(decode_occupancy_grid(sample.payload)),
-            "map_update": lambda sample: self._scene.add_map_update(
-                decode_map_update(sample.payload)
-            ),
+            **{topic: partial(_draw_grid, draw) for topic, draw in grids.items()},
+            "map_update": lambda sample: scene.add_map_update(decode_map_update(sample.payload)),
             "pose": self._draw_pose,
             "tf_static": partial(self._draw_pose, is_static=True),
-            "command": self._draw_command,
+            "command": lambda s: scene.add_command(read_command(decode_json(s.payload))),
             "path": self._draw_path,
-            "coverage": lambda sample: self._scene.add_coverage(
-                decode_occupancy_grid(sample.payload)
-            ),
-            "floor": lambda sample: self._scene.add_floor(decode_occupancy_grid(sample.payload)),
             "pheromone": self._draw_pheromone,
-            "directions": lambda sample: self._scene.add_directions(
-                decode_occupancy_grid(sample.payload)
-            ),
-            "rooms": lambda sample: self._scene.add_rooms(decode_tolerant(sample.payload, Rooms)),
-            "status": self._draw_status,
+            "rooms": lambda sample: scene.add_rooms(decode_tolerant(sample.payload, Rooms)),
+            "status": lambda sample: scene.add_status(decode_tolerant(sample.payload, Status)),
         }
         frames = (ros.frames.map, ros.frames.robot) if (ros := config.ros2) else DEFAULT_FRAMES
         self._poses = PoseDecoder(config.pose.schema, frames)
@@ -200,9 +199,6 @@ class Recorder:
         if pose is not None:
             self._scene.add_pose(pose)
 
-    def _draw_command(self, sample: Sample) -> None:
-        self._scene.add_command(read_command(decode_json(sample.payload)))
-
     def _draw_path(self, sample: Sample) -> None:
         about = decode_tolerant(sample.attachment, PathAttachment)
         self._scene.add_path(decode_path(sample.payload), about)
@@ -210,9 +206,6 @@ class Recorder:
     def _draw_pheromone(self, sample: Sample) -> None:
         about = decode_tolerant(sample.attachment or b"{}", TrailAttachment)
         self._scene.add_pheromone(decode_pheromone(sample.payload), about)
-
-    def _draw_status(self, sample: Sample) -> None:
-        self._scene.add_status(decode_tolerant(sample.payload, Status))
 
     def _watch_planner(self, heard_ns: int) -> None:
         """Report a planner that was silent for long, up to a time [ns]."""
@@ -245,6 +238,10 @@ class Recorder:
         )
         self._scene.add_report(self._report)
         self._reporter.put(encode_json(self._report))
+
+
+def _draw_grid(draw: Callable[[OccupancyGrid], None], sample: Sample) -> None:
+    draw(decode_occupancy_grid(sample.payload))
 
 
 def _is_rival(payload: bytes) -> bool:

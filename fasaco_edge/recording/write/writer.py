@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import enum
 import logging
-from collections.abc import Iterator
 from pathlib import Path
 
 from fasaco_edge.errors import BadConfiguration
@@ -65,7 +64,6 @@ class RecordingWriter:
         self._part: Part | None = None
         self._parts = 0
         self._abandoned: list[Part] = []
-        self._live: rr.RecordingStream | None = None
         self._next_flush_ns = 0
         self._part_until_ns: int | None = None
         self._unflushed_messages = 0
@@ -127,13 +125,13 @@ class RecordingWriter:
     def at(self, wall_ns: int) -> None:
         """Set the time [ns] of the next log calls."""
         self._latched.wall_ns = wall_ns
-        for stream in self._streams():
+        if (stream := self._stream) is not None:
             self._latched.set_times(stream)
 
     def sequence(self, timeline: str, number: int) -> None:
         """Set the position on another timeline for all later log calls."""
         self._latched.sequences[timeline] = number
-        for stream in self._streams():
+        if (stream := self._stream) is not None:
             self._latched.set_times(stream)
 
     def log(
@@ -147,15 +145,14 @@ class RecordingWriter:
             size: its size, if large [bytes].
         """
         if latched:
-            missed = self._part is None or self.state is not WriterState.RECORDING
-            self._latched.latch(entity, archetype, missed=missed)
-        for stream in self._streams():
+            self._latched.latch(entity, archetype, missed=self._stream is None)
+        if (stream := self._stream) is not None:
             stream.log(entity, archetype)
         self._unflushed_bytes += size
 
     def write_blob(self, blob: bytes, entity: str = entities.INPUTS) -> bool:
         """Write bytes of an entity at the time set, at once; False on failure."""
-        if self._part is None or self.state is not WriterState.RECORDING:
+        if self._part is None or self._stream is None:
             return False
         self._part.write_blob(blob, self.wall_ns, entity)
         self._unflushed_bytes += len(blob)
@@ -164,25 +161,20 @@ class RecordingWriter:
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log static data of the run; replaces earlier static data."""
         self._latched.static[entity] = archetypes
-        for stream in self._streams():
+        if (stream := self._stream) is not None:
             stream.log(entity, *archetypes, static=True)
 
-    def describe(self, name: str, properties: dict[str, str]) -> None:
-        """Name the recording, and set its properties."""
-        self._latched.name, self._latched.properties = name, properties
-        for stream in self._streams():
-            self._latched.send_description(stream)
+    def describe(self, name: str) -> None:
+        """Name the recording."""
+        self._latched.name = name
+        if (stream := self._stream) is not None:
+            stream.send_recording_name(name)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
         """Make ``blueprint`` the active one; the last one in a file counts."""
         self._latched.blueprint = blueprint
-        for stream in self._streams():
+        if (stream := self._stream) is not None:
             send_blueprint(stream, blueprint)
-
-    def serve(self, live: rr.RecordingStream) -> None:
-        """Also log to ``live``, independent of the disk."""
-        self._live = live
-        self._latched.begin(live)
 
     def sync(self, now_ns: int) -> None:
         """Check whether all data are written, and act on it; call it often.
@@ -219,11 +211,12 @@ class RecordingWriter:
         self._part = None
         return True
 
-    def _streams(self) -> Iterator[rr.RecordingStream]:
-        if self._part is not None and self.state is WriterState.RECORDING:
-            yield self._part.stream
-        if self._live is not None:
-            yield self._live
+    @property
+    def _stream(self) -> rr.RecordingStream | None:
+        """Where to log to; None while nothing is written."""
+        if self._part is None or self.state is not WriterState.RECORDING:
+            return None
+        return self._part.stream
 
     def _is_flushed(self, part: Part) -> bool:
         stalled = self.state is WriterState.STALLED

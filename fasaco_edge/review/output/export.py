@@ -27,8 +27,8 @@ def export(review: Review, folder: Path, form: str = CSV) -> list[tuple[Path, st
     """Write all series of a review into ``folder``, which is made if missing; return the files.
 
     A file for each of ``tables``; columns.csv, which says what they hold, in what units;
-    and end.npz: map int8 and its origin (x, y, yaw) and resolution_m; visits uint16 and reachable
-    bool of the lattice with its first row, column and cell_m.
+    and end.npz: map int8 and its origin (x, y, yaw) and resolution_m; visits uint16
+    of the lattice with its first row, column and cell_m.
 
     Each file comes with a phrase that says what is in it.
 
@@ -120,7 +120,7 @@ def _cell(value: object) -> object:
 
 
 def _write_arrays(review: Review, file: Path) -> None:
-    grid, lattice, drive = review.data.grid, review.lattice, review.drive
+    grid, lattice, visits = review.data.grid, review.lattice, review.visits
     arrays: dict[str, NDArray[np.generic]] = {}
     if grid is not None:
         origin = grid.geometry.origin
@@ -129,10 +129,9 @@ def _write_arrays(review: Review, file: Path) -> None:
             "map_origin": np.array((origin.x, origin.y, origin.yaw)),
             "map_resolution_m": np.array(grid.geometry.resolution),
         }
-    if lattice is not None and drive is not None:
+    if lattice is not None and visits is not None:
         arrays |= {
-            "visits": drive.visits,
-            "reachable": drive.reachable,
+            "visits": visits,
             "lattice_corner": np.array((lattice.window.row0, lattice.window.col0)),
             "cell_m": np.array(lattice.cell_m),
         }

@@ -1,4 +1,4 @@
-"""Pictures of a review: the map with the track, charts, a moment, spots."""
+"""Pictures of a review: the map with the track, a moment, spots."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.chart import draw_panels
 from fasaco_edge.drawing.pictures import draw_mission, draw_order, draw_unswept
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.output.answer_rows import instant_rows, spot_rows
-from fasaco_edge.review.output.panels import coverage_panel, replan_panel, state_panel
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rooms import outlined
 from fasaco_edge.review.run_data import RunData
@@ -26,53 +24,30 @@ from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.settings import known_settings
 
-# The most that one review takes, and the height of all [px].
-SIZE = (1600, 900)
-# Space of title, caption and key beside the map.
-AROUND = (56, 210)
 TRAIL_SPACING_M = 0.02
 # Width of a drive drawn beside the lines of paths [m].
 DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
 
 
-def draw_review(review: Review, other: Review | None = None) -> Image.Image:
-    """Return a picture, RGB: map and charts; of two runs both maps, and their curves together.
-
-    It is as wide as it has to be: one is of ``SIZE`` at most, two are wider by a map.
-    """
-    reviews = [review] if other is None else [review, other]
-    panels = [
-        coverage_panel(reviews),
-        replan_panel(reviews),
-        *([state_panel(review)] if other is None else []),
-    ]
-    charts = draw_panels(panels)
-    space = SIZE[0] - charts.width
-    maps = [draw_map(each, (space - AROUND[0], SIZE[1] - AROUND[1])) for each in reviews]
-    missions = [each for each in maps if each is not None]
-    for mission in missions:
-        # A caption of many lines leaves less space for the map.
-        mission.thumbnail((space, SIZE[1]))
-    width = sum(mission.width for mission in missions) + charts.width
-    sheet, left = Image.new("RGB", (width, SIZE[1]), palette.PAPER), 0
-    for mission in missions:
-        sheet.paste(mission, (left, (SIZE[1] - mission.height) // 2))
-        left += mission.width
-    sheet.paste(charts, (left, SIZE[1] - charts.height))
+def draw_review(reviews: Sequence[Review]) -> Image.Image | None:
+    """Return the maps of reviews side by side, RGB; None if there is none."""
+    maps = [found for found in map(draw_map, reviews) if found is not None]
+    if not maps:
+        return None
+    size = sum(one.width for one in maps), max(one.height for one in maps)
+    sheet, left = Image.new("RGB", size, palette.PAPER), 0
+    for one in maps:
+        sheet.paste(one, (left, 0))
+        left += one.width
     return sheet
 
 
-def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
-    """Return the last map with cells, unswept floor and track; None without any of them.
-
-    Args:
-        review: the review.
-        space: largest size of the map (width, height) [px].
-    """
-    grid, lattice, drive, floor = review.data.grid, review.lattice, review.drive, review.floor
+def draw_map(review: Review) -> Image.Image | None:
+    """Return the last map with cells, unswept floor and track; None without any of them."""
+    grid, lattice, visits, floor = review.data.grid, review.lattice, review.visits, review.floor
     track, driven = _thinned(review.data)
-    if grid is None or lattice is None or drive is None or not len(track):
+    if grid is None or lattice is None or visits is None or not len(track):
         return None
     # A line over the floor covers cells without passing their centres: visits would not show it.
     is_line = known_settings(review.data.config).planner.line != "cells"
@@ -80,14 +55,12 @@ def draw_map(review: Review, space: tuple[int, int]) -> Image.Image | None:
         grid,
         lattice,
         track,
-        drive.visits,
+        visits,
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
-        space=space,
         driven=driven,
         swept=MapLayer(floor.geometry, floor.swept) if floor and is_line else None,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
-        left_out_words=left_out_words(review),
         zones=[zone.polygon for zone in review.data.zones if zone.polygon],
         keep_out=review.data.keep_out,
         rooms=[(one_line(room.title), room.outline) for room in outlined(review.data)],
@@ -175,7 +148,7 @@ def _simulated(review: Review) -> list[str]:
 
 
 def _caption(review: Review) -> list[str]:
-    counts, walk, replans = review.counts, review.walk, review.replans
+    counts, replans = review.data.counts, review.replans
     lines = _simulated(review)
     if counts is not None:
         lines.append(
@@ -186,10 +159,6 @@ def _caption(review: Review) -> list[str]:
         figures = review.floor.figures
         swept = swept_words(figures.swept_m2, figures.reachable_m2)
         lines.append(f"floor swept: {swept}, by recorded poses")
-    if walk is not None:
-        lines.append(
-            f"{walk.steps:,} steps, {walk.revisits:,} revisits, {walk.turns_90:,} quarter-turns"
-        )
     median, slowest = replans.milliseconds(50), replans.milliseconds(100)
     if median is not None and slowest is not None:
         lines.append(
@@ -197,18 +166,6 @@ def _caption(review: Review) -> list[str]:
             f"{slowest:.0f} ms at worst; {review.faults.total:,} messages refused"
         )
     return lines
-
-
-def left_out_words(review: Review) -> str:
-    """Return what cells are called that the track did not pass.
-
-    The daemon also counts what was covered before the recording began, or beside a track.
-    """
-    counts, drive = review.counts, review.drive
-    has_counted_more = (
-        counts is not None and drive is not None and (counts.covered > drive.coverage.covered)
-    )
-    return "not passed while it was recorded" if has_counted_more else "not covered"
 
 
 def _thinned(

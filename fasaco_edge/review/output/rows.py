@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
 from msgspec.structs import astuple
 
 from fasaco_edge.client.phrases import percent, scale_words
-from fasaco_edge.review.comparison import figures
+from fasaco_edge.review.comparison import figures, floor_words
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.orders import order_words
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 REASONS = ("reason", "replans", "median", "slowest")
 REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
 """Columns of ``reason_rows`` and ``replan_rows``."""
-MOST_REPLANS = 8
 # The most important settings; the others are in the run card and in the JSON document.
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
@@ -37,7 +35,7 @@ LEFT = ("m2", "at", "why")
 """Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
 ROOMS = ("room", "m2", "time", "entered", "swept", "passes", "left")
 """Columns of ``room_rows``."""
-MOST_PLACES = 3
+MOST_PLACES = 2
 # Less of a way without poses is not shown [m].
 LEAST_LOST_M = 1.0
 CHARGES = ("at", "for", "battery")
@@ -82,7 +80,6 @@ def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]
     at = {patch: room_at(review.data, (patch.x, patch.y)) for patch in document.left}
     found: list[tuple[str, ...]] = []
     for room in document.rooms:
-        share = room.counted_share if room.swept_share is None else room.swept_share
         patches = [
             f"{patch.m2:.2f} at ({patch.x:.2f}, {patch.y:.2f})"
             for patch, there in at.items()
@@ -95,7 +92,7 @@ def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]
                 f"{room.area_m2:.1f}",
                 clock(room.seconds),
                 str(room.entered),
-                NOT_KNOWN if share is None else percent(share),
+                NOT_KNOWN if room.share is None else percent(room.share),
                 "-" if room.passes is None else str(room.passes),
                 left + (f": {_some(patches)}" if patches else ""),
             )
@@ -108,11 +105,6 @@ def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     return [(clock(each.at_s), each.command) for each in document.commands]
 
 
-def replans_in_time(review: Review) -> list[tuple[str, ...]]:
-    """Return all replans as ``replan_rows`` has the slowest ones, in order of time."""
-    return [_replan_row(path) for path in review.replans.later]
-
-
 def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str]]:
     """Return the most important rows: with verdict and curve they fit on one screen."""
     by_name = {figure.name: figure.text for figure in figures(document)}
@@ -122,65 +114,71 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     reached = [
         f"{percent} % {by_name[f'{percent} % of cells covered after']}" for percent in MILESTONES
     ]
-    slowest = review.replans.slowest
     replans = f"{document.replans}"
-    if slowest is not None and document.replan_ms_p50 is not None:
+    for slowest in review.replans.slowest_first[:1]:
         replans += f", {amount(document.replan_ms_p50, 'ms')} in the median"
         replans += f", the slowest {amount(slowest.plan_ms, 'ms')} at {clock(slowest.at_s)}"
     left = [f"{patch.m2:.2f} m2 at ({patch.x:.2f}, {patch.y:.2f})" for patch in document.left]
-    areas = [area for order in document.orders[-1:] for area in order.unreached]
     unreached = [
-        f"{area.m2:.2f} m2 at ({area.x:.2f}, {area.y:.2f}) {area.reason}" for area in areas
+        f"{area.m2:.2f} m2 at ({area.x:.2f}, {area.y:.2f}) {area.reason}"
+        for order in document.orders[-1:]
+        for area in order.unreached
     ]
     troubles = [
         f"{t.state} {clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s" for t in document.troubles
     ]
     commands = [" ".join(row) for row in command_rows(document)]
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
-    return [
+    has_count = document.covered_cells is not None
+    found = [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
         *clock_rows(document),
         ("floor swept", _swept(document, by_name["floor swept"])),
-        ("covered", by_name["covered"]),
+        ("covered", by_name["covered"] + ": the tool passed their centres" * has_count),
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
         ("not reached", _some(unreached)),
-        ("driven", f"{amount(document.driven_m, 'm')}, {count(document.steps, 'steps')}"),
+        ("driven", amount(document.driven_m, "m")),
         ("replans", replans),
-        *([("processor", _processor(document))] if document.processor_s else []),
+        ("processor", _processor(document)),
         ("commands", _some(commands)),
-        *([("rooms", _shares(document))] if document.rooms else []),
-        *([("charges", _some(charges))] if charges else []),
-        *([("poses", lost)] if (lost := _lost_way(review)) else []),
+        ("rooms", _shares(document)),
+        ("charges", _some(charges)),
+        ("poses", _lost_way(review)),
+        ("stood", _stood(document)),
         ("troubles", _some(troubles)),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
     ]
+    return [(name, text) for name, text in found if text]
 
 
 def _shares(document: ReviewDocument) -> str:
     """Return the swept share of each room, those with the least first."""
-    shares = [
-        (room.counted_share if room.swept_share is None else room.swept_share, room.title)
-        for room in document.rooms
-    ]
-    known = sorted((share, title) for share, title in shares if share is not None)
-    return ", ".join(f"{title} {percent(share)}" for share, title in known) or NOT_KNOWN
+    known = sorted((room.share, room.title) for room in document.rooms if room.share is not None)
+    return ", ".join(f"{title} {percent(share)}" for share, title in known)
 
 
 def _lost_way(review: Review) -> str:
     """Return over how much of its way the robot's poses are missing; "" over little."""
     data = review.data
-    if len(data.poses) < 2:
-        return ""
-    ways_m = np.hypot(*np.diff(data.track[:, :2], axis=0).T)[~data.driven]
+    ways_m = data.lengths_m[~data.driven]
     if ways_m.sum() < LEAST_LOST_M:
         return ""
     gaps = f"{len(ways_m)} gap{'s' * (len(ways_m) != 1)}"
     return f"{gaps} over {ways_m.sum():.0f} m: floor between them does not count"
 
 
+def _stood(document: ReviewDocument) -> str:
+    if (stand := document.longest_stand) is None:
+        return ""
+    at = f"from {clock(stand.at_s)} at ({stand.x:.2f}, {stand.y:.2f})"
+    return f"longest {stand.seconds:.1f} s {at}: {', '.join(stand.states)}"
+
+
 def _processor(document: ReviewDocument) -> str:
-    daemon, recorder = document.processor_s or 0.0, document.recorder_processor_s
+    daemon, recorder = document.processor_s, document.recorder_processor_s
+    if not daemon:
+        return ""
     told = f"daemon {amount(daemon, 's')}"
     if document.recorded_s:
         told += f" ({100 * daemon / document.recorded_s:.1f} % of a core)"
@@ -189,7 +187,7 @@ def _processor(document: ReviewDocument) -> str:
 
 def _some(texts: Sequence[str]) -> str:
     more = f"; {len(texts) - MOST_PLACES} more" if len(texts) > MOST_PLACES else ""
-    return "; ".join(texts[:MOST_PLACES]) + more or "none"
+    return "; ".join(texts[:MOST_PLACES]) + more
 
 
 def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
@@ -216,7 +214,8 @@ def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
 
 def _ending(document: ReviewDocument) -> str:
     if document.complete:
-        return "complete: every reachable cell of the order is covered"
+        floor = floor_words(document)
+        return "complete: every cell covered" + (f"; {floor} of floor swept" if floor else "")
     if document.complete is None:
         return "not recorded whether it was completed"
     covered, coverable = document.covered_cells, document.coverable_cells
@@ -233,12 +232,8 @@ def _swept(document: ReviewDocument, text: str) -> str:
 
 
 def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return robot, map, time and settings of a run."""
-    config, grid, parts = document.config, document.map, document.files
-    size = "none"
-    if grid is not None:
-        width, depth = grid.sides_m
-        size = f"{width:.1f} x {depth:.1f} m, {grid.resolution_m:g} m a pixel"
+    """Return version, settings and files of a run."""
+    config, parts = document.config, document.files
     settings = [
         f"{name.rpartition('.')[2] if name != 'planner.name' else 'planner'} {config[name]}"
         for name in CARD_SETTINGS
@@ -247,11 +242,6 @@ def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     megabytes = sum(part.bytes for part in parts) / 1e6
     state = "" if document.is_ended else ", not ended in order"
     return [
-        ("robot", document.robot or "not recorded"),
-        ("began", _began(document.began)),
-        ("duration", clock(document.duration_s)),
-        *clock_rows(document),
-        ("map", size),
         ("version", document.version or "not recorded"),
         ("settings", ", ".join(settings) or "not recorded"),
         ("recording", f"{len(parts)} part{'s' * (len(parts) != 1)}, {megabytes:.1f} MB{state}"),
@@ -279,8 +269,8 @@ def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
 
 
 def replan_rows(review: Review) -> list[tuple[str, ...]]:
-    """Return the slowest replans: time, duration, plan, change of the map, reason."""
-    return [_replan_row(path) for path in review.replans.slowest_first(MOST_REPLANS)]
+    """Return the replans: time, duration, plan, change of the map, reason."""
+    return [_replan_row(path) for path in review.replans.later]
 
 
 def _replan_row(path: PathSample) -> tuple[str, ...]:
@@ -294,11 +284,6 @@ def _replan_row(path: PathSample) -> tuple[str, ...]:
         _place(about.changed),
         plain(about.reason),
     )
-
-
-def moment_rows(review: Review) -> list[tuple[str, ...]]:
-    """Return the worst moments: figure, value, time and note."""
-    return [(m.what, amount(m.value, m.unit), clock(m.at_s), plain(m.note)) for m in review.moments]
 
 
 def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:

@@ -15,7 +15,6 @@ from fasaco_edge.mission.orders.order import order_document
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnGrid, DrawnLine, drawings
 from fasaco_edge.review.orders import command_words
-from fasaco_edge.review.output.panels import covered_share
 from fasaco_edge.review.review import Review
 
 # Limit on the pheromone fields of a table, besides the last one.
@@ -118,18 +117,6 @@ def _paths(review: Review) -> Iterator[Table]:
         (AT, REVISION, place, X, Y),
         _points(review),
     )
-    columns = (
-        AT,
-        Column("took_ms", "float", "ms", "duration of planning"),
-        Column("attempt", "bool", "", "whether it was only to make the path better"),
-        Column("used", "bool", "", "whether it became a path"),
-        REASON,
-    )
-    plans = (
-        (round(p.at_s, 6), round(p.took_ms, 3), p.is_attempt, p.is_used, p.reason)
-        for p in data.plan_log.plans
-    )
-    yield Table("plans", "a plan that was made, also one that became no path", columns, plans)
 
 
 def _points(review: Review) -> Iterator[tuple[object, ...]]:
@@ -170,10 +157,7 @@ def _mission(review: Review) -> Iterator[Table]:
     yield Table("states", "a state of the mission", columns, states)
     yield _rooms(review)
     share = Column("share", "float", "", "of the cells coverable at the end")
-    covered = (
-        (round(at, 6), round(part, 6))
-        for at, part in zip(*(each.tolist() for each in covered_share(review)), strict=True)
-    )
+    covered = ((round(at, 6), round(part, 6)) for at, part in review.covered_share.tolist())
     yield Table("coverage", "the share covered at a time", (AT, share), covered)
     columns = (
         AT,

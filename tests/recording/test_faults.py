@@ -1,4 +1,4 @@
-"""A recorder that is killed leaves all but the last second; see ``kill_campaign`` for many."""
+"""Short forms of the campaigns: a recorder that is killed, and a disk that is full."""
 
 from __future__ import annotations
 
@@ -7,9 +7,21 @@ import pytest
 pytest.importorskip("rerun")
 
 from tests.campaigns.kill_recorder import GOAL_LOST_S, run_campaign
+from tests.campaigns.recorder_disk import DISK, run_episodes
+from tests.support.disks import disk_fixture
 
+disk = disk_fixture(DISK)
 # The goal itself is the campaign's to measure: this machine may have others to serve, too.
 PATIENCE_S = 9.0
+
+
+def test_each_full_disk_is_told_once_and_all_parts_are_readable(disk):
+    done = run_episodes(disk, episodes=2)
+    assert done.on_log == done.in_recording == 2
+    assert done.parts == 3
+    assert done.rows > 0
+    assert done.lost > 0
+    assert done.exit_code == 0
 
 
 def test_a_kill_costs_what_was_said_last():

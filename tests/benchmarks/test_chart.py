@@ -1,7 +1,8 @@
 """Charts: their names, and the numbers on their axes."""
 
-from fasaco_edge.drawing import chart, palette
-from fasaco_edge.drawing.chart import Axis, Line, Panel, draw_panels
+from fasaco_edge.drawing import palette
+from tests.benchmarks import chart
+from tests.benchmarks.chart import Axis, Line, Panel, draw_panels
 
 
 def test_the_unit_stands_below_the_caption(monkeypatch):
