@@ -8,19 +8,16 @@ is opposite to it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import replace
 
 from fasaco_edge.follow.estimate import Limits
 from fasaco_edge.follow.route import (
     BEGINNING_M,
-    CHUNK,
-    LEAST_LEG_M,
     NEAREST_M,
     Joining,
     Leg,
     Route,
-    leg_between,
 )
 from fasaco_edge.grid.geometry import Point, Pose2D
 
@@ -32,14 +29,12 @@ class CurveRoute(Route):
     """A curve, and the leg of it that the robot is on.
 
     Args:
-        take: returns the next poses of the path, at most as many as asked for.
+        poses: of the path, read as they are needed.
         limits: of the base.
     """
 
-    def __init__(self, take: Callable[[int], list[Pose2D]], limits: Limits) -> None:
-        super().__init__(lambda _: [], limits)
-        self._take_poses = take
-        self._poses: list[Pose2D] = []
+    def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
+        super().__init__(poses, limits)
         # The leg before the first one, unless the robot comes to rest between them.
         self._behind: Leg | None = None
 
@@ -90,26 +85,9 @@ class CurveRoute(Route):
             return Joining.AT_REST
         return Joining.ELSEWHERE if math.dist(here, leg.start) > BEGINNING_M else Joining.JOINED
 
-    def _fill(self, count: int) -> None:
-        while len(self._legs) < count and self._read():
-            leg, after = self._leg_of(0), self._leg_of(1) if len(self._poses) > 2 else None
-            stops = after is None or after.is_back != leg.is_back
-            self._legs.append(replace(leg, most=0.0 if stops else math.inf))
-            del self._poses[0]
+    def _leg_between(self, start: Pose2D, end: Pose2D) -> Leg:
+        leg = super()._leg_between(start, end)
+        return replace(leg, is_back=leg.ux * math.cos(start.yaw) + leg.uy * math.sin(start.yaw) < 0)
 
-    def _leg_of(self, number: int) -> Leg:
-        """Return the leg from one of the poses ahead to the next one."""
-        start, end = self._poses[number : number + 2]
-        leg = leg_between((start.x, start.y), (end.x, end.y))
-        along = leg.ux * math.cos(start.yaw) + leg.uy * math.sin(start.yaw)
-        return replace(leg, is_back=along < 0.0)
-
-    def _read(self) -> bool:
-        while len(self._poses) < 3 and not self._is_read:
-            poses = self._take_poses(CHUNK)
-            self._is_read = len(poses) < CHUNK
-            for pose in poses:
-                last = self._poses[-1] if self._poses else None
-                if last is None or math.hypot(pose.x - last.x, pose.y - last.y) >= LEAST_LEG_M:
-                    self._poses.append(pose)
-        return len(self._poses) >= 2
+    def _ending(self, leg: Leg, after: Leg) -> Leg:
+        return replace(leg, most=math.inf if after.is_back == leg.is_back else 0.0)

@@ -103,10 +103,7 @@ class Follower(Supervision):
     def _have(self, points: PathPoints) -> None:
         if not self._is_new:
             self._before = self._route
-        if self._limits.turn_radius:
-            self._route = CurveRoute(points.take_poses, self._limits)
-        else:
-            self._route = Route(points.take, self._limits)
+        self._route = (CurveRoute if self._limits.turn_radius else Route)(points, self._limits)
         self._is_new = True
 
     def _withdraw(self) -> None:

@@ -5,7 +5,7 @@ reaches the end: Nav2 switches to it without a stop. Where the path returns to i
 begins only shortly before the end: a controller continues at the nearest part of a path, and would
 skip the rest of the last goal. The last pose of a goal has the heading in which the path leads on:
 the robot turns while the next goal is under way. A robot that cannot turn on the spot gets pieces
-of a curve, see ``follow/curve_pieces.py``. No clock, no session.
+of a curve, each driven forward or backward as a whole. No clock, no session.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.curve_pieces import CurveLine
 from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
 from fasaco_edge.follow.pieces import LEAST_M, STEP_M, Line, end_of_piece
@@ -345,7 +344,7 @@ class Nav2Follower(Supervision):
         self._here, self._came_at = here, now
 
     def _have(self, points: PathPoints) -> None:
-        self._next = CurveLine(points.take_poses) if self._is_curved else Line(points.take)
+        self._next = Line(points, is_curved=self._is_curved)
 
     def _withdraw(self) -> None:
         self._path = self._next = None

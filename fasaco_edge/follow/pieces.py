@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Iterable
 
-from fasaco_edge.grid.geometry import Point
+from fasaco_edge.follow.route import apart
+from fasaco_edge.grid.geometry import Point, Pose2D
 
 # Spacing of the poses of a piece [m]: controllers search the nearest one.
 STEP_M = 0.05
@@ -22,8 +23,8 @@ APART = 2.0
 CORNER_RAD = math.radians(60.0)
 # Longest piece [m].
 MOST_M = 20.0
-# Points are read on demand, this many at a time.
-CHUNK = 500
+# A robot that cannot turn on the spot changes between forward and backward at a sharper bend [rad].
+REVERSAL_RAD = math.radians(120.0)
 # Points nearer to each other than this count as one [m].
 LEAST_M = 1e-3
 
@@ -32,26 +33,32 @@ class Line:
     """A path parametrised by arc length, from 0 at its start.
 
     Args:
-        take: returns the next points of the path [m], at most as many as asked for.
+        poses: of the path, read as they are needed.
+        is_curved: whether the robot cannot turn on the spot, and may drive backward.
     """
 
-    def __init__(self, take: Callable[[int], list[Point]]) -> None:
-        self._take = take
+    def __init__(self, poses: Iterable[Pose2D], *, is_curved: bool = False) -> None:
+        self._coming = apart(poses, LEAST_M)
+        self._is_curved = is_curved
+        # Robot's heading at its beginning [rad].
+        self._yaw = 0.0
         self._points: list[Point] = []
         self._ways: list[float] = []
-        self._is_read = False
 
     def length(self, most: float) -> float:
         """Return its length, at most ``most`` [m]."""
-        while not self._is_read and (not self._ways or self._ways[-1] < most):
-            points = self._take(CHUNK)
-            self._is_read = len(points) < CHUNK
-            for point in points:
-                way = math.dist(self._points[-1], point) if self._points else 0.0
-                if not self._points or way >= LEAST_M:
-                    self._points.append(point)
-                    self._ways.append(self._ways[-1] + way if self._ways else 0.0)
-        return min(self._ways[-1], most) if self._ways else 0.0
+        while not self._ways or self._ways[-1] < most:
+            pose = next(self._coming, None)
+            if pose is None:
+                return self._ways[-1] if self._ways else 0.0
+            point = pose.x, pose.y
+            if self._points:
+                self._ways.append(self._ways[-1] + math.dist(self._points[-1], point))
+            else:
+                self._yaw = pose.yaw
+                self._ways.append(0.0)
+            self._points.append(point)
+        return most
 
     def at(self, way: float) -> Point:
         """Return the point at an arc length [m]; the end or begin for values beyond."""
@@ -89,12 +96,20 @@ class Line:
         return self.bends(start, stop, CORNER_RAD)
 
     def reversals(self, start: float, stop: float) -> list[float]:
-        """Return the arc lengths where a piece must end; see ``CurveLine``. Here there are none."""
-        return []
+        """Return the arc lengths between two limits where the robot turns back, in order [m].
+
+        A piece ends there: the robot comes to rest, and a controller that may reverse would cut
+        the ends of lanes. One that turns on the spot always drives forward.
+        """
+        return self.bends(start, stop, REVERSAL_RAD) if self._is_curved else []
 
     def is_back(self, way: float) -> bool:
-        """Return whether the robot drives backward from an arc length on; see ``CurveLine``."""
-        return False
+        """Return whether the robot drives backward from an arc length on."""
+        if not self._is_curved:
+            return False
+        (x, y), (to_x, to_y) = self.at(0.0), self.at(LEAST_M)
+        along = math.atan2(to_y - y, to_x - x) - self._yaw
+        return (len(self.reversals(0.0, way)) % 2 == 1) != (math.cos(along) < 0.0)
 
     def bends(self, start: float, stop: float, least: float) -> list[float]:
         """Return the arc lengths of bends of more than ``least`` [rad] between two limits [m]."""

@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice, pairwise
 
 from fasaco_edge.follow.estimate import Limits
 from fasaco_edge.follow.rounding import rounding
-from fasaco_edge.grid.geometry import Point
+from fasaco_edge.grid.geometry import Point, Pose2D
 
-# Points are read on demand, this many at a time.
-CHUNK = 500
 # Shorter legs have no direction of their own [m].
 LEAST_LEG_M = 1e-3
 # A new path is joined where it passes the robot within this distance of its start [m]: the robot
@@ -103,22 +102,19 @@ class Route:
     """A path, and the leg of it that the robot is on.
 
     Args:
-        take: returns the next points of the path [m], at most as many as asked for.
+        poses: of the path, read as they are needed.
         limits: of the base.
 
     Attributes:
         rounds: greatest speed in the corner that the robot rounds to its leg; 0 for none [m/s].
     """
 
-    def __init__(self, take: Callable[[int], list[Point]], limits: Limits) -> None:
+    def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
         self.rounds = 0.0
-        self._take = take
         self._limits = limits
-        # The first leg is the one that the robot is on; the end of the last leg may not be known
-        # yet.
+        # The first leg is the one that the robot is on; those that are not needed yet are coming.
         self._legs: list[Leg] = []
-        self._ahead: list[Point] = []
-        self._is_read = False
+        self._coming = self._legs_along(poses)
         # How far the robot was from the corner that it returns to; infinity if it does not return
         # [m].
         self._missed_by = math.inf
@@ -126,8 +122,7 @@ class Route:
     @property
     def leg(self) -> Leg | None:
         """The leg that the robot is on; None once the path is driven."""
-        self._fill(1)
-        return self._legs[0] if self._legs else None
+        return self._leg(0)
 
     def next_leg(self, here: Point | None = None) -> None:
         """Go on to the next leg.
@@ -137,7 +132,7 @@ class Route:
         brought it nearer: a robot whose pose is late, or not of the point that it turns about,
         would otherwise circle for ever about a corner that it cannot hit.
         """
-        self._fill(2)
+        self._leg(1)
         corner = self._legs[0].end if self._legs else None
         del self._legs[:1]
         before, self._missed_by = self._missed_by, math.inf
@@ -309,32 +304,37 @@ class Route:
         return index
 
     def _leg(self, index: int) -> Leg | None:
-        self._fill(index + 1)
+        self._legs += islice(self._coming, max(index + 1 - len(self._legs), 0))
         return self._legs[index] if index < len(self._legs) else None
 
-    def _fill(self, count: int) -> None:
-        """Read until there are ``count`` legs, if the path has them."""
-        while len(self._legs) < count and self._read():
-            start, end = self._ahead[:2]
-            leg = leg_between(start, end)
-            if len(self._ahead) > 2:
-                after = leg_between(end, self._ahead[2])
-                turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
-                room = 0.5 * min(leg.length, after.length)
-                most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
-                leg = replace(leg, most=most, early_s=early_s)
-            self._legs.append(leg)
-            del self._ahead[0]
+    def _legs_along(self, poses: Iterable[Pose2D]) -> Iterator[Leg]:
+        leg = None
+        for start, end in pairwise(apart(poses, LEAST_LEG_M)):
+            after = self._leg_between(start, end)
+            if leg is not None:
+                yield self._ending(leg, after)
+            leg = after
+        if leg is not None:
+            yield leg
 
-    def _read(self) -> bool:
-        """Read the next two points and the one after them, if there is one."""
-        while len(self._ahead) < 3 and not self._is_read:
-            points = self._take(CHUNK)
-            self._is_read = len(points) < CHUNK
-            for point in points:
-                if not self._ahead or math.dist(point, self._ahead[-1]) >= LEAST_LEG_M:
-                    self._ahead.append(point)
-        return len(self._ahead) >= 2
+    def _leg_between(self, start: Pose2D, end: Pose2D) -> Leg:
+        return leg_between((start.x, start.y), (end.x, end.y))
+
+    def _ending(self, leg: Leg, after: Leg) -> Leg:
+        """Return a leg with what the robot does at its end, where it goes on to another one."""
+        turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
+        room = 0.5 * min(leg.length, after.length)
+        most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
+        return replace(leg, most=most, early_s=early_s)
+
+
+def apart(poses: Iterable[Pose2D], least: float) -> Iterator[Pose2D]:
+    """Yield the poses that are at least so far from the one yielded before [m]."""
+    last = None
+    for pose in poses:
+        if last is None or math.hypot(pose.x - last.x, pose.y - last.y) >= least:
+            yield pose
+            last = pose
 
 
 def leg_between(start: Point, end: Point) -> Leg:

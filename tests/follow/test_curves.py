@@ -81,14 +81,8 @@ def test_it_sweeps_a_room_without_a_touch(reverses, conditions, off_m):
 
 
 def test_a_leg_is_driven_backward_where_the_heading_is_opposite():
-    poses = [
-        Pose2D(1.0, 1.0),
-        Pose2D(2.0, 1.0),
-        Pose2D(1.5, 1.0),
-        Pose2D(1.5, 1.0),
-        Pose2D(1.2, 1.0),
-    ]
-    route = CurveRoute(lambda _: [poses.pop(0) for _ in poses[:]], replace(LIMITS, turn_radius=0.4))
+    poses = [Pose2D(x, 1.0) for x in (1.0, 2.0, 1.5, 1.5, 1.2)]
+    route = CurveRoute(poses, replace(LIMITS, turn_radius=0.4))
     legs = []
     while route.leg is not None:
         legs.append((route.leg.is_back, route.leg.stops))
