@@ -140,15 +140,15 @@ def _become_small(args: argparse.Namespace) -> NoReturn:
 
 def _drive() -> int:
     """Drive, in the small process."""
-    from fasaco_edge.follow.node import native_node, run_follower
+    from fasaco_edge.follow.node import FollowerNode, run_follower
     from fasaco_edge.follow.settings import FollowSettings
 
     settings = FollowSettings.decode(sys.stdin.buffer.read())
-    node_of: Callable[[Bus, FollowSettings, Callable[[str], None]], Node] = native_node
+    node_of: Callable[[Bus, FollowSettings, Callable[[str], None]], Node] = FollowerNode
     if settings.nav2:
-        from fasaco_edge.follow.nav2_node import nav2_node as node_of
-    elif settings.ros:
-        from fasaco_edge.follow.ros import ros_node as node_of
+        from fasaco_edge.follow.nav2_node import Nav2Node
+
+        node_of = Nav2Node
     with stop_event() as stop:
         run_follower(settings, stop, node_of, lambda line: print(line, flush=True))
     return Exit.OK

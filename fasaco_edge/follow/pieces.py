@@ -125,12 +125,8 @@ class Line:
                 found.append(self._ways[index])
         return found
 
-    def poses(self, start: float, stop: float) -> list[Point]:
-        """Return points between two arc lengths, ``STEP_M`` apart and at each corner [m]."""
-        return [self.at(way) for way in self.ways(start, stop)]
-
     def ways(self, start: float, stop: float) -> list[float]:
-        """Return the arc lengths of these points."""
+        """Return arc lengths between two, ``STEP_M`` apart and at each corner [m]."""
         first, last = bisect_right(self._ways, start), bisect_right(self._ways, stop)
         bends = [way for way in self._ways[first:last] if start < way < stop]
         ways = [start]

@@ -23,7 +23,7 @@ from fasaco_edge.follow.scanner import (
     speed_before,
     speed_beside,
 )
-from fasaco_edge.follow.supervision import State
+from fasaco_edge.follow.supervision import Reason, State
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.scans import decode_scan
 
@@ -35,12 +35,10 @@ AHEAD_M = 1.5
 PLACE_M, STANDS_S, FORGET_S = 0.1, 1.5, 1.0
 # Points nearer to the robot's middle than this share of its radius are the robot itself.
 OWN_SHARE = 0.7
-# The report of a thing has the points within this distance of it [m].
+# The report of an obstacle has the points within this distance of it [m].
 AROUND_M = 0.5
 # A speed below this counts as 0 [m/s].
 LEAST_M_S = 0.02
-
-Trouble = tuple[State, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,12 +71,15 @@ class Limit:
     Attributes:
         speed: the highest [m/s]; infinite without a limit.
         why: what limits it, in words.
-        thing: the thing that limits it; None for none.
+        around: the points seen around what limits it [m], the nearest first.
     """
 
     speed: float
     why: str = ""
-    thing: Thing | None = None
+    around: tuple[Point, ...] = ()
+
+
+NO_LIMIT = Limit(math.inf)
 
 
 class Sight:
@@ -94,7 +95,7 @@ class Sight:
         self._map = KnownMap(settings.free_at_most)
         self._scan_at: float | None = None
         self._stamp_ns = 0
-        self._fault: Trouble | None = None
+        self._fault: Reason | None = None
         self._is_first = True
         # Occupied squares: when they were first and last seen [s].
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
@@ -126,7 +127,7 @@ class Sight:
         self._fault, self._scan_at = None, now
         self._look(points, pose, now)
 
-    def trouble(self, frame: str, now: float) -> Trouble | None:
+    def trouble(self, frame: str, now: float) -> Reason | None:
         """Return why the robot must stand, with figures; None if it can see.
 
         Args:
@@ -156,8 +157,6 @@ class Sight:
             acceleration: of the base [m/s^2].
             period: from one command to the next [s].
         """
-        if not self.things:
-            return Limit(math.inf)
         radius = self._settings.radius
         speed, thing = speed_beside(self.things, pose, radius, acceleration)
         why = "something moves"
@@ -165,16 +164,13 @@ class Sight:
         if met is not None and (ahead := speed_before(met.way, acceleration, period)) < speed:
             speed, thing, why = ahead, met.thing, "something stands"
         if thing is None:
-            return Limit(math.inf)
+            return NO_LIMIT
         far = max(math.dist((pose.x, pose.y), thing[:2]) - radius, 0.0)
-        return Limit(speed if speed >= LEAST_M_S else 0.0, f"{why} {far:.2f} m away", thing)
-
-    def around(self, thing: Thing | None) -> tuple[Point, ...]:
-        """Return the points seen within ``AROUND_M`` of a thing [m], the nearest first."""
-        if thing is None:
-            return ()
+        if speed >= LEAST_M_S:
+            return Limit(speed)
         apart = sorted((math.dist(thing[:2], other[:2]), other[:2]) for other in self.things)
-        return tuple(place for far, place in apart if far <= AROUND_M)
+        around = tuple(place for off, place in apart if off <= AROUND_M)
+        return Limit(0.0, f"{why} {far:.2f} m away", around)
 
     def _look(self, points: list[Point], pose: Pose2D, now: float) -> None:
         """Keep points that no map shows, and separate standing things from those that may move."""

@@ -155,7 +155,7 @@ def test_a_pose_that_is_too_old_stops_it_until_the_next(told):
 
 
 def test_a_pose_that_is_none_stops_it(told):
-    told.follower.refuse_pose(MalformedMessage("pose.position.x must be ..., got nan"))
+    told.follower.pose_fault = MalformedMessage("pose.position.x must be ..., got nan")
     assert told.step() == STAND
     assert told.follower.state is State.BAD_POSE
     assert "nan" in told.follower.detail

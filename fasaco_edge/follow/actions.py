@@ -1,0 +1,253 @@
+"""Goals of a ROS 2 action: requests to its server, cancellations until they are confirmed, and its
+client on the bus.
+
+rmw_zenoh shows the server's types and keys in its graph; a bridge does not, and is queried by name.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.messages.follow_path import (
+    ENDED_BEFORE,
+    NO_SUCH_GOAL,
+    TAKEN,
+    decode_accepted,
+    decode_cancel,
+    encode_cancel,
+    encode_goal_id,
+)
+from fasaco_edge.wire.ros_keys import (
+    Call,
+    RosNode,
+    attachment,
+    bridge_keys,
+    gid_of,
+    served_keys,
+    server_tokens,
+)
+
+_Value = TypeVar("_Value")
+
+# Retry period of a cancellation [s].
+CANCEL_EVERY_S = 1.0
+# Limit on the goals cancelled at a time, the newest ones: a server drives no other.
+MOST_CANCELLED = 8
+# Timeout of a reply [s], and of a result, which comes only when the goal has ended.
+ANSWER_S, RESULT_S = 2.5, 300.0
+# Period of searching the graph for the action's server [s].
+LOOK_EVERY_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class SendGoal:
+    """A request to begin a goal."""
+
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class AskResult:
+    """A query for the result of a goal; the reply comes when it has ended."""
+
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoal:
+    """A request to cancel a goal."""
+
+    id: bytes
+
+
+Request = SendGoal | AskResult | CancelGoal
+
+
+class Sender(Protocol):
+    """Who sends goals, and takes what comes of them."""
+
+    def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
+        """Take in whether a goal was accepted; None without an answer: the server must end it."""
+
+    def take_ending(
+        self,
+        goal_id: bytes,
+        ending: Any,  # noqa: ANN401 - what ``read_ending`` returns
+        why: str,
+        now: float,
+    ) -> None:
+        """Take in how a goal ended; None if the server's words are malformed."""
+
+    def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
+        """Take in that a query for a result ended after some time [s] without a reply."""
+
+    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
+        """Take in the answer to a request to cancel; None without one."""
+
+
+@dataclass(slots=True)
+class _Cancellation:
+    """A goal to cancel: whether the server has answered it, else it may not know it yet; and the
+    time of the last request [s]."""
+
+    is_known: bool = True
+    asked_at: float = -math.inf
+
+
+class Cancellations:
+    """The goals to cancel that the server has not confirmed yet."""
+
+    def __init__(self) -> None:
+        self._goals: dict[bytes, _Cancellation] = {}
+
+    def add(self, goal_id: bytes, *, is_known: bool = True) -> None:
+        """Cancel a goal; ``is_known``: whether the server has answered it."""
+        self._goals[goal_id] = _Cancellation(is_known)
+        while len(self._goals) > MOST_CANCELLED:
+            del self._goals[next(iter(self._goals))]
+
+    def drop(self, goal_id: bytes) -> None:
+        """Take in that a goal has ended, or was never sent."""
+        self._goals.pop(goal_id, None)
+
+    def take_accepted(self, goal_id: bytes, accepted: bool | None) -> None:
+        """Take in whether a goal was accepted; None without an answer."""
+        if goal_id in self._goals:
+            self.drop(goal_id)
+            if accepted is not False:
+                self.add(goal_id)
+
+    def take_answer(self, goal_id: bytes, code: int | None) -> None:
+        """Take in the answer to a cancellation; None without one."""
+        goal = self._goals.get(goal_id)
+        if goal and goal.is_known and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
+            self.drop(goal_id)
+
+    def due(self, now: float) -> list[Request]:
+        """Return the cancellations to send now, each every ``CANCEL_EVERY_S``."""
+        due = [one for one, goal in self._goals.items() if now - goal.asked_at >= CANCEL_EVERY_S]
+        for goal_id in due:
+            self._goals[goal_id].asked_at = now
+        return [CancelGoal(goal_id) for goal_id in due]
+
+
+class ActionClient:
+    """Sends requests to the server of an action, and passes on its replies.
+
+    Args:
+        bus: the session.
+        ros: how ROS is connected to Zenoh, as in ``FollowSettings``.
+        action: its name.
+        types: its types.
+        sender: takes the replies, in ``turn``.
+        read_ending: decodes a result.
+        clock: returns the time for the sender [s].
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        ros: Mapping[str, Any],
+        action: str,
+        types: tuple[str, ...],
+        sender: Sender,
+        read_ending: Callable[[bytes], object],
+        clock: Callable[[], float],
+    ) -> None:
+        self._bus, self._sender = bus, sender
+        self._read_ending, self._clock = read_ending, clock
+        self._domain: int = ros["domain"]
+        self._action, self._types = action, types
+        self._sequence = 0
+        self._gid = b""
+        self._roll = None
+        # Replies, from Zenoh's threads.
+        self._replies = deque[Callable[[], None]]()
+        if ros["kind"] == "rmw_zenoh":
+            node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
+            self._gid = gid_of(f"{node.token}/{action}")
+            self._roll = bus.roll(server_tokens(self._domain, action))
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether the graph shows servers, and their types."""
+        return self._roll is not None
+
+    def keys(self) -> dict[Call, str]:
+        """Return the keys of the server's services; none if the graph shows no server."""
+        if self._roll is None:
+            return bridge_keys(self._action)
+        return served_keys(self._domain, self._action, self._roll.there(), self._types)
+
+    @property
+    def waiting(self) -> int:
+        """Number of replies that have come, or will not come, and were not passed on."""
+        return len(self._replies)
+
+    def turn(self) -> None:
+        """Look for the server at intervals, and pass on the replies that have come."""
+        if self._roll is not None:
+            self._roll.ask(LOOK_EVERY_S)
+        while self._replies:
+            self._replies.popleft()()
+
+    def ask(self, request: Request, goal: bytes = b"") -> None:
+        """Send a request; ``goal``: what is sent to begin a goal."""
+        if isinstance(request, SendGoal):
+            self._ask("send_goal", goal, partial(self._take_accepted, request.id))
+        elif isinstance(request, AskResult):
+            take = partial(self._take_result, request.id, time.monotonic())
+            self._ask("get_result", encode_goal_id(request.id), take)
+        else:
+            take = partial(self._take_cancelled, request.id)
+            self._ask("cancel_goal", encode_cancel(request.id), take)
+
+    def _take_accepted(self, goal_id: bytes, reply: bytes | None) -> None:
+        accepted, why = self._read(decode_accepted, reply)
+        self._sender.take_accepted(goal_id, accepted, why, self._clock())
+
+    def _take_result(self, goal_id: bytes, asked_at: float, reply: bytes | None) -> None:
+        if reply is None:
+            self._sender.take_silence(goal_id, time.monotonic() - asked_at, self._clock())
+        else:
+            ending, why = self._read(self._read_ending, reply)
+            self._sender.take_ending(goal_id, ending, why, self._clock())
+
+    def _take_cancelled(self, goal_id: bytes, reply: bytes | None) -> None:
+        self._sender.take_cancelled(goal_id, self._read(decode_cancel, reply)[0])
+
+    def _read(
+        self, decode: Callable[[bytes], _Value], reply: bytes | None
+    ) -> tuple[_Value | None, str]:
+        """Return what a reply says; None, and why, without a reply or for a malformed one."""
+        if reply is None:
+            return None, f"{self._action} did not answer"
+        try:
+            return decode(reply), ""
+        except MalformedMessage as error:
+            return None, str(error)
+
+    def _ask(self, call: Call, payload: bytes, take: Callable[[bytes | None], None]) -> None:
+        """Send a request; ``take`` gets the reply in ``turn``, None for none."""
+
+        def end(replies: list[Reply]) -> None:
+            reply = next((reply.payload for reply in replies if not reply.is_error), None)
+            self._replies.append(partial(take, reply))
+
+        key = self.keys().get(call)
+        if key is None:
+            end([])
+            return
+        self._sequence += 1
+        beside = attachment(self._sequence, time.time_ns(), self._gid) if self._gid else b""
+        timeout_s = RESULT_S if call == "get_result" else ANSWER_S
+        self._bus.ask(key, payload, beside, timeout_s, end)
