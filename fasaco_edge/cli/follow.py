@@ -221,7 +221,6 @@ def _scan(config: DaemonConfig) -> dict[str, object]:
             "yaw": math.radians(scan.yaw_deg),
             "upside_down": scan.upside_down,
         },
-        "radius_m": config.robot.radius_m,
         "lost_s": scan.lost_s,
         "free_at_most": config.map.free_at_most,
         "most_pixels": config.map.max_pixels,

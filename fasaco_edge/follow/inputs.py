@@ -19,8 +19,9 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.follow.daemons import Daemons, News
 from fasaco_edge.follow.follower import Follower
+from fasaco_edge.follow.scanner import Mount
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
-from fasaco_edge.follow.sight import Sight, SightSettings
+from fasaco_edge.follow.sight import Sight
 from fasaco_edge.follow.supervision import Supervision
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -177,8 +178,10 @@ class ScanInputs:
     """
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
-        self.sight = Sight(SightSettings.of(settings.scan))
-        self._most_map_bytes: int = settings.scan["most_pixels"] + HEADER_BYTES
+        scan = settings.scan
+        mount = Mount(**scan["mount"])
+        self.sight = Sight(mount, settings.radius_m, scan["lost_s"], scan["free_at_most"])
+        self._most_map_bytes: int = scan["most_pixels"] + HEADER_BYTES
         self._scans = deque[tuple[Sample, float]](maxlen=MOST_SCANS)
         self._maps = deque[tuple[bool, bytes]](maxlen=MOST_UPDATES)
         self._publisher = WatchedPublisher("scans", topics.SCAN.one_publisher_s, bus)
@@ -190,7 +193,7 @@ class ScanInputs:
         }
         for topic in (topics.MAP, topics.MAP_UPDATE, topics.SCAN):
             bus.listen(keys, topic, takers[topic.name])
-        for name, key, latched, depth in settings.scan["topics"]:
+        for name, key, latched, depth in scan["topics"]:
             in_order = name in topics.IN_ORDER
             bus.subscribe(key, takers[name], latched, depth, in_order=in_order)
 

@@ -51,7 +51,7 @@ class FollowSettings:
             distance of goals to themselves [m].
         dock: if Nav2's docking server docks: names of its actions, dock, its type, frame, pose x,
             y [m], yaw [rad], and how far in front of it paths end [m].
-        scan: if scans are used: where the lidar is (``mount``), ``radius_m`` of the robot,
+        scan: if scans are used: where the lidar is (``mount``),
             ``lost_s``, ``free_at_most``, ``most_pixels`` of a map, and further topics of scans,
             maps and updates: name, key, whether it is latched, depth.
         radius_m: of the robot's disc; 0 if unknown.

@@ -24,7 +24,7 @@ from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
 from fasaco_edge.follow.estimate import Command, Limits
 from fasaco_edge.follow.follower import Follower
 from fasaco_edge.follow.scanner import Mount
-from fasaco_edge.follow.sight import Sight, SightSettings
+from fasaco_edge.follow.sight import Sight
 from fasaco_edge.follow.standstill import Standstill, report_of
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -199,10 +199,8 @@ def _sight(config: DaemonConfig) -> Sight | None:
     """Return what the follower sees by; None without scans."""
     if not config.scan:
         return None
-    settings = SightSettings(
-        Mount(), config.robot.radius_m, config.scan.lost_s, config.map.free_at_most
-    )
-    return Sight(settings)
+    scan = config.scan
+    return Sight(Mount(), config.robot.radius_m, scan.lost_s, config.map.free_at_most)
 
 
 def _follower(config: DaemonConfig, sight: Sight | None) -> Follower:
