@@ -46,11 +46,8 @@ class CurveRoute(Route):
 
     def carrot(self, along: float, ahead: float) -> Point:
         """Return the point ``ahead`` of ``along`` the leg [m]; past a stop, further on the arc."""
-        before, leg, index, to = self._behind, self._leg(0), 0, along + ahead
-        assert leg is not None
-        while to > leg.length and leg.bends and (after := self._leg(index + 1)):
-            to -= leg.length
-            before, leg, index = leg, after, index + 1
+        leg, before, to = self._leg_at(along + ahead)
+        before = before or self._behind
         beyond = to - leg.length
         if beyond <= 0.0 or before is None or max(before.length, leg.length) > CHORD_M:
             return leg.at(to)
@@ -70,9 +67,7 @@ class CurveRoute(Route):
         leg = self.leg
         if leg is None:
             return Joining.JOINED
-        target = before.leg.end if before is not None and before.leg is not None else None
-        index = self._leg_to(target) if target is not None else None
-        index = self._nearest(here) if index is None else index
+        index, _ = self._passing(here, before)
         if self._legs[index].distance(here) <= NEAREST_M:
             del self._legs[:index]
             return Joining.JOINED

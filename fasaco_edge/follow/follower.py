@@ -120,7 +120,8 @@ class Follower(Supervision):
                 return None
             self._is_new, self._before = False, None
         leg = self._route.leg
-        toward = self._route.toward(here, LEADS_M)
+        x, y = self._route.line_ahead(here, LEADS_M)[-1]
+        toward = math.atan2(y - here[1], x - here[0])
         if leg is not None and self._grip.is_lost(self._estimate, toward, now):
             self.state, self.detail = State.NOT_MOVING, self._grip.detail
             self.ahead = floor_ahead(here, toward, self._radius)

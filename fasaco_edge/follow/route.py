@@ -167,59 +167,39 @@ class Route:
         """Return how far ahead of ``along`` the robot must be slow [m], and its greatest speed
         there [m/s]; at least one place, up to the next stop or beyond ``horizon`` [m]."""
         found: list[tuple[float, float]] = []
-        left, index = -along, 0
-        while leg := self._leg(index):
+        left = -along
+        for leg in self._ahead():
             left += leg.length
             if not leg.bends or left > horizon:
                 found.append((left - leg.early_s * leg.most if leg.early_s else left, leg.most))
             if leg.stops or left > horizon:
                 break
-            index += 1
         return found
 
     def carrot(self, along: float, ahead: float) -> Point:
         """Return the point ``ahead`` of ``along`` the leg [m]; past a corner, straight on."""
-        index, to = 0, along + ahead
-        leg = self._leg(0)
-        assert leg is not None
-        while to > leg.length and leg.bends and (after := self._leg(index + 1)):
-            to -= leg.length
-            leg, index = after, index + 1
+        leg, _, to = self._leg_at(along + ahead)
         return leg.at(to)
 
     def line_ahead(self, here: Point, ahead: float) -> list[Point]:
         """Return the corners of the route from ``here`` on, at most ``ahead`` further [m]."""
-        line, index = [here], 0
-        while ahead > 0.0 and (leg := self._leg(index)):
+        line = [here]
+        for leg in self._ahead():
+            (x0, y0), (x1, y1) = line[-1], leg.end
             length = math.dist(line[-1], leg.end)
             share = min(ahead / length, 1.0) if length > 0.0 else 1.0
-            (x0, y0), (x1, y1) = line[-1], leg.end
             line.append((x0 + share * (x1 - x0), y0 + share * (y1 - y0)))
             ahead -= length
-            index += 1
+            if ahead <= 0.0:
+                break
         return line
-
-    def toward(self, here: Point, ahead: float) -> float:
-        """Return the direction from ``here`` to the point ``ahead`` along the route [rad].
-
-        Past corners, too: a path that begins a little beside the robot leads the same way.
-        """
-        leg, index = self._leg(0), 0
-        if leg is None:
-            return 0.0
-        to = min(max(leg.placed(here)[0], 0.0), leg.length) + ahead
-        while to > leg.length and (after := self._leg(index + 1)):
-            to -= leg.length
-            leg, index = after, index + 1
-        x, y = leg.at(min(to, leg.length))
-        return math.atan2(y - here[1], x - here[0])
 
     def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
         """Find the leg that passes the robot, near the beginning of a new path.
 
         That is the leg to the corner that the robot was driving to, if the path has it: on the same
-        leg it just goes on. Otherwise it is the leg where the distance to the robot stops
-        decreasing. If the path begins further along the last one, that one is driven until there.
+        leg it just goes on. If the path begins further along the last one, that one is driven until
+        there.
 
         Args:
             here: the robot's position.
@@ -229,14 +209,12 @@ class Route:
         Returns:
             how it can be joined; if it is, the robot is on its first leg.
         """
-        target = before._legs[0].end if before is not None and before._legs else None
-        kept = self._leg_to(target) if target else None
-        index = self._nearest(here) if kept is None else kept
+        index, is_kept = self._passing(here, before)
         leg = self._leg(index)
         if leg is None:
             return Joining.JOINED
         aside = leg.distance(here)
-        is_same = before is not None and kept is not None and leg.leads_as(before.leg)
+        is_same = before is not None and is_kept and leg.leads_as(before.leg)
         turn = math.atan2(leg.uy, leg.ux) - (heading or 0.0)
         is_along = heading is None or abs(math.remainder(turn, math.tau)) <= ALONG_RAD
         if (is_same and aside <= NEAREST_M) or (aside <= BESIDE_M and is_along):
@@ -262,16 +240,40 @@ class Route:
             self._legs.insert(0, leg_between(here, begin))
         return Joining.JOINED
 
+    def _passing(self, here: Point, before: Route | None) -> tuple[int, bool]:
+        """Return which leg passes ``here``, near the beginning; and whether it ends at the corner
+        that the robot was driving to."""
+        target = before._legs[0].end if before is not None and before._legs else None
+        way = 0.0
+        for index, leg in enumerate(self._ahead()):
+            if target is None or way > JOIN_WITHIN_M:
+                break
+            if math.dist(leg.end, target) <= SAME_M:
+                return index, True
+            way += leg.length
+        # Else it is the leg where the distance to the robot stops decreasing.
+        way, index = 0.0, 0
+        while (one := self._leg(index)) and (after := self._leg(index + 1)):
+            way += one.length
+            is_past = one.placed(here)[0] >= one.length
+            if way > JOIN_WITHIN_M or not is_past or after.distance(here) > one.distance(here):
+                break
+            index += 1
+        return index, False
+
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
         """Return the legs up to a point that they pass soon; none if they do not.
 
         None either for a robot that is off its leg, as the leg does not lead it there.
         """
-        leg = self.leg
-        if leg is None or leg.distance(here) > NEAREST_M:
-            return []
-        way, index = -leg.placed(here)[0], 0
-        while way <= LEAD_M and (leg := self._leg(index)):
+        way = 0.0
+        for index, leg in enumerate(self._ahead()):
+            if index == 0:
+                way = -leg.placed(here)[0]
+                if leg.distance(here) > NEAREST_M:
+                    break
+            if way > LEAD_M:
+                break
             along, aside = leg.placed(point)
             # The robot may be unable to come to rest at a nearer point.
             on_leg = LEAST_LEG_M <= along <= leg.length + LEAST_LEG_M
@@ -279,29 +281,24 @@ class Route:
             if is_ahead and abs(aside) <= BESIDE_M:
                 return [*self._legs[:index], leg_between(leg.start, leg.at(along))]
             way += leg.length
-            index += 1
         return []
 
-    def _leg_to(self, target: Point) -> int | None:
-        """Return which of the first legs ends at ``target``."""
-        way, index = 0.0, 0
-        while way <= JOIN_WITHIN_M and (leg := self._leg(index)):
-            if math.dist(leg.end, target) <= SAME_M:
-                return index
-            way += leg.length
-            index += 1
-        return None
+    def _leg_at(self, to: float) -> tuple[Leg, Leg | None, float]:
+        """Return the leg where the robot is after some way from here [m], up to the next corner;
+        the leg before it, if it is not the first; and how far along it that is [m]."""
+        before = None
+        for leg in self._ahead():
+            if to <= leg.length or not leg.bends:
+                return leg, before, to
+            to, before = to - leg.length, leg
+        raise AssertionError("the last leg does not bend")
 
-    def _nearest(self, here: Point) -> int:
-        """Return the leg at which the distance to ``here`` stops decreasing."""
-        way, index = 0.0, 0
-        while (leg := self._leg(index)) and (after := self._leg(index + 1)):
-            way += leg.length
-            is_past = leg.placed(here)[0] >= leg.length
-            if way > JOIN_WITHIN_M or not is_past or after.distance(here) > leg.distance(here):
-                break
+    def _ahead(self) -> Iterator[Leg]:
+        """Yield the legs, from that of the robot on."""
+        index = 0
+        while (leg := self._leg(index)) is not None:
+            yield leg
             index += 1
-        return index
 
     def _leg(self, index: int) -> Leg | None:
         self._legs += islice(self._coming, max(index + 1 - len(self._legs), 0))
