@@ -44,6 +44,8 @@ CANCEL_EVERY_S = 1.0
 MOST_CANCELLED = 8
 # Timeout of a reply [s], and of a result, which comes only when the goal has ended.
 ANSWER_S, RESULT_S = 2.5, 300.0
+# How long the end of goals is waited for at the exit [s].
+END_S = 1.0
 # Period of searching the graph for the action's server [s].
 LOOK_EVERY_S = 2.0
 
@@ -64,7 +66,7 @@ class AskResult:
 
 @dataclass(frozen=True, slots=True)
 class CancelGoal:
-    """A request to cancel a goal."""
+    """A request to cancel a goal; it is repeated until the server confirms it."""
 
     id: bytes
 
@@ -90,54 +92,53 @@ class Sender(Protocol):
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended after some time [s] without a reply."""
 
-    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
-        """Take in the answer to a request to cancel; None without one."""
-
-
-@dataclass(slots=True)
-class _Cancellation:
-    """A goal to cancel: whether the server has answered it, else it may not know it yet; and the
-    time of the last request [s]."""
-
-    is_known: bool = True
-    asked_at: float = -math.inf
-
 
 class Cancellations:
-    """The goals to cancel that the server has not confirmed yet."""
+    """The goals to cancel, each second until the server confirms it."""
 
     def __init__(self) -> None:
-        self._goals: dict[bytes, _Cancellation] = {}
+        # Time of the last request, by goal [s]; and the goals that the server has not answered:
+        # it may not know them yet.
+        self._asked_at: dict[bytes, float] = {}
+        self._unanswered: set[bytes] = set()
 
-    def add(self, goal_id: bytes, *, is_known: bool = True) -> None:
-        """Cancel a goal; ``is_known``: whether the server has answered it."""
-        self._goals[goal_id] = _Cancellation(is_known)
-        while len(self._goals) > MOST_CANCELLED:
-            del self._goals[next(iter(self._goals))]
+    def add(self, goal_id: bytes) -> None:
+        """Cancel a goal."""
+        self._asked_at[goal_id] = -math.inf
+        while len(self._asked_at) > MOST_CANCELLED:
+            self.drop(next(iter(self._asked_at)))
 
     def drop(self, goal_id: bytes) -> None:
-        """Take in that a goal has ended, or was never sent."""
-        self._goals.pop(goal_id, None)
+        """Take in that a goal has ended."""
+        self._asked_at.pop(goal_id, None)
+
+    @property
+    def are_open(self) -> bool:
+        """Whether the server has to confirm any."""
+        return bool(self._asked_at)
+
+    def take_sent(self, goal_id: bytes) -> None:
+        """Take in that a goal was sent."""
+        self._unanswered.add(goal_id)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None) -> None:
         """Take in whether a goal was accepted; None without an answer."""
-        if goal_id in self._goals:
+        self._unanswered.discard(goal_id)
+        if accepted is False:
             self.drop(goal_id)
-            if accepted is not False:
-                self.add(goal_id)
+        elif goal_id in self._asked_at:
+            self._asked_at[goal_id] = -math.inf
 
     def take_answer(self, goal_id: bytes, code: int | None) -> None:
         """Take in the answer to a cancellation; None without one."""
-        goal = self._goals.get(goal_id)
-        if goal and goal.is_known and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
+        if goal_id not in self._unanswered and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
             self.drop(goal_id)
 
-    def due(self, now: float) -> list[Request]:
-        """Return the cancellations to send now, each every ``CANCEL_EVERY_S``."""
-        due = [one for one, goal in self._goals.items() if now - goal.asked_at >= CANCEL_EVERY_S]
-        for goal_id in due:
-            self._goals[goal_id].asked_at = now
-        return [CancelGoal(goal_id) for goal_id in due]
+    def due(self, now: float) -> list[bytes]:
+        """Return the goals to cancel now."""
+        due = [goal for goal, at in self._asked_at.items() if now - at >= CANCEL_EVERY_S]
+        self._asked_at |= dict.fromkeys(due, now)
+        return due
 
 
 class ActionClient:
@@ -167,6 +168,7 @@ class ActionClient:
         self._read_ending, self._clock = read_ending, clock
         self._domain: int = ros["domain"]
         self._action, self._types = action, types
+        self._cancellations = Cancellations()
         self._sequence = 0
         self._gid = b""
         self._roll = None
@@ -188,31 +190,40 @@ class ActionClient:
             return bridge_keys(self._action)
         return served_keys(self._domain, self._action, self._roll.there(), self._types)
 
-    @property
-    def waiting(self) -> int:
-        """Number of replies that have come, or will not come, and were not passed on."""
-        return len(self._replies)
-
     def turn(self) -> None:
-        """Look for the server at intervals, and pass on the replies that have come."""
+        """Look for the server and cancel goals, at intervals, and pass on the replies."""
         if self._roll is not None:
             self._roll.ask(LOOK_EVERY_S)
         while self._replies:
             self._replies.popleft()()
+        self._cancel()
+
+    def end(self) -> None:
+        """Wait a little until the server has confirmed all cancellations."""
+        ends = time.monotonic() + END_S
+        while self._cancellations.are_open and time.monotonic() < ends:
+            self.turn()
+            time.sleep(0.01)
 
     def ask(self, request: Request, goal: bytes = b"") -> None:
         """Send a request; ``goal``: what is sent to begin a goal."""
         if isinstance(request, SendGoal):
+            self._cancellations.take_sent(request.id)
             self._ask("send_goal", goal, partial(self._take_accepted, request.id))
         elif isinstance(request, AskResult):
             take = partial(self._take_result, request.id, time.monotonic())
             self._ask("get_result", encode_goal_id(request.id), take)
         else:
-            take = partial(self._take_cancelled, request.id)
-            self._ask("cancel_goal", encode_cancel(request.id), take)
+            self._cancellations.add(request.id)
+            self._cancel()
+
+    def _cancel(self) -> None:
+        for goal_id in self._cancellations.due(time.monotonic()):
+            self._ask("cancel_goal", encode_cancel(goal_id), partial(self._take_cancelled, goal_id))
 
     def _take_accepted(self, goal_id: bytes, reply: bytes | None) -> None:
         accepted, why = self._read(decode_accepted, reply)
+        self._cancellations.take_accepted(goal_id, accepted)
         self._sender.take_accepted(goal_id, accepted, why, self._clock())
 
     def _take_result(self, goal_id: bytes, asked_at: float, reply: bytes | None) -> None:
@@ -220,10 +231,12 @@ class ActionClient:
             self._sender.take_silence(goal_id, time.monotonic() - asked_at, self._clock())
         else:
             ending, why = self._read(self._read_ending, reply)
+            if ending is not None:
+                self._cancellations.drop(goal_id)
             self._sender.take_ending(goal_id, ending, why, self._clock())
 
     def _take_cancelled(self, goal_id: bytes, reply: bytes | None) -> None:
-        self._sender.take_cancelled(goal_id, self._read(decode_cancel, reply)[0])
+        self._cancellations.take_answer(goal_id, self._read(decode_cancel, reply)[0])
 
     def _read(
         self, decode: Callable[[bytes], _Value], reply: bytes | None

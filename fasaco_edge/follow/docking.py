@@ -24,7 +24,6 @@ from fasaco_edge.follow.actions import (
     ActionClient,
     AskResult,
     CancelGoal,
-    Cancellations,
     Request,
     SendGoal,
 )
@@ -93,7 +92,7 @@ class Docking:
         # Whether the robot is in the dock; None before its first pose.
         self._is_docked: bool | None = None
         self._goal: _Goal | None = None
-        self._cancellations = {move: Cancellations() for move in Move}
+        self._requests: list[DockRequest] = []
         self._retry_at, self._retry_s = -math.inf, RETRY_S
 
     def step(
@@ -107,7 +106,6 @@ class Docking:
             here: the robot's pose; None without one.
             drives: whether there is a path to drive.
         """
-        requests: list[DockRequest] = []
         if here is not None:
             far = math.hypot(here.x - self._dock.x, here.y - self._dock.y)
             if self._is_docked is None:
@@ -116,16 +114,15 @@ class Docking:
             elif self._goal is None and far > self._approach + 2.0 * DOCKED_M:
                 self._is_docked = False
         if (goal := self._goal) is not None:
-            requests += self._watch(goal, now, state)
+            self._watch(goal, now, state)
         elif here is not None and now >= self._retry_at:
             if state == "charging" and not self._is_docked:
-                requests.append(self._start(Move.DOCK, now))
+                self._start(Move.DOCK, now)
             elif self._is_docked and drives and state in DRIVES:
-                requests.append(self._start(Move.UNDOCK, now))
+                self._start(Move.UNDOCK, now)
         is_in = bool(self._is_docked) and drives
         self.holds = self._goal.move.value if self._goal else "in its dock" if is_in else ""
-        for move, cancellations in self._cancellations.items():
-            requests += [(move, one) for one in cancellations.due(now)]
+        requests, self._requests = self._requests, []
         return requests
 
     def end(self) -> list[DockRequest]:
@@ -141,13 +138,12 @@ class Docking:
         goal = self._goal
         if goal is None or goal.id != goal_id:
             return
-        self._cancellations[goal.move].take_accepted(goal_id, accepted)
         if accepted:
             # Its result is queried at the next step.
             goal.is_accepted, goal.asked_at = True, -math.inf
             return
         if accepted is None:
-            self._cancellations[goal.move].add(goal_id)
+            self._cancel(goal)
         self._fail(why or "refused: is the docking server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: DockEnding | None, why: str, now: float) -> None:
@@ -155,9 +151,8 @@ class Docking:
         goal = self._goal
         if goal is None or goal.id != goal_id:
             return
-        self._cancellations[goal.move].drop(goal_id)
         if ending is None:
-            self._cancellations[goal.move].add(goal_id)
+            self._cancel(goal)
             self._fail(why, now)
         elif ending.is_done:
             self._goal, self.trouble = None, ""
@@ -175,27 +170,24 @@ class Docking:
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without one: it is asked for again."""
 
-    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
-        """Take in the result of a request to cancel; None without an answer."""
-        for cancellations in self._cancellations.values():
-            cancellations.take_answer(goal_id, code)
-
-    def _start(self, move: Move, now: float) -> DockRequest:
+    def _start(self, move: Move, now: float) -> None:
         self._goal = _Goal(move, self._new_id(), now, asked_at=now)
-        return move, SendGoal(self._goal.id)
+        self._requests.append((move, SendGoal(self._goal.id)))
 
-    def _watch(self, goal: _Goal, now: float, state: str) -> list[DockRequest]:
+    def _cancel(self, goal: _Goal) -> None:
+        self._requests.append((goal.move, CancelGoal(goal.id)))
+
+    def _watch(self, goal: _Goal, now: float, state: str) -> None:
         """Query the result again; cancel an unwanted goal; give up a goal that never ends."""
         if goal.move is Move.DOCK and state in LEAVES and not goal.is_cancelled:
             goal.is_cancelled = True
-            self._cancellations[goal.move].add(goal.id, is_known=goal.is_accepted)
+            self._cancel(goal)
         if now - goal.sent_at > GIVE_UP_S:
-            self._cancellations[goal.move].add(goal.id)
+            self._cancel(goal)
             self._fail("did not end", now)
         elif goal.is_accepted and now - goal.asked_at > RESULT_EVERY_S:
             goal.asked_at = now
-            return [(goal.move, AskResult(goal.id))]
-        return []
+            self._requests.append((goal.move, AskResult(goal.id)))
 
     def _fail(self, why: str, now: float) -> None:
         assert self._goal is not None

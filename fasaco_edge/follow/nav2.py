@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.follow.actions import AskResult, Cancellations, Request, SendGoal
+from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal
 from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.pieces import LEAST_M, STEP_M, Line, end_of_piece
 from fasaco_edge.follow.standstill import Tries, floor_ahead
@@ -109,7 +109,6 @@ class Nav2Follower(Supervision):
         # The goal that Nav2 drives, and the one sent but not answered yet.
         self._active: Goal | None = None
         self._pending: Goal | None = None
-        self._cancellations = Cancellations()
         self._asked_at = -math.inf
         self._tries = Tries(PROGRESS_M, RETRY_S, MOST_RETRY_S)
         self._is_canceled = False
@@ -120,28 +119,25 @@ class Nav2Follower(Supervision):
 
     def step(self, now: float) -> list[Request]:
         """Return the requests to Nav2 now."""
-        self._requests = []
         if not self._supervised(self._drive, now):
             self._stop()
         if self.state in (State.STANDS, State.GIVEN_UP) and self._path:
             self.ahead = floor_ahead(self._here, self._toward(self._path), self._radius)
-        return self._requests + self._cancellations.due(now)
+        return self._taken()
 
     def end(self) -> list[Request]:
         """Return the requests that end all goals."""
         self._stop()
-        return self._cancellations.due(math.inf)
+        return self._taken()
 
     def take_unsent(self, goal_id: bytes, why: str, now: float) -> None:
         """Take in that a goal could not be sent."""
         if self._pending is not None and self._pending.id == goal_id:
             self._pending = None
             self._fail(State.NO_NAV2, why, now)
-        self._cancellations.drop(goal_id)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
         """Take in whether Nav2 accepted a goal; None without an answer: then Nav2 must end it."""
-        self._cancellations.take_accepted(goal_id, accepted)
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
@@ -156,19 +152,17 @@ class Nav2Follower(Supervision):
             self._requests_later.append(AskResult(goal_id))
             return
         if accepted is None:
-            self._cancellations.add(goal_id)
+            self._requests.append(CancelGoal(goal_id))
         state = State.REFUSED if accepted is False else State.NO_NAV2
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
         """Take in how a goal ended; None if Nav2 will not answer: it may still drive the goal."""
-        if ending is not None:
-            self._cancellations.drop(goal_id)
         if self._active is None or self._active.id != goal_id:
             return
         goal, self._active = self._active, None
         if ending is None:
-            self._cancellations.add(goal_id)
+            self._requests.append(CancelGoal(goal_id))
         self._requests_later.clear()
         if self._pending is not None:
             # Nav2 switches to the next goal.
@@ -194,10 +188,6 @@ class Nav2Follower(Supervision):
             self.take_ending(goal_id, None, "it went away", now)
         elif self._active is not None and self._active.id == goal_id:
             self._requests_later.append(AskResult(goal_id))
-
-    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
-        """Take in the result of a request to cancel; None without an answer."""
-        self._cancellations.take_answer(goal_id, code)
 
     def _drive(self, now: float) -> bool:
         """Send what is due; return whether there is a path from here."""
@@ -293,7 +283,7 @@ class Nav2Follower(Supervision):
         if stands_s > STANDS_S:
             self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
         if stands_s > GIVE_UP_S:
-            self._cancellations.add(goal.id)
+            self._requests.append(CancelGoal(goal.id))
             self._active = None
             self._fail(State.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
         elif now - self._asked_at > longest_s:
@@ -321,11 +311,13 @@ class Nav2Follower(Supervision):
 
     def _stop(self) -> None:
         """End all goals."""
-        for goal, is_known in ((self._active, True), (self._pending, False)):
-            if goal is not None:
-                self._cancellations.add(goal.id, is_known=is_known)
+        self._requests += [CancelGoal(goal.id) for goal in (self._active, self._pending) if goal]
         self._active = self._pending = None
         self._requests_later.clear()
+
+    def _taken(self) -> list[Request]:
+        requests, self._requests = self._requests, []
+        return requests
 
     def _moved_to(self, pose: Pose2D, now: float) -> None:
         share = 1.0 - math.exp((self._pose_at - now) / STEADY_S)

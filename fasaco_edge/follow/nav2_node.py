@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
 from functools import partial
 
@@ -14,9 +13,6 @@ from fasaco_edge.follow.node import Node, patience_of
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.wire.messages.follow_path import GOAL_ID_BYTES, decode_ending, encode_goal
 from fasaco_edge.wire.ros_keys import FOLLOW_PATH, RELEASES, Release, RosNode, release_of
-
-# Timeout for goals to end at the exit [s].
-END_S = 1.0
 
 
 class Nav2Node(Node):
@@ -45,11 +41,8 @@ class Nav2Node(Node):
     def end(self) -> None:
         """Stop the robot, and wait for Nav2's word."""
         super().end()
-        requests = self._follower.end()
-        self._ask(requests)
-        ends = time.monotonic() + END_S
-        while requests and self._client.waiting < len(requests) and time.monotonic() < ends:
-            time.sleep(0.01)
+        self._ask(self._follower.end())
+        self._client.end()
 
     def _step(self, now: float) -> None:
         self._client.turn()

@@ -8,7 +8,7 @@ from fasaco_edge.follow.actions import AskResult, CancelGoal, SendGoal
 from fasaco_edge.follow.docking import GIVE_UP_S, RESULT_EVERY_S, RETRY_S, Docking, Move
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.messages.docking import DockEnding
-from fasaco_edge.wire.messages.follow_path import ABORTED, CANCELED, SUCCEEDED, TAKEN, UNKNOWN
+from fasaco_edge.wire.messages.follow_path import ABORTED, CANCELED, SUCCEEDED, UNKNOWN
 
 DOCK, BEFORE, AWAY = Pose2D(2.0, 0.0), Pose2D(1.5, 0.0), Pose2D(-3.0, 0.0)
 DONE = DockEnding(SUCCEEDED, success=True)
@@ -119,22 +119,17 @@ def test_an_error_is_told_and_tried_again_after_a_while(robot, ending, why):
         assert why in robot.docking.trouble
         assert not robot.sends_after(0.9 * pause_s)
         robot.now += 0.2 * pause_s - 1.0
-        for number in range(8):
-            robot.docking.take_cancelled(number.to_bytes(16), TAKEN)
         pause_s *= 2.0
     robot.ends(robot.started())
     assert robot.docking.trouble == ""
 
 
-def test_a_goal_without_an_answer_is_cancelled_until_confirmed_and_sent_again(robot):
-    """It was once cancelled each second for good, whatever the server answered."""
+def test_a_goal_without_an_answer_is_cancelled_and_sent_again(robot):
     robot.arrive()
     goal = robot.sent()
     robot.docking.take_accepted(goal[1], accepted=None, why="no answer", now=robot.now)
     assert robot.step() == [cancel(goal)]
     assert ("no answer" in robot.docking.trouble, robot.docking.holds) == (True, "")
-    assert robot.step() == [cancel(goal)]
-    robot.docking.take_cancelled(goal[1], TAKEN)
     assert robot.step() == []
     assert robot.sends_after(RETRY_S)
 

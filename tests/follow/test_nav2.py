@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.actions import MOST_CANCELLED, AskResult, CancelGoal, SendGoal
+from fasaco_edge.follow.actions import AskResult, CancelGoal, SendGoal
 from fasaco_edge.follow.goals import TIP_M
 from fasaco_edge.follow.nav2 import (
     EARLY_M,
@@ -23,7 +23,6 @@ from fasaco_edge.wire.messages.follow_path import (
     CANCELED,
     ERRORS,
     SUCCEEDED,
-    TAKEN,
     UNKNOWN,
     Ending,
     encode_goal,
@@ -301,7 +300,6 @@ def test_no_answer_to_a_goal_is_another_goal():
     # Nav2 may have taken it, and drive.
     assert drive.step(0.0) == [CancelGoal(goal.id)]
     assert (drive.state, drive.follower.detail) == (State.NO_NAV2, "did not answer")
-    drive.follower.take_cancelled(goal.id, TAKEN)
     (again,) = drive.step(0.0, after=RETRY_S)
     assert isinstance(again, SendGoal)
     assert again.id != goal.id
@@ -338,31 +336,6 @@ def test_a_goal_that_could_not_be_sent_is_not_canceled():
     drive.follower.take_unsent(goal.id, "no server", drive.now)
     assert drive.step(0.0) == []
     assert (drive.state, drive.follower.detail) == (State.NO_NAV2, "no server")
-
-
-@pytest.mark.parametrize("lost", ["accepted", "ending"])
-def test_a_goal_whose_answer_was_lost_ends_with_the_path(lost):
-    drive = Drive(*LONG)
-    if lost == "accepted":
-        (goal,) = drive.step(0.0)
-        drive.follower.take_accepted(goal.id, None, "did not answer", drive.now)
-    else:
-        goal = drive.begun()
-        drive.follower.take_ending(goal.id, None, "went away", drive.now)
-    drive.path()
-    assert drive.step(0.1) == [CancelGoal(goal.id)]
-    assert drive.follower.end() == [CancelGoal(goal.id)]
-
-
-def test_without_any_answer_only_so_many_goals_are_canceled():
-    drive = Drive(*LONG)
-    asked = []
-    for _ in range(500):
-        asked = drive.step(0.0, after=1.0)
-        for request in asked:
-            if isinstance(request, SendGoal):
-                drive.follower.take_accepted(request.id, None, "", drive.now)
-    assert len(asked) <= MOST_CANCELLED + 1
 
 
 def test_a_refusal_is_said():
@@ -407,29 +380,17 @@ def test_a_path_that_begins_elsewhere_is_not_driven():
     assert drive.state is State.PATH_ELSEWHERE
 
 
-def test_an_empty_path_cancels_until_nav2_has_heard():
+@pytest.mark.parametrize("answered", [True, False])
+def test_an_empty_path_cancels_what_there_is_and_so_does_the_end(answered):
     drive = Drive(*LONG)
-    goal = drive.begun()
+    goal = drive.begun() if answered else drive.step(0.0)[0]
     drive.path()
     assert drive.step(0.1) == [CancelGoal(goal.id)]
     assert drive.state is State.EMPTY_PATH
-    assert drive.step(0.1) == []
-    assert drive.step(0.1, after=1.0) == [CancelGoal(goal.id)]
-    drive.follower.take_cancelled(goal.id, TAKEN)
     assert drive.step(0.1, after=1.0) == []
-
-
-def test_a_goal_that_was_just_sent_is_canceled_once_it_is_there():
-    """Nav2 may not know it yet when the request to cancel comes."""
-    drive = Drive(*LONG)
-    (goal,) = drive.step(0.0)
-    drive.path()
-    assert drive.step(0.0) == [CancelGoal(goal.id)]
-    drive.follower.take_cancelled(goal.id, 2)
-    drive.accept(goal)
-    assert drive.step(0.0) == [CancelGoal(goal.id)]
-    drive.follower.take_cancelled(goal.id, TAKEN)
-    assert drive.step(0.0, after=2.0) == []
+    drive.path(*LONG)
+    (again,) = drive.step(0.1)
+    assert drive.follower.end() == [CancelGoal(again.id)]
 
 
 def test_an_old_pose_cancels_and_a_new_one_goes_on():
@@ -458,12 +419,6 @@ def test_a_controller_that_stands_is_asked_and_then_given_up(noise_m):
     assert requests.count(CancelGoal) >= 1
     assert {State.STANDS, State.GIVEN_UP} <= said
     assert requests.count(SendPiece) == 1
-
-
-def test_end_cancels_what_there_is():
-    drive = Drive(*LONG)
-    goal = drive.begun()
-    assert drive.follower.end() == [CancelGoal(goal.id)]
 
 
 class CurveDrive(Drive):
