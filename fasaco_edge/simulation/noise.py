@@ -8,7 +8,6 @@ from typing import Self
 
 from numpy.random import Generator
 
-from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.rotation import composed, inverse
 
@@ -54,13 +53,6 @@ class MapperNoise:
     jump_m: float = 0.1
     late_s: float = 0.05
 
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not math.isfinite(value) or value < 0 or (field.name in SHARES and value > 1):
-                most = "in 0..1" if field.name in SHARES else "at least 0"
-                raise BadConfiguration(f"{field.name} must be {most}, got {value}")
-
     @classmethod
     def none(cls) -> Self:
         """Return no noise: maps and poses equal building and robot."""
@@ -74,15 +66,6 @@ class MapperNoise:
             if field.name not in ("seed", "closes_loops")
         }
         return replace(self, **{n: min(a, 1.0) if n in SHARES else a for n, a in amounts.items()})
-
-    @property
-    def is_in_map(self) -> bool:
-        """Whether maps and poses differ from the truth; a delay alone does not count."""
-        jumps_m = self.jumps * self.jump_m
-        return any((
-            self.range_m, self.specks, self.leg_misses, self.shift_m, self.match_m,
-            self.match_rad, self.drift_m, self.drift_rad, jumps_m,
-        ))  # fmt: skip
 
 
 class PoseError:

@@ -76,11 +76,7 @@ class NoisyMapper(Mapper):
         return self._error.true_place(x, y)
 
     def scan(self, pose: Pose2D) -> Window | None:
-        """Add a scan from ``pose``, if that is far enough from the scan before.
-
-        Returns:
-            the window of the own map's pixels that the scan may have changed, or None.
-        """
+        """Add a scan as ``Mapper`` does, if it is far enough from the one before."""
         at, self._at = self._at or pose, pose
         if way_m := math.hypot(pose.x - at.x, pose.y - at.y):
             self._error.drift(pose, way_m)

@@ -9,14 +9,14 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import StartBlocked, StartOutsideMap
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.geometry import Point, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.mapper import Mapper
@@ -26,7 +26,6 @@ from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     Battery,
     DriveState,
-    Point,
     SimulationConfig,
     driven,
     joined,
@@ -111,12 +110,10 @@ class World:
                 f"({start.x:g}, {start.y:g}) m"
             )
         self._drive = DriveState(start)
-        noise = noise or MapperNoise.none()
-        is_ideal = not noise.is_in_map
-        self._mapper = Mapper(truth, config) if is_ideal else NoisyMapper(truth, config, noise)
-        # Poses that are not yet published, and for how many ticks each is delayed.
+        self._mapper = NoisyMapper(truth, config, noise) if noise else Mapper(truth, config)
+        # Poses that are not yet published, and by how much each is delayed.
         self._poses: deque[StampedPose] = deque()
-        self._late_ticks = round(noise.late_s / config.tick_s)
+        self._late_ns = round(noise.late_s / config.tick_s) * config.tick_ns if noise else 0
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
         # The newest velocity, if one drives it: speed [m/s], turn rate [rad/s], and its tick.
@@ -180,15 +177,10 @@ class World:
         pose = self._drive.pose
         return np.array([*self._track, (pose.x, pose.y)], np.float64)
 
-    def emission(
-        self, *, with_map: bool = True, with_pose: bool = True, with_battery: bool = True
-    ) -> Emission:
+    def emission(self) -> Emission:
         """Return map and pose as they are now; there is no map before the first tick."""
-        return Emission(
-            self._mapper.snapshot(self.stamp_ns) if with_map else None,
-            StampedPose(self.believed, self.frame, self.stamp_ns) if with_pose else None,
-            self.battery if with_battery else None,
-        )
+        pose = StampedPose(self.believed, self.frame, self.stamp_ns)
+        return Emission(self._mapper.snapshot(self.stamp_ns), pose, self.battery)
 
     def follow(self, path: NDArray[np.float64]) -> None:
         """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); an empty one halts.
@@ -217,24 +209,22 @@ class World:
         self._ticks += 1
         self._count_stand()
         self._drain()
-        config, since_first = self.config, self._ticks - 1
-        if since_first % config.period_ticks(config.scan_hz) == 0:
+        if self._is_due(self.config.scan_hz):
             self._mapper.scan(self.pose)
             if self.activity is Activity.NO_WAY or self._may_try_again():
                 self._join()
-        map_is_due = since_first % config.period_ticks(config.map_hz) == 0
-        pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
-        battery_is_due = since_first % config.period_ticks(BATTERY_HZ) == 0
-        now = self.emission(with_map=map_is_due, with_pose=pose_is_due, with_battery=battery_is_due)
-        return replace(now, pose=self._ripe(now.pose)) if self._late_ticks else now
+        if self._is_due(self.config.pose_hz):
+            self._poses.append(StampedPose(self.believed, self.frame, self.stamp_ns))
+        is_ripe = self._poses and self._poses[0].stamp_ns <= self.stamp_ns - self._late_ns
+        return Emission(
+            self._mapper.snapshot(self.stamp_ns) if self._is_due(self.config.map_hz) else None,
+            self._poses.popleft() if is_ripe else None,
+            self.battery if self._is_due(BATTERY_HZ) else None,
+        )
 
-    def _ripe(self, pose: StampedPose | None) -> StampedPose | None:
-        """Store a pose; return the delayed one to publish now, if any."""
-        if pose is not None:
-            self._poses.append(pose)
-        oldest_ns = self.stamp_ns - self._late_ticks * self.config.tick_ns
-        is_ripe = bool(self._poses) and self._poses[0].stamp_ns <= oldest_ns
-        return self._poses.popleft() if is_ripe else None
+    def _is_due(self, rate_hz: float) -> bool:
+        """Return whether this tick is one at a rate, from the first tick on."""
+        return (self._ticks - 1) % self.config.period_ticks(rate_hz) == 0
 
     def _drain(self) -> None:
         battery, drive = self.battery, self._drive

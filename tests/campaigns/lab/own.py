@@ -25,8 +25,8 @@ from tests.campaigns.lab.settings import BEAMS, MOST_RANGE_M, TICK_S, LabSetting
 FRAME = "map"
 MAP_EVERY_S = 3.0
 # Rough: twice as much of all, legs that are seldom seen, and jumps.
-NOISES = {
-    "none": MapperNoise.none(),
+NOISES: dict[str, MapperNoise | None] = {
+    "none": None,
     "usual": MapperNoise(),
     "range": replace(MapperNoise.none(), range_m=0.02, shift_m=0.05),
     "legs": replace(MapperNoise.none(), leg_misses=0.9, specks=0.002, shift_m=0.05),
@@ -65,7 +65,8 @@ class OwnBase:
             pose_hz=1.0 / TICK_S,
             turn_radius_m=settings.turn_radius_m,
         )
-        noise = replace(NOISES[settings.own], seed=settings.seed)
+        noise = NOISES[settings.own]
+        noise = replace(noise, seed=settings.seed) if noise else None
         truth = OccupancyGrid(building.geometry, cells, FRAME)
         self.world = World(truth, building.start, config, noise)
         self._truth = truth
