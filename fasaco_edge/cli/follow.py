@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
     from fasaco_edge.bus.session import Bus
     from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.config.robot import RobotConfig
     from fasaco_edge.config.ros import RosConfig
+    from fasaco_edge.follow.estimate import Limits
     from fasaco_edge.follow.node import Node
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
 
@@ -174,12 +176,7 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         base=here.keys.base,
         connect=here.bus.connect,
         secured=here.bus.secured,
-        speed_m_s=robot.speed_m_s,
-        acceleration_m_s2=robot.acceleration_m_s2,
-        turn_deg_s=robot.turning_deg_s(),
-        turn_deg_s2=robot.turn_deg_s2,
-        steered_deg=robot.steered_deg,
-        turn_radius_m=robot.turn_radius_m,
+        limits=limits_of(robot),
         pose_schema=config.pose.schema,
         pose_age_s=args.pose_age,
         poses=_ros_poses(ros) if ros else poses,
@@ -194,6 +191,20 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         radius_m=robot.radius_m,
         pace=args.speed,
         dry_run=args.dry_run,
+    )
+
+
+def limits_of(robot: RobotConfig) -> Limits:
+    """Return the limits of a base."""
+    from fasaco_edge.follow.estimate import Limits
+
+    return Limits(
+        robot.speed_m_s,
+        robot.acceleration_m_s2,
+        math.radians(robot.turning_deg_s()),
+        math.radians(robot.turn_deg_s2),
+        math.radians(robot.steered_deg),
+        robot.turn_radius_m,
     )
 
 

@@ -17,10 +17,12 @@ from typing import Any, Protocol, TypeVar
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.messages.docking import DockEnding
 from fasaco_edge.wire.messages.follow_path import (
     ENDED_BEFORE,
     NO_SUCH_GOAL,
     TAKEN,
+    Ending,
     decode_accepted,
     decode_cancel,
     encode_cancel,
@@ -139,6 +141,12 @@ class Cancellations:
         due = [goal for goal, at in self._asked_at.items() if now - at >= CANCEL_EVERY_S]
         self._asked_at |= dict.fromkeys(due, now)
         return due
+
+
+def said_of(ending: Ending | DockEnding, errors: Mapping[int, str], no_code: str) -> str:
+    """Return what a server says of a goal that failed: code, its name, and its words."""
+    code = f"{ending.code} {errors.get(ending.code, 'no code')}" if ending.code else no_code
+    return f"{code}: {ending.message}" if ending.message else code
 
 
 class ActionClient:

@@ -26,6 +26,7 @@ from fasaco_edge.follow.actions import (
     CancelGoal,
     Request,
     SendGoal,
+    said_of,
 )
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.supervision import Supervision
@@ -163,9 +164,7 @@ class Docking:
         elif ending.status == UNKNOWN:
             self._fail("it does not know its goal: was it restarted?", now)
         else:
-            what = ERRORS.get(ending.code, "no code")
-            code = f"{ending.code} " if ending.code else ""
-            self._fail(code + what + (f": {ending.message}" if ending.message else ""), now)
+            self._fail(said_of(ending, ERRORS, "no code"), now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without one: it is asked for again."""

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal
+from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, said_of
 from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
 from fasaco_edge.follow.pieces import LEAST_M, STEP_M, Line, end_of_piece
 from fasaco_edge.follow.standstill import Tries, floor_ahead
@@ -172,10 +172,7 @@ class Nav2Follower(Supervision):
         elif ending.status == SUCCEEDED:
             self._take_done(goal, now)
         elif ending.status == ABORTED:
-            what = ERRORS.get(ending.code, "no code") if ending.code else NO_CODE
-            code = f"{ending.code} " if ending.code else ""
-            said = f": {ending.message}" if ending.message else ""
-            self._fail(State.GIVEN_UP, f"{code}{what}{said}", now)
+            self._fail(State.GIVEN_UP, said_of(ending, ERRORS, NO_CODE), now)
         elif ending.status == CANCELED:
             self._is_canceled = True
             self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)

@@ -24,11 +24,11 @@ class Nav2Node(Node):
         nav2, ros = settings.nav2, settings.ros
         follower = Nav2Follower(
             nav2["near_m"],
-            settings.speed_m_s,
+            settings.limits.speed,
             partial(os.urandom, GOAL_ID_BYTES),
             patience_of(settings),
             settings.radius_m,
-            is_curved=settings.turn_radius_m > 0.0,
+            is_curved=settings.limits.turn_radius > 0.0,
         )
         super().__init__(bus, settings, follower)
         self._report = report

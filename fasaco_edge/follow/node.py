@@ -15,11 +15,11 @@ from fasaco_edge.bus.publisher import Publisher, RosPublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.daemons import BaseClaim
-from fasaco_edge.follow.estimate import STAND, Command, Limits
+from fasaco_edge.follow.estimate import STAND, Command
 from fasaco_edge.follow.follower import PERIOD_S, Follower
 from fasaco_edge.follow.inputs import Inputs, ScanInputs
 from fasaco_edge.follow.settings import FollowSettings
-from fasaco_edge.follow.standstill import Standstill, report_of
+from fasaco_edge.follow.standstill import Standstill
 from fasaco_edge.follow.supervision import LINK_S, Patience, State, Supervision
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
@@ -73,10 +73,10 @@ class Node:
             else:
                 self._docking.turn(inputs.news.state, follower)
         self._step(now)
-        held_s = self._standstill.look(follower, now)
-        if held_s is not None and self._blocked is not None and not follower.standby:
-            news = inputs.news
-            self._blocked.put(report_of(follower, held_s, news.planner, news.revision))
+        news = inputs.news
+        report = self._standstill.report(follower, news.planner, news.revision, now)
+        if report is not None and self._blocked is not None and not follower.standby:
+            self._blocked.put(report)
         self._log()
 
     def end(self) -> None:
@@ -114,16 +114,8 @@ class FollowerNode(Node):
 
     def __init__(self, bus: Bus, settings: FollowSettings, report: Callable[[str], None]) -> None:
         self._scans = ScanInputs(settings, bus) if settings.scan else None
-        limits = Limits(
-            settings.speed_m_s,
-            settings.acceleration_m_s2,
-            math.radians(settings.turn_deg_s),
-            math.radians(settings.turn_deg_s2),
-            math.radians(settings.steered_deg),
-            settings.turn_radius_m,
-        )
         follower = Follower(
-            limits,
+            settings.limits,
             patience_of(settings),
             moves=not settings.dry_run,
             radius=settings.radius_m,
@@ -212,18 +204,12 @@ def run_follower(
         node = node_of(bus, settings, report)
         release_unused()
         try:
-            _take_turns(node, PERIOD_S / settings.pace, stop)
+            due, period_s = time.monotonic(), PERIOD_S / settings.pace
+            while not stop.is_set():
+                node.turn()
+                # Missed cycles are skipped.
+                now = time.monotonic()
+                due = due + period_s if due + period_s > now else now + period_s
+                stop.wait(due - now)
         finally:
             node.end()
-
-
-def _take_turns(node: Node, period_s: float, stop: threading.Event) -> None:
-    due = time.monotonic()
-    while not stop.is_set():
-        node.turn()
-        due += period_s
-        now = time.monotonic()
-        if due <= now:
-            # Missed cycles are skipped.
-            due = now + period_s
-        stop.wait(due - now)
