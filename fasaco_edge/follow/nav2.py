@@ -15,8 +15,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, said_of
-from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
-from fasaco_edge.follow.pieces import LEAST_M, STEP_M, Line, end_of_piece
+from fasaco_edge.follow.pieces import (
+    COAST_M,
+    LEAST_M,
+    STEP_M,
+    TIP_M,
+    Goal,
+    Line,
+    PathDriven,
+    end_of_piece,
+)
 from fasaco_edge.follow.standstill import Tries, floor_ahead
 from fasaco_edge.follow.supervision import Patience, Reason, State, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D

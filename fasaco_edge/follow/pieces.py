@@ -1,4 +1,4 @@
-"""Pieces of a path that neither cross nor approach themselves, as poses for a controller.
+"""Pieces of a path that neither cross nor approach themselves: the goals of Nav2's controller.
 
 A coverage path crosses and touches itself. A controller with the whole path would continue at the
 nearest part, and finish wherever the end is near. So it gets a simple piece at a time: two poses
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 from fasaco_edge.follow.route import apart
 from fasaco_edge.grid.geometry import Point, Pose2D
@@ -152,35 +153,129 @@ def end_of_piece(line: Line, start: float, near: float) -> float:
     stop = line.length(start + MOST_M)
     stop = min([stop, *line.reversals(start + LEAST_M, stop)])
     ways = line.ways(start, stop)
-    seen: dict[tuple[int, int], list[int]] = {}
     points = [line.at(way) for way in ways]
-    # Poses that are far enough behind to count are added as the piece grows.
+    # By square, the poses that are far enough behind to count; they are added as the piece grows.
+    seen: dict[tuple[int, int], list[int]] = {}
     filed = 0
-    for index, (way, point) in enumerate(zip(ways, points, strict=True)):
+    for index, (way, (x, y)) in enumerate(zip(ways, points, strict=True)):
         while way - ways[filed] > APART * near:
-            seen.setdefault(_cell(points[filed], near), []).append(filed)
+            square = math.floor(points[filed][0] / near), math.floor(points[filed][1] / near)
+            seen.setdefault(square, []).append(filed)
             filed += 1
-        if (other := _touched(seen, points, point, near)) is not None:
-            corners = line.corners(max(ways[other], start), ways[index - 1])
+        col, row = math.floor(x / near), math.floor(y / near)
+        around = [(col + right, row + up) for right in (-1, 0, 1) for up in (-1, 0, 1)]
+        others = [other for square in around for other in seen.get(square, ())]
+        touched = [other for other in others if math.dist(points[other], (x, y)) < near]
+        if touched:
+            corners = line.corners(max(ways[max(touched)], start), ways[index - 1])
             late = [corner for corner in corners if corner >= way - 2.0 * APART * near]
             return late[-1] if late and late[-1] > start + LEAST_M else ways[index - 1]
     return stop
 
 
-def _touched(
-    seen: dict[tuple[int, int], list[int]], points: list[Point], point: Point, near: float
-) -> int | None:
-    """Return the last stored point that a point is too near to."""
-    column, row = _cell(point, near)
-    touched = [
-        other
-        for east in (-1, 0, 1)
-        for north in (-1, 0, 1)
-        for other in seen.get((column + east, row + north), ())
-        if math.dist(points[other], point) < near
-    ]
-    return max(touched, default=None)
+# The next goal is sent only if it extends the last one by this much [m].
+GAIN_M = 0.3
+# Where the path returns to itself, the next goal begins this far before the end of the last one
+# [m]: the part skipped there is less than half of a tool.
+TIP_M = 0.1
+# If a part before that point returns to itself, the next goal begins earlier: one of these shares
+# of the usual distance before the end.
+SHARES = (1.0, 0.6, 0.35, 0.2)
+# A goal that begins early extends beyond the last one by as much as it begins before that one's
+# end, up to this [m].
+AMPLE_M = 2.0
+# Two paths nearer than this to each other are the same [m].
+SAME_M = 0.03
+# The robot is searched this far ahead along a goal [m].
+LOOK_AHEAD_M = 2.0
+# After its goal has ended the robot rolls on by at most this [m].
+COAST_M = 0.5
 
 
-def _cell(point: Point, near: float) -> tuple[int, int]:
-    return math.floor(point[0] / near), math.floor(point[1] / near)
+@dataclass(slots=True)
+class Goal:
+    """A piece sent to Nav2, from ``start`` to ``end`` on the line [m]."""
+
+    id: bytes
+    start: float
+    end: float
+    # Where the next one may begin [m]: infinite if it must wait for the end of this one; None if
+    # that is not computed yet.
+    next_start: float | None = None
+
+
+class PathDriven:
+    """A path driven goal by goal: its line, and the robot's distance along it [m]."""
+
+    def __init__(self, line: Line, way: float) -> None:
+        self.line, self.way = line, way
+        # End of the last finished goal: the next one begins there, even if the robot stopped
+        # elsewhere.
+        self._done = -1.0
+
+    def finish(self, goal: Goal) -> None:
+        """Note that a goal is done."""
+        self.way = self._done = goal.end
+
+    def advance(self, here: Point, goal: Goal | None) -> None:
+        """Update the robot's distance along the line: never backward nor beyond its goal."""
+        if goal is not None:
+            end = min(goal.end, self.way + LOOK_AHEAD_M)
+        elif self.way != self._done:
+            end = self.line.length(self.way + COAST_M)
+            end = min([end, *self.line.corners(self.way + STEP_M, end)])
+        else:
+            return
+        if end > self.way:
+            self.way, _ = self.line.nearest(here, self.way, end)
+
+    def start_after(self, goal: Goal, ahead: float, near: float) -> float:
+        """Return the earliest start of a piece that continues a goal; infinite if there is none.
+
+        Args:
+            goal: the last goal.
+            ahead: how far before its end the piece begins if possible [m].
+            near: least distance of a piece to itself [m].
+        """
+        if self.line.reversals(goal.end - LEAST_M, goal.end):
+            return math.inf  # the robot has to come to rest there
+        for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
+            start = max(goal.end - before_m, goal.start)
+            # A goal that begins early ends sooner: it must last until the next one arrives.
+            gain_m = max(min(before_m, AMPLE_M), GAIN_M)
+            if end_of_piece(self.line, start, near) >= goal.end + gain_m:
+                return start
+        return math.inf
+
+    def heading_after(self, goal: Goal) -> float | None:
+        """Return the heading in which the line leads on after a goal [rad]; None at its end."""
+        if self.line.length(goal.end + STEP_M) < goal.end + STEP_M:
+            return None
+        if self.line.reversals(goal.end - LEAST_M, goal.end):
+            return None
+        (x, y), (to_x, to_y) = self.line.at(goal.end), self.line.at(goal.end + STEP_M)
+        turned = math.pi if self.line.is_back(goal.end) else 0.0
+        return math.remainder(math.atan2(to_y - y, to_x - x) + turned, math.tau)
+
+    def is_near_end(self, here: Point, goal: Goal, within: float) -> bool:
+        """Return whether the robot is within a distance of the end of its goal [m].
+
+        Nav2 ends a goal by this distance, also where the robot has cut a bend before the end.
+        """
+        is_last_part = goal.end - self.way <= COAST_M
+        return is_last_part and math.dist(here, self.line.at(goal.end)) <= within
+
+    def shift_to(self, line: Line, way: float, goal: Goal) -> float | None:
+        """Return the offset of a goal's rest along another line [m]; None if that diverges before.
+
+        ``way``: the robot's distance along the other line [m].
+        """
+        was, far = self.line.nearest(line.at(way), self.way, goal.end)
+        left = goal.end - was
+        if far > SAME_M or line.length(way + left) < way + left - SAME_M:
+            return None
+        count = max(math.ceil(left / (2 * STEP_M)), 1)
+        parts = (left * part / count for part in range(count + 1))
+        at, there = self.line.at, line.at
+        is_same = all(math.dist(at(was + part), there(way + part)) <= SAME_M for part in parts)
+        return way - was if is_same else None

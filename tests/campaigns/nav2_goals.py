@@ -28,9 +28,8 @@ import numpy as np
 import fasaco_edge as fe
 from fasaco_edge.cli.follow import NEAR_SHARE
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.follow.goals import GAIN_M, TIP_M
 from fasaco_edge.follow.nav2 import EARLY_M
-from fasaco_edge.follow.pieces import Line, end_of_piece
+from fasaco_edge.follow.pieces import GAIN_M, TIP_M, Line, end_of_piece
 from fasaco_edge.grid.geometry import Pose2D
 from tests.follow.nav2_missions import Point, kind_of, nav2_follower, nav2_robot, passed
 from tests.support.driven_base import DrivenBase

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from fasaco_edge.follow.actions import AskResult, CancelGoal, SendGoal
-from fasaco_edge.follow.goals import TIP_M
 from fasaco_edge.follow.nav2 import (
     EARLY_M,
     GIVE_UP_S,
@@ -16,6 +15,7 @@ from fasaco_edge.follow.nav2 import (
     Nav2Follower,
     SendPiece,
 )
+from fasaco_edge.follow.pieces import TIP_M
 from fasaco_edge.follow.supervision import Patience, State
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire.messages.follow_path import (
