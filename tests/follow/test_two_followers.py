@@ -43,12 +43,12 @@ def commands_a_second(base, seconds=1.5):
     return (len(base.heard) - count) / seconds
 
 
-@pytest.mark.parametrize("ros2", [{}, RMW], ids=["native", "ROS 2"])
-@pytest.mark.parametrize("ends", [signal.SIGTERM, signal.SIGKILL], ids=["ends", "is killed"])
+@pytest.mark.parametrize(("ends", "ros2"), [(signal.SIGTERM, {}), (signal.SIGKILL, RMW)])
 def test_the_second_waits_in_silence_and_takes_over(base, tmp_path, ends, ros2):
     if ros2:
         base.take_ros(7)
-    config = config_file(tmp_path, base.endpoint, ros2)
+    bus = {"listen": [], "connect": [base.endpoint], "mode": "client"}
+    config = config_file(tmp_path, bus=bus, ros2=ros2)
     first_log, second_log = tmp_path / "first", tmp_path / "second"
     with follower_process(base.endpoint, first_log, "--config", str(config)) as first:
         base.wait_until_it_moves()
