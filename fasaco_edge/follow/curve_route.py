@@ -26,12 +26,7 @@ CHORD_M = 0.06
 
 
 class CurveRoute(Route):
-    """A curve, and the leg of it that the robot is on.
-
-    Args:
-        poses: of the path, read as they are needed.
-        limits: of the base.
-    """
+    """A curve, and the leg of it that the robot is on."""
 
     def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
         super().__init__(poses, limits)

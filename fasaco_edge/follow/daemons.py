@@ -170,12 +170,7 @@ NO_RIGHT = "access rules keep its token from others: the role driver needs `driv
 
 
 class BaseClaim(BusClaim):
-    """The claim of this follower.
-
-    Args:
-        bus: its session.
-        settings: the follower's.
-    """
+    """The claim of this follower."""
 
     # Another follower that drives sees this token with its next query: until then this one must not
     # drive.
@@ -187,11 +182,7 @@ class BaseClaim(BusClaim):
         self._is_seen, self._look_at = False, -math.inf
 
     def standby(self, now: float) -> Reason | None:
-        """Return why this follower must leave the base alone; None if it drives.
-
-        Args:
-            now: monotonic time [s].
-        """
+        """Return why this follower must leave the base alone; None if it drives."""
         if self.update(now):
             self.show()
             if self.state is ClaimState.PLANS and self.rival:

@@ -223,12 +223,7 @@ class DockingNode:
         self._logged = ("", "")
 
     def turn(self, state: str, follower: Supervision) -> None:
-        """Run a cycle; the follower is held while the docking server moves the robot.
-
-        Args:
-            state: of the daemon, "" before the first status.
-            follower: has the pose and the path.
-        """
+        """Run a cycle; the follower is held while the docking server moves the robot."""
         for client in self._clients.values():
             client.turn()
         docking, pose = self._docking, follower.newest_pose

@@ -90,13 +90,10 @@ class WatchedPublisher(OnePublisher):
 
 
 class Inputs:
-    """Subscribes, and passes the inputs since the last cycle to a follower.
-
-    Attributes:
-        news: of the daemon that plans, in the last cycle.
-    """
+    """Subscribes, and passes the inputs since the last cycle to a follower."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
+        # Of the daemon that plans, in the last cycle.
         self.news = News()
         self._clock = Clock(settings.pace)
         self._decoder = PoseDecoder(settings.pose_schema, settings.frames)
@@ -171,11 +168,7 @@ MAP, UPDATE, SCAN = topics.MAP.name, topics.MAP_UPDATE.name, topics.SCAN.name
 
 
 class ScanInputs:
-    """Subscribes, and passes on the samples since the last cycle.
-
-    Attributes:
-        sight: takes in maps.
-    """
+    """Subscribes to scans and maps, and passes on those since the last cycle."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
         scan = settings.scan
@@ -198,13 +191,7 @@ class ScanInputs:
             bus.subscribe(key, takers[name], latched, depth, in_order=in_order)
 
     def feed(self, follower: Follower, time_of: Callable[[float], float]) -> None:
-        """Pass on maps and scans.
-
-        Args:
-            follower: takes the scans.
-            time_of: returns the robot's time of an arrival, given by the computer's monotonic clock
-                [s].
-        """
+        """Pass maps to the sight, scans to a follower; ``time_of``: as of ``Inputs``."""
         while self._maps:
             is_update, payload = self._maps.popleft()
             self.sight.take_map(payload, is_update=is_update)

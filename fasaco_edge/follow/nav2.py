@@ -121,9 +121,8 @@ class Nav2Follower(Supervision):
         self._tries = Tries(PROGRESS_M, RETRY_S, MOST_RETRY_S)
         self._is_canceled = False
         self._trouble_of_nav2: Reason | None = None
+        # Requests that the next step returns.
         self._requests: list[Request] = []
-        # Requests that follow from answers, sent at the next step.
-        self._requests_later: list[Request] = []
 
     def step(self, now: float) -> list[Request]:
         """Return the requests to Nav2 now."""
@@ -157,7 +156,7 @@ class Nav2Follower(Supervision):
             self._active, self._is_canceled = goal, False
             self._trouble_of_nav2 = None
             self._asked_at = now
-            self._requests_later.append(AskResult(goal_id))
+            self._requests.append(AskResult(goal_id))
             return
         if accepted is None:
             self._requests.append(CancelGoal(goal_id))
@@ -171,7 +170,6 @@ class Nav2Follower(Supervision):
         goal, self._active = self._active, None
         if ending is None:
             self._requests.append(CancelGoal(goal_id))
-        self._requests_later.clear()
         if self._pending is not None:
             # Nav2 switches to the next goal.
             return
@@ -192,12 +190,10 @@ class Nav2Follower(Supervision):
         if waited_s < GONE_S:
             self.take_ending(goal_id, None, "it went away", now)
         elif self._active is not None and self._active.id == goal_id:
-            self._requests_later.append(AskResult(goal_id))
+            self._requests.append(AskResult(goal_id))
 
     def _drive(self, now: float) -> bool:
         """Send what is due; return whether there is a path from here."""
-        self._requests += self._requests_later
-        self._requests_later.clear()
         if self._path is not None:
             self._tries.moved_to(self._here)
             # The robot may also be on an unanswered goal, as answers may be lost.
@@ -318,7 +314,6 @@ class Nav2Follower(Supervision):
         """End all goals."""
         self._requests += [CancelGoal(goal.id) for goal in (self._active, self._pending) if goal]
         self._active = self._pending = None
-        self._requests_later.clear()
 
     def _taken(self) -> list[Request]:
         requests, self._requests = self._requests, []

@@ -39,13 +39,7 @@ LEAST_S = 1e-6
 
 
 class Node:
-    """A follower on the bus: its inputs, the claim on the base, docking by Nav2, and reports.
-
-    Args:
-        bus: the session.
-        settings: the follower's.
-        follower: gets the inputs.
-    """
+    """A follower on the bus: its inputs, the claim on the base, docking by Nav2, and reports."""
 
     def __init__(self, bus: Bus, settings: FollowSettings, follower: Supervision) -> None:
         self._settings, self._follower = settings, follower
@@ -191,11 +185,7 @@ def run_follower(
 ) -> None:
     """Drive the base along the path until ``stop`` is set; then stop the base.
 
-    Args:
-        settings: the follower's.
-        stop: ends it.
-        node_of: makes the node that runs the cycles.
-        report: called each second with the command in a dry run.
+    ``report`` is called with what would be sent in a dry run.
     """
     bus = join(BusSettings("client", settings.connect, secured=settings.secured), stop)
     if bus is None:

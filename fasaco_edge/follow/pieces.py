@@ -31,15 +31,11 @@ LEAST_M = 1e-3
 
 
 class Line:
-    """A path parametrised by arc length, from 0 at its start.
-
-    Args:
-        poses: of the path, read as they are needed.
-        is_curved: whether the robot cannot turn on the spot, and may drive backward.
-    """
+    """A path parametrised by arc length, from 0 at its start; read as far as it is needed."""
 
     def __init__(self, poses: Iterable[Pose2D], *, is_curved: bool = False) -> None:
         self._coming = apart(poses, LEAST_M)
+        # Whether the robot cannot turn on the spot, and may drive backward.
         self._is_curved = is_curved
         # Robot's heading at its beginning [rad].
         self._yaw = 0.0

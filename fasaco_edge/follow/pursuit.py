@@ -42,17 +42,13 @@ class Pursuit:
     command then brakes by as much as was possible since the last one. The robot also brakes
     earlier, by the distance that it would drive on in such a delay.
 
-    Args:
-        limits: of the base.
-        period: from one command to the next [s].
-
-    Attributes:
-        is_lost: whether the route leads where the robot cannot turn to.
+    ``period``: from one command to the next [s].
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
         self._limits = limits
         self._period = period
+        # Whether the robot turns on the spot; and whether the route leads where it cannot turn to.
         self._is_turning, self.is_lost = True, False
         # Time since the last command, and the delay to expect of the next one [s].
         self._seconds, self._late = period, 0.0

@@ -99,17 +99,10 @@ class Leg:
 
 
 class Route:
-    """A path, and the leg of it that the robot is on.
-
-    Args:
-        poses: of the path, read as they are needed.
-        limits: of the base.
-
-    Attributes:
-        rounds: greatest speed in the corner that the robot rounds to its leg; 0 for none [m/s].
-    """
+    """A path, read as far as it is needed, and the leg of it that the robot is on."""
 
     def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
+        # Greatest speed in the corner that the robot rounds to its leg; 0 for none [m/s].
         self.rounds = 0.0
         self._limits = limits
         # The first leg is the one that the robot is on; those that are not needed yet are coming.
@@ -205,9 +198,6 @@ class Route:
             here: the robot's position.
             heading: its direction of driving [rad]; None at rest.
             before: the last route; None for none.
-
-        Returns:
-            how it can be joined; if it is, the robot is on its first leg.
         """
         index, is_kept = self._passing(here, before)
         leg = self._leg(index)

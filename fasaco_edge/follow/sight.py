@@ -115,12 +115,7 @@ class Sight:
         self._look(points, pose, now)
 
     def trouble(self, frame: str, now: float) -> Reason | None:
-        """Return why the robot must stand, with figures; None if it can see.
-
-        Args:
-            frame: of the path.
-            now: the time [s].
-        """
+        """Return why the robot must stand, with figures; None if it can see in the path's frame."""
         if self._fault is not None:
             return self._fault
         if self._grid is None:

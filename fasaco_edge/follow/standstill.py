@@ -53,10 +53,7 @@ class Standstill:
     ) -> bytes | None:
         """Return a report as JSON, see ``wire.documents.blocked``; None if none is due.
 
-        Args:
-            follower: with its state, and what is ahead.
-            planner, revision: of the path.
-            now: the time [s].
+        ``planner``, ``revision``: of the path.
         """
         pose, state = follower.newest_pose, follower.state
         if state not in REASONS or pose is None:
@@ -89,10 +86,7 @@ class Standstill:
 def floor_ahead(here: Point, toward: float, radius: float) -> tuple[Point, ...]:
     """Return the floor that a robot pushes against, places [m]; none for an unknown radius.
 
-    Args:
-        here: where the robot is.
-        toward: where it is to go [rad].
-        radius: of its disc [m].
+    ``toward``: where it is to go [rad]; ``radius``: of its disc [m].
     """
     if not radius:
         return ()

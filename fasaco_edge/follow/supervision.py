@@ -78,9 +78,6 @@ class Patience:
 class Supervision:
     """Decides whether path, pose and daemon let the robot drive; base class of followers.
 
-    Args:
-        patience: timeouts of pose and status.
-
     Attributes:
         state: of the robot.
         detail: figures of the state, in words.

@@ -115,9 +115,9 @@ def test_the_one_before_may_end_before_the_next_is_accepted():
     goal = drive.begun()
     ahead = next(request for step in range(1, 195) for request in drive.step(step / 10))
     drive.end(goal, ABORTED)
-    assert drive.step(19.5) == []
+    asked = drive.step(19.5)
     drive.accept(ahead)
-    assert drive.step(19.6) == [AskResult(ahead.id)]
+    assert asked + drive.step(19.6) == [AskResult(ahead.id)]
 
 
 def test_at_a_reversal_the_next_goal_starts_just_before_the_turn():
@@ -215,6 +215,7 @@ def test_errors_are_named_and_goals_retried_with_growing_pauses(code, name):
     assert drive.follower.detail == f"{code} {name}"
     (goal,) = drive.step(0.0, after=RETRY_S)
     drive.accept(goal)
+    assert drive.step(0.0) == [AskResult(goal.id)]
     drive.end(goal, ABORTED, code)
     assert drive.step(0.0, after=RETRY_S) == []
     (goal,) = drive.step(0.0, after=RETRY_S)
