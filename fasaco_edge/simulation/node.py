@@ -92,15 +92,13 @@ def run_simulation(
 ) -> Progress | None:
     """Run the robot of ``world`` on the bus until it has to stop.
 
-    It publishes its map (latched) and its pose with simulated time as the stamp, and
-    drives along the newest path, or by velocities. In the main thread, SIGINT and SIGTERM end it
-    too. Its last map and pose are published before it returns its last progress; None if it was
-    stopped before it had joined the bus.
+    It publishes its map (latched) and its pose with simulated time as the stamp, and drives along
+    the newest path, or by velocities. In the main thread, SIGINT and SIGTERM end it too. Its last
+    map and pose are published before it returns its last progress; None if it was stopped before it
+    had joined the bus.
 
     Args:
-        world: the building and the robot.
-        keys: the robot's keys.
-        settings: how to join the bus.
+        world, keys, settings: the building and the robot, its keys, and how to join the bus.
         speed: simulated seconds per second, above 0; a machine that cannot keep up
             runs slower.
         driver: ideal: it follows paths itself; follow: velocities drive it.

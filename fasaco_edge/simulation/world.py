@@ -20,8 +20,7 @@ from fasaco_edge.grid.geometry import Point, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.mapper import Mapper
-from fasaco_edge.simulation.noise import MapperNoise
-from fasaco_edge.simulation.noisy_mapper import NoisyMapper
+from fasaco_edge.simulation.noisy_mapper import MapperNoise, NoisyMapper
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     Battery,
@@ -99,8 +98,9 @@ class World:
         config: SimulationConfig,
         noise: MapperNoise | None = None,
     ) -> None:
-        self._truth = truth
-        self.config = config
+        self._truth, self.config = truth, config
+        # Name of the frame of everything the robot publishes.
+        self.frame = truth.frame
         col, row = truth.geometry.to_pixels(start.x, start.y)
         if not (0 <= row < truth.geometry.rows and 0 <= col < truth.geometry.cols):
             raise StartOutsideMap(f"start ({start.x:g}, {start.y:g}) m is not on the map")
@@ -126,8 +126,7 @@ class World:
         self.distance_m = 0.0
         self.collisions = 0
         self.stops = 0
-        # The other robots in the building, by name, and how often it touched one, or stopped
-        # before one.
+        # Other robots in the building, by name; how often it touched one, or stopped before one.
         self.others: dict[str, Point] = {}
         self.touches = self.meetings = 0
         self._is_held = False
@@ -148,7 +147,7 @@ class World:
 
     @property
     def velocity(self) -> tuple[float, float]:
-        """Its speed [m/s] and rate of turning [rad/s]."""
+        """Speed [m/s] and rate of turning [rad/s]."""
         return self._drive.speed, self._drive.turn_rate
 
     @property
@@ -160,11 +159,6 @@ class World:
     def longest_stand_s(self) -> float:
         """The longest time that the robot stood between two moves [s]."""
         return self._longest_stand * self.config.tick_s
-
-    @property
-    def frame(self) -> str:
-        """Name of the frame of everything the robot publishes."""
-        return self._truth.frame
 
     @property
     def stamp_ns(self) -> int:
@@ -245,12 +239,10 @@ class World:
             has_room = partial(is_clear, margin_m=margin_m)
             route = joined(self._path, track, has_room, goes_back=goes_back)
             if route is not None:
-                break
-        if route is None:
-            self._corners, self.activity = [], Activity.NO_WAY
-            return
-        self._corners = [(float(x), float(y)) for x, y in route[::-1]]
-        self.activity = Activity.DRIVING if self._corners else Activity.IDLE
+                self._corners = [(float(x), float(y)) for x, y in route[::-1]]
+                self.activity = Activity.DRIVING if self._corners else Activity.IDLE
+                return
+        self._corners, self.activity = [], Activity.NO_WAY
 
     def _may_try_again(self) -> bool:
         """Return whether the robot, stopped for the first time on its path, has come to rest."""
@@ -299,12 +291,12 @@ class World:
         if self.activity is Activity.STOPPED:
             return False
         ahead = driven(self._drive, self._goal(), self.config)
-        was_held, self._is_held = self._is_held, self._meets(stopping_point(ahead, self.config))
+        rest = stopping_point(ahead, self.config)
+        was_held, self._is_held = self._is_held, self._meets(rest)
         if self._is_held:
             self.meetings += not was_held
             return False
-        stop = self._on_map(stopping_point(ahead, self.config))
-        if ahead.speed == 0.0 or self._mapper.is_clear_at(stop):
+        if ahead.speed == 0.0 or self._mapper.is_clear_at(self._on_map(rest)):
             return True
         self.activity = Activity.STOPPED
         self.stops += 1
@@ -316,23 +308,20 @@ class World:
         ahead = moved_by(self._drive, speed_m_s, turn_rad_s, self.config)
         was_touching = self.activity is Activity.COLLIDED
         self.activity = Activity.DRIVING if ahead.moving else Activity.IDLE
-        if ahead.moving and not _fits(self._truth, ahead.pose, self.config):
-            slid = self._slid(ahead)
-            if slid is not None:
-                self.collisions += not was_touching
-                self._go_on(slid)
-                self.activity = Activity.COLLIDED
-                return
-        if ahead.moving or self._drive.moving:
+        hits = ahead.moving and not _fits(self._truth, ahead.pose, self.config)
+        if hits and (slid := self._slid(ahead)) is not None:
+            self.collisions += not was_touching
+            self._go_on(slid)
+            self.activity = Activity.COLLIDED
+        elif ahead.moving or self._drive.moving:
             self._go_on(ahead)
 
     def _slid(self, ahead: DriveState) -> DriveState | None:
         """Return the state of a base that slides along a wall; None if it cannot."""
         here, pose = self.pose, ahead.pose
         way = math.dist((here.x, here.y), (pose.x, pose.y))
-        for deg in SLIDES_DEG:
-            along = pose.yaw + math.radians(deg)
-            share = math.cos(math.radians(deg))
+        for off in map(math.radians, SLIDES_DEG):
+            along, share = pose.yaw + off, math.cos(off)
             x, y = here.x + share * way * math.cos(along), here.y + share * way * math.sin(along)
             slid = Pose2D(x, y, pose.yaw)
             if _fits(self._truth, slid, self.config):

@@ -7,14 +7,13 @@ import pytest
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.simulation.mapper import Mapper
-from fasaco_edge.simulation.noise import MapperNoise
-from fasaco_edge.simulation.noisy_mapper import NoisyMapper
+from fasaco_edge.simulation.noisy_mapper import MapperNoise, NoisyMapper
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
 from tests.simulation.rooms import RESOLUTION, building
 
 CONFIG = SimulationConfig(range_m=6.0)
-NONE = MapperNoise.none()
+NONE = MapperNoise().times(0.0)
 LEG = (1.5, 1.5, 1.55, 1.55)
 
 

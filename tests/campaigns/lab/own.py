@@ -16,7 +16,7 @@ from fasaco_edge.follow.estimate import STAND, Command
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, ranges_of
-from fasaco_edge.simulation.noise import MapperNoise
+from fasaco_edge.simulation.noisy_mapper import MapperNoise
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from tests.campaigns.lab.building import Building
@@ -28,8 +28,8 @@ MAP_EVERY_S = 3.0
 NOISES: dict[str, MapperNoise | None] = {
     "none": None,
     "usual": MapperNoise(),
-    "range": replace(MapperNoise.none(), range_m=0.02, shift_m=0.05),
-    "legs": replace(MapperNoise.none(), leg_misses=0.9, specks=0.002, shift_m=0.05),
+    "range": replace(MapperNoise().times(0.0), range_m=0.02, shift_m=0.05),
+    "legs": replace(MapperNoise().times(0.0), leg_misses=0.9, specks=0.002, shift_m=0.05),
     "drift": replace(MapperNoise(), drift_m=0.015, drift_rad=0.005),
     "jumps": replace(MapperNoise(), jumps=0.03),
     "late": replace(MapperNoise(), late_s=0.3),
