@@ -31,7 +31,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.follow.nav2 import EARLY_M
 from fasaco_edge.follow.pieces import GAIN_M, TIP_M, Line, end_of_piece
 from fasaco_edge.grid.geometry import Pose2D
-from tests.follow.nav2_missions import Point, kind_of, nav2_follower, nav2_robot, passed
+from tests.follow.nav2_missions import Point, Robot, kind_of, nav2_follower, passed
 from tests.support.driven_base import DrivenBase
 
 LIMIT_S = 600.0
@@ -120,7 +120,7 @@ def run_mission(faults: str, length_m: float, speed_m_s: float, seed: int) -> Mi
     try:
         with (
             tempfile.TemporaryDirectory() as folder,
-            nav2_robot(**robot) as nav2,
+            Robot(**robot) as nav2,
             nav2_follower(Path(folder), base.endpoint, kind_of(domain), speed_m_s=speed_m_s) as log,
         ):
             base.plans()

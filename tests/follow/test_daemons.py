@@ -76,13 +76,6 @@ def test_of_two_that_plan_it_is_the_one_that_will_go_on(daemons):
     assert (daemons.news().planner, daemons.news().path) == (A, None)
 
 
-def test_a_path_without_a_daemon_is_handed_over_apart(daemons):
-    daemons.take_path(path(""))
-    news = daemons.news()
-    assert (news.path, news.unnamed) == (None, path(""))
-    assert daemons.news().unnamed is None
-
-
 def test_a_flood_of_daemons_is_bounded_and_keeps_the_planner(daemons):
     daemons.take_path(path(A))
     for number in range(100 * MOST_DAEMONS):

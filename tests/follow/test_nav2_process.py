@@ -6,7 +6,7 @@ import time
 import pytest
 
 from fasaco_edge.wire.messages.poses import decode_pose
-from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot, passed
+from tests.follow.nav2_missions import Robot, kind_of, nav2_follower, passed
 from tests.support.driven_base import DrivenBase
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
@@ -58,7 +58,7 @@ def test_a_path_is_driven_to_its_end(base, tmp_path, release, domain):
     # By rmw_zenoh it is seen, whatever the configuration says.
     told = {"release": release} if domain is None else {"controller": "FollowPath"}
     ros2 = {**kind_of(domain), "nav2": told}
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
+    with Robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
         base.plans()
         base.send_path(*LANES)
         wait_log(log, "standing, the path is driven")
@@ -72,7 +72,7 @@ def test_a_path_is_driven_to_its_end(base, tmp_path, release, domain):
 
 def test_a_path_that_crosses_itself_is_driven_without_standing(base, tmp_path):
     robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.5}
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
+    with Robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
         base.plans()
         base.send_path(*CROSSING)
         wait_log(log, "standing, the path is driven")
@@ -85,7 +85,7 @@ def test_a_path_that_crosses_itself_is_driven_without_standing(base, tmp_path):
 def test_a_replan_that_changes_nothing_ahead_changes_no_goal(base, tmp_path):
     robot = {"endpoint": base.endpoint, "domain": None, "start": (0.0, 0.0), "speed": 0.3}
     ros2 = kind_of(None)
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
+    with Robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
         base.plans()
         base.send_path((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
         wait_log(log, "driving")
@@ -102,7 +102,7 @@ def test_a_replan_that_changes_nothing_ahead_changes_no_goal(base, tmp_path):
 def test_a_replan_that_changes_what_lies_ahead_replaces_the_goal(base, tmp_path):
     robot = {"endpoint": base.endpoint, "domain": None, "start": (0.0, 0.0), "speed": 0.3}
     ros2 = kind_of(None)
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
+    with Robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
         base.plans()
         base.send_path((0.0, 0.0), (3.0, 0.0))
         poses = listen(base, "pose")
@@ -118,7 +118,7 @@ def test_a_replan_that_changes_what_lies_ahead_replaces_the_goal(base, tmp_path)
 @pytest.mark.parametrize("why", ["empty path", "no daemon"])
 def test_what_stops_the_robot_cancels_its_goal(base, tmp_path, why):
     robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.3}
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
+    with Robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
         base.plans()
         base.send_path((0.0, 0.0), (30.0, 0.0))
         poses = listen(base)
@@ -143,7 +143,7 @@ def test_no_server_and_an_error_are_said_with_their_reasons(base, tmp_path):
     base.send_path(*LANES)
     with nav2_follower(tmp_path, base.endpoint, ros2) as log:
         wait_log(log, "no pose")
-        with nav2_robot(**robot):
+        with Robot(**robot):
             wait_log(
                 log, "standing, given up by Nav2: 101 invalid controller: no controller Nothing"
             )
@@ -157,7 +157,7 @@ def test_a_mission_is_driven_by_nav2_to_its_end(tmp_path):
     with (
         daemon_process(tmp_path, ros2=ros2, robot=names) as daemon,
         Outsider(daemon.endpoint) as native,
-        nav2_robot(
+        Robot(
             endpoint=daemon.endpoint, domain=0, start=(0.6, 0.6), abort_every_s=6.0, delay_s=0.5,
             lost=0.02,
         ) as nav2,

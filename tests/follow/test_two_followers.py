@@ -12,7 +12,7 @@ from fasaco_edge.follow.daemons import NO_RIGHT
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import topics
 from tests.campaigns.fault_links import Link
-from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot
+from tests.follow.nav2_missions import Robot, kind_of, nav2_follower
 from tests.follow.test_process import AHEAD, config_file
 from tests.support.driven_base import DrivenBase, follower_process
 from tests.support.waiting import until
@@ -136,7 +136,7 @@ def test_nav2_gets_goals_from_one_of_two(base, tmp_path):
     robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.4}
     (tmp_path / "second").mkdir()
     with (
-        nav2_robot(**robot) as nav2,
+        Robot(**robot) as nav2,
         nav2_follower(tmp_path, base.endpoint, kind_of(7)) as first,
     ):
         until(lambda: "driving" in first.read_text())
