@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 
-from fasaco_edge.follow.curve_route import CurveRoute
 from fasaco_edge.follow.estimate import STAND, Command, Limits, PoseEstimate
 from fasaco_edge.follow.grip import Grip
 from fasaco_edge.follow.pursuit import CurvePursuit, Pursuit
-from fasaco_edge.follow.route import Joining, Route
+from fasaco_edge.follow.route import CurveRoute, Joining, Route
 from fasaco_edge.follow.sight import AHEAD_M, NO_LIMIT, Limit, Sight
 from fasaco_edge.follow.standstill import floor_ahead
 from fasaco_edge.follow.supervision import Patience, Reason, State, Supervision

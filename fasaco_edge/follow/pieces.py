@@ -12,7 +12,7 @@ from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from fasaco_edge.follow.route import apart
+from fasaco_edge.follow.legs import apart
 from fasaco_edge.grid.geometry import Point, Pose2D
 
 # Spacing of the poses of a piece [m]: controllers search the nearest one.

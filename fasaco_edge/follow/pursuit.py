@@ -5,7 +5,7 @@ the robot steers the arc through a point of the path some way ahead, of curvatur
 speed is regulated as by S. Macenski et al., Regulated Pure Pursuit for Robot Path Tracking (2023),
 but by the limits of the base: it brakes to come to rest at each stop, and respects the turn rate.
 Deviations: past a corner the point lies straight on, so that the corner is not cut; corners are
-rounded at the speed that ``follow/rounding.py`` allows; and a robot with a large heading error
+rounded at the speed that ``follow/legs.py`` allows; and a robot with a large heading error
 comes to rest and turns on the spot.
 """
 

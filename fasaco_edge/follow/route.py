@@ -10,15 +10,13 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice, pairwise
 
 from fasaco_edge.follow.estimate import Limits
-from fasaco_edge.follow.rounding import rounding
+from fasaco_edge.follow.legs import LEAST_LEG_M, Leg, apart, leg_between, rounding
 from fasaco_edge.grid.geometry import Point, Pose2D
 
-# Shorter legs have no direction of their own [m].
-LEAST_LEG_M = 1e-3
 # A new path is joined where it passes the robot within this distance of its start [m]: the robot
 # drove that stretch while the path was under way.
 JOIN_WITHIN_M = 0.3
@@ -33,8 +31,8 @@ LEAST_LEAD_M, LEAD_M = 0.15, 2.0
 MISSED_M = 0.03
 # A corner of the new path is the same as one of the old path if they are this near [m].
 SAME_M = 1e-3
-# Cosine of the angle up to which two legs lead in the same direction.
-SAME_DIRECTION = math.cos(ALONG_RAD)
+# Legs of a curve up to this long are chords of an arc [m].
+CHORD_M = 0.06
 
 
 class Joining(enum.Enum):
@@ -43,59 +41,6 @@ class Joining(enum.Enum):
     JOINED = "it is"
     AT_REST = "once the robot stands"
     ELSEWHERE = "not from here"
-
-
-@dataclass(frozen=True, slots=True)
-class Leg:
-    """A straight part of the path.
-
-    Attributes:
-        start, end: [m].
-        ux, uy: its direction, of length 1.
-        length: [m].
-        most: greatest speed at its end [m/s]: 0 where the robot has to come to rest, infinity where
-            it just steers.
-        early_s: how long before its end the robot begins to turn there, if it rounds a corner [s].
-        is_back: whether it is driven backward.
-    """
-
-    start: Point
-    end: Point
-    ux: float
-    uy: float
-    length: float
-    most: float = 0.0
-    early_s: float = 0.0
-    is_back: bool = False
-
-    @property
-    def stops(self) -> bool:
-        """Whether the robot has to come to rest at its end."""
-        return self.most == 0.0
-
-    @property
-    def bends(self) -> bool:
-        """Whether it just steers at its end."""
-        return self.most == math.inf
-
-    def placed(self, point: Point) -> tuple[float, float]:
-        """Return a point's distance along the leg's line, and to its left [m]."""
-        dx, dy = point[0] - self.start[0], point[1] - self.start[1]
-        return dx * self.ux + dy * self.uy, self.ux * dy - self.uy * dx
-
-    def distance(self, point: Point) -> float:
-        """Return a point's distance from the leg [m]."""
-        along, aside = self.placed(point)
-        beyond = max(-along, along - self.length, 0.0)
-        return math.hypot(beyond, aside)
-
-    def leads_as(self, other: Leg | None) -> bool:
-        """Return whether another leg leads in the same direction."""
-        return other is not None and self.ux * other.ux + self.uy * other.uy >= SAME_DIRECTION
-
-    def at(self, along: float) -> Point:
-        """Return the point at a distance along its line [m]."""
-        return self.start[0] + along * self.ux, self.start[1] + along * self.uy
 
 
 class Route:
@@ -315,16 +260,64 @@ class Route:
         return replace(leg, most=most, early_s=early_s)
 
 
-def apart(poses: Iterable[Pose2D], least: float) -> Iterator[Pose2D]:
-    """Yield the poses that are at least so far from the one yielded before [m]."""
-    last = None
-    for pose in poses:
-        if last is None or math.hypot(pose.x - last.x, pose.y - last.y) >= least:
-            yield pose
-            last = pose
+class CurveRoute(Route):
+    """A curve, and the leg of it that a robot is on that cannot turn on the spot.
 
+    Its legs are chords of arcs, and lanes; the robot steers from each to the next. It comes to rest
+    only where it changes between forward and backward: a leg is driven backward if the path's
+    heading is opposite to it.
+    """
 
-def leg_between(start: Point, end: Point) -> Leg:
-    """Return the leg from one point to another."""
-    length = math.dist(start, end)
-    return Leg(start, end, (end[0] - start[0]) / length, (end[1] - start[1]) / length, length)
+    def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
+        super().__init__(poses, limits)
+        # The leg before the first one, unless the robot comes to rest between them.
+        self._behind: Leg | None = None
+
+    def next_leg(self, here: Point | None = None) -> None:
+        """Go on to the next leg; the robot does not return to a corner that it has missed."""
+        leg = self.leg
+        self._behind = None if leg is None or leg.stops else leg
+        super().next_leg()
+
+    def carrot(self, along: float, ahead: float) -> Point:
+        """Return the point ``ahead`` of ``along`` the leg [m]; past a stop, further on the arc."""
+        leg, before, to = self._leg_at(along + ahead)
+        before = before or self._behind
+        beyond = to - leg.length
+        if beyond <= 0.0 or before is None or max(before.length, leg.length) > CHORD_M:
+            return leg.at(to)
+        heading = math.atan2(leg.uy, leg.ux)
+        turn = math.remainder(heading - math.atan2(before.uy, before.ux), math.tau)
+        curvature = 2.0 * turn / (before.length + leg.length)
+        # At its end, an arc has turned by half of a chord's angle more.
+        heading += 0.5 * (curvature * leg.length + curvature * beyond)
+        x, y = leg.end
+        return x + beyond * math.cos(heading), y + beyond * math.sin(heading)
+
+    def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
+        """Find the leg that passes the robot; see ``Route.join``.
+
+        The robot steers to a leg beside it: it cannot turn towards the nearest point.
+        """
+        leg = self.leg
+        if leg is None:
+            return Joining.JOINED
+        index, _ = self._passing(here, before)
+        if self._legs[index].distance(here) <= NEAREST_M:
+            del self._legs[:index]
+            return Joining.JOINED
+        if before is not None and (lead := before._lead_to(leg.start, here)):
+            is_back = before._legs[len(lead) - 1].is_back
+            most = math.inf if is_back == leg.is_back else 0.0
+            self._legs[:0] = [*lead[:-1], replace(lead[-1], most=most, is_back=is_back)]
+            return Joining.JOINED
+        if heading is not None:
+            return Joining.AT_REST
+        return Joining.ELSEWHERE if math.dist(here, leg.start) > BEGINNING_M else Joining.JOINED
+
+    def _leg_between(self, start: Pose2D, end: Pose2D) -> Leg:
+        leg = super()._leg_between(start, end)
+        return replace(leg, is_back=leg.ux * math.cos(start.yaw) + leg.uy * math.sin(start.yaw) < 0)
+
+    def _ending(self, leg: Leg, after: Leg) -> Leg:
+        return replace(leg, most=math.inf if after.is_back == leg.is_back else 0.0)

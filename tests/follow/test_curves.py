@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.curve_route import CurveRoute
 from fasaco_edge.follow.follower import Follower
+from fasaco_edge.follow.route import CurveRoute
 from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor
