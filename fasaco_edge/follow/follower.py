@@ -54,10 +54,9 @@ class Follower(Supervision):
         self._estimate = PoseEstimate(limits)
         self._pursuit = (CurvePursuit if limits.turn_radius else Pursuit)(limits, PERIOD_S)
         self._grip = Grip()
+        # The route that is driven, and the one to join.
         self._route: Route | None = None
-        # The route driven until a new path is joined.
-        self._before: Route | None = None
-        self._is_new = False
+        self._next: Route | None = None
         self._driven_at = -math.inf
         self._stepped_at: float | None = None
 
@@ -87,13 +86,10 @@ class Follower(Supervision):
         self._estimate.take(pose, now)
 
     def _have(self, points: PathPoints) -> None:
-        if not self._is_new:
-            self._before = self._route
-        self._route = (CurveRoute if self._limits.turn_radius else Route)(points, self._limits)
-        self._is_new = True
+        self._next = (CurveRoute if self._limits.turn_radius else Route)(points, self._limits)
 
     def _withdraw(self) -> None:
-        self._route, self._before, self._is_new = None, None, False
+        self._route = self._next = None
 
     def _trouble(self, now: float) -> Reason | None:
         if (reason := super()._trouble(now)) is not None:
@@ -104,22 +100,23 @@ class Follower(Supervision):
         return self._sight.trouble(self.path_frame, now) if self._sight is not None else None
 
     def _steer(self, now: float) -> Command | None:
-        assert self._route is not None
         pose = self._estimate.at(now)
         here = (pose.x, pose.y)
-        if self._is_new:
+        if self._next is not None:
             heading = None
             if self._estimate.speed:
                 heading = pose.yaw if self._estimate.speed > 0.0 else pose.yaw + math.pi
-            joining = self._route.join(here, heading, self._before)
+            joining = self._next.join(here, heading, self._route)
             if joining is Joining.AT_REST:
                 return self._pursuit.brake()
             if joining is Joining.ELSEWHERE:
                 self.state = State.PATH_ELSEWHERE
                 return None
-            self._is_new, self._before = False, None
-        leg = self._route.leg
-        x, y = self._route.line_ahead(here, LEADS_M)[-1]
+            self._route, self._next = self._next, None
+        route = self._route
+        assert route is not None
+        leg = route.leg
+        x, y = route.line_ahead(here, LEADS_M)[-1]
         toward = math.atan2(y - here[1], x - here[0])
         if leg is not None and self._grip.is_lost(self._estimate, toward, now):
             self.state, self.detail = State.NOT_MOVING, self._grip.detail
@@ -128,10 +125,10 @@ class Follower(Supervision):
         if leg is not None and (off := leg.distance(here)) > OFF_PATH_M:
             self.state, self.detail = State.OFF_PATH, f"by {off:.2f} m"
             return None
-        limit = self._limit(pose, self._route)
+        limit = self._limit(pose, route)
         most = min(limit.speed, self._path_most_m_s)
-        command = self._pursuit.steer(pose, self._route, most)
-        if self._route.leg is None:
+        command = self._pursuit.steer(pose, route, most)
+        if route.leg is None:
             self.state = State.DRIVEN
             return None
         if self._pursuit.is_lost:
