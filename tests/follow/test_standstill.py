@@ -95,17 +95,8 @@ def test_the_floor_ahead_of_a_stalled_base_lies_before_its_disc():
     ids=str,
 )
 def test_reports_beyond_a_limit_are_refused(wrong):
-    document = {
-        "daemon": "a1",
-        "revision": 1,
-        "reason": "obstacle",
-        "detail": "",
-        "held_s": 5.0,
-        "frame": "map",
-        "x": 0.0,
-        "y": 0.0,
-        "points": [],
-    }
+    document = {"daemon": "a1", "revision": 1, "reason": "obstacle", "detail": "", "held_s": 5.0}
+    document |= {"frame": "map", "x": 0.0, "y": 0.0, "points": []}
     assert blocked_of(json.dumps(document).encode()).points == ()
     with pytest.raises(MalformedMessage):
         blocked_of(json.dumps(document | wrong).encode())
