@@ -207,24 +207,24 @@ class DockingNode:
         pose = Pose2D(*dock["pose"])
         new_id = partial(os.urandom, GOAL_ID_BYTES)
         docking = self._docking = Docking(pose, dock["approach_m"], new_id)
-        client = partial(ActionClient, bus, settings.ros, sender=docking, clock=time.monotonic)
-        self._clients = {
-            Move.DOCK: client(dock["dock_action"], DOCK_ROBOT, read_ending=decode_dock_ending),
-            Move.UNDOCK: client(
-                dock["undock_action"], UNDOCK_ROBOT, read_ending=decode_undock_ending
-            ),
-        }
         names = dock["id"], dock["type"]
-        # By the id of the goal, what is sent to begin it.
-        self._goals: dict[Move, Callable[[bytes], bytes]] = {
-            Move.DOCK: lambda goal_id: encode_dock(goal_id, pose, dock["frame"], *names),
-            Move.UNDOCK: lambda goal_id: encode_undock(goal_id, dock["type"]),
+        client = partial(ActionClient, bus, settings.ros, sender=docking, clock=time.monotonic)
+        # The client of each motion, and what is sent to begin a goal, by its id.
+        self._actions: dict[Move, tuple[ActionClient, Callable[[bytes], bytes]]] = {
+            Move.DOCK: (
+                client(dock["dock_action"], DOCK_ROBOT, read_ending=decode_dock_ending),
+                lambda goal_id: encode_dock(goal_id, pose, dock["frame"], *names),
+            ),
+            Move.UNDOCK: (
+                client(dock["undock_action"], UNDOCK_ROBOT, read_ending=decode_undock_ending),
+                lambda goal_id: encode_undock(goal_id, dock["type"]),
+            ),
         }
         self._logged = ("", "")
 
     def turn(self, state: str, follower: Supervision) -> None:
         """Run a cycle; the follower is held while the docking server moves the robot."""
-        for client in self._clients.values():
+        for client, _ in self._actions.values():
             client.turn()
         docking, pose = self._docking, follower.newest_pose
         self._ask(docking.step(time.monotonic(), state, pose, drives=follower.has_path))
@@ -241,4 +241,5 @@ class DockingNode:
 
     def _ask(self, requests: list[DockRequest]) -> None:
         for move, request in requests:
-            self._clients[move].ask(request, self._goals[move](request.id))
+            client, goal_of = self._actions[move]
+            client.ask(request, goal_of(request.id))

@@ -176,7 +176,13 @@ class Nav2Follower(Supervision):
         if ending is None:
             self._fail(State.NO_NAV2, why, now)
         elif ending.status == SUCCEEDED:
-            self._take_done(goal, now)
+            if (path := self._path) is None:
+                return
+            far = math.dist(self._here, path.line.at(goal.end))
+            if far > DONE_M and goal.end - path.way > DONE_M:
+                self._fail(State.GIVEN_UP, f"reported as done {far:.1f} m before the end", now)
+            else:
+                path.finish(goal)
         elif ending.status == ABORTED:
             self._fail(State.GIVEN_UP, said_of(ending, ERRORS, NO_CODE), now)
         elif ending.status == CANCELED:
@@ -290,15 +296,6 @@ class Nav2Follower(Supervision):
         elif now - self._asked_at > longest_s:
             self._asked_at = now
             self._requests.append(AskResult(goal.id))
-
-    def _take_done(self, goal: Goal, now: float) -> None:
-        if self._path is None:
-            return
-        far = math.dist(self._here, self._path.line.at(goal.end))
-        if far > DONE_M and goal.end - self._path.way > DONE_M:
-            self._fail(State.GIVEN_UP, f"reported as done {far:.1f} m before the end", now)
-            return
-        self._path.finish(goal)
 
     def _fail(self, state: State, detail: str, now: float, *, for_good: bool = False) -> None:
         self._trouble_of_nav2 = (state, detail)

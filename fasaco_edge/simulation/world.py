@@ -109,8 +109,8 @@ class World:
                 f"a robot of radius {config.robot_radius_m:g} m does not fit at the start "
                 f"({start.x:g}, {start.y:g}) m"
             )
-        self._drive = DriveState(start)
-        self._mapper = NoisyMapper(truth, config, noise) if noise else Mapper(truth, config)
+        self.drive = DriveState(start)
+        self.mapper = NoisyMapper(truth, config, noise) if noise else Mapper(truth, config)
         # Poses that are not yet published, and by how much each is delayed.
         self._poses: deque[StampedPose] = deque()
         self._late_ns = round(noise.late_s / config.tick_s) * config.tick_ns if noise else 0
@@ -132,33 +132,18 @@ class World:
         self._is_held = False
         # Number of the robot's stops when its path came.
         self._stopped_at = 0
-        # For how many ticks the robot has stood, once it has moved; and the longest such time.
-        self._stands = self._longest_stand = 0
+        # For how many ticks the robot stands, once it has moved; and the longest such time [s].
+        self._stands, self.longest_stand_s = 0, 0.0
 
     @property
     def pose(self) -> Pose2D:
         """The robot's true pose."""
-        return self._drive.pose
+        return self.drive.pose
 
     @property
     def believed(self) -> Pose2D:
         """Its mapper's estimate of the pose; without noise the true one."""
-        return self._mapper.believed(self._drive.pose)
-
-    @property
-    def velocity(self) -> tuple[float, float]:
-        """Speed [m/s] and rate of turning [rad/s]."""
-        return self._drive.speed, self._drive.turn_rate
-
-    @property
-    def loops(self) -> int:
-        """How many loops its mapper has closed."""
-        return self._mapper.loops
-
-    @property
-    def longest_stand_s(self) -> float:
-        """The longest time that the robot stood between two moves [s]."""
-        return self._longest_stand * self.config.tick_s
+        return self.mapper.believed(self.drive.pose)
 
     @property
     def stamp_ns(self) -> int:
@@ -168,13 +153,13 @@ class World:
     @property
     def track(self) -> NDArray[np.float64]:
         """Where the robot has been: points (x, y) [m], float64 (n, 2), the start first."""
-        pose = self._drive.pose
+        pose = self.drive.pose
         return np.array([*self._track, (pose.x, pose.y)], np.float64)
 
     def emission(self) -> Emission:
         """Return map and pose as they are now; there is no map before the first tick."""
         pose = StampedPose(self.believed, self.frame, self.stamp_ns)
-        return Emission(self._mapper.snapshot(self.stamp_ns), pose, self.battery)
+        return Emission(self.mapper.snapshot(self.stamp_ns), pose, self.battery)
 
     def follow(self, path: NDArray[np.float64]) -> None:
         """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); an empty one halts.
@@ -193,7 +178,7 @@ class World:
     @property
     def unanswered_s(self) -> float:
         """Time since the newest velocity while the robot moves, or is commanded to [s]."""
-        if self._told is None or not (self._drive.moving or any(self._told[:2])):
+        if self._told is None or not (self.drive.moving or any(self._told[:2])):
             return 0.0
         return (self._ticks - self._told[2]) * self.config.tick_s
 
@@ -204,14 +189,14 @@ class World:
         self._count_stand()
         self._drain()
         if self._is_due(self.config.scan_hz):
-            self._mapper.scan(self.pose)
+            self.mapper.scan(self.pose)
             if self.activity is Activity.NO_WAY or self._may_try_again():
                 self._join()
         if self._is_due(self.config.pose_hz):
             self._poses.append(StampedPose(self.believed, self.frame, self.stamp_ns))
         is_ripe = self._poses and self._poses[0].stamp_ns <= self.stamp_ns - self._late_ns
         return Emission(
-            self._mapper.snapshot(self.stamp_ns) if self._is_due(self.config.map_hz) else None,
+            self.mapper.snapshot(self.stamp_ns) if self._is_due(self.config.map_hz) else None,
             self._poses.popleft() if is_ripe else None,
             self.battery if self._is_due(BATTERY_HZ) else None,
         )
@@ -221,11 +206,11 @@ class World:
         return (self._ticks - 1) % self.config.period_ticks(rate_hz) == 0
 
     def _drain(self) -> None:
-        battery, drive = self.battery, self._drive
+        battery, drive = self.battery, self.drive
         if battery is None:
             return
         if battery.level == 0.0:  # with an empty battery the robot stands
-            self._drive = DriveState(drive.pose)
+            self.drive = DriveState(drive.pose)
             self._path, self._corners, self.activity = None, [], Activity.IDLE
         away_m = math.dist(self._dock, (drive.pose.x, drive.pose.y))
         battery.tick(self.config.tick_s, moves=drive.moving, is_docked=away_m <= DOCK_M)
@@ -233,7 +218,7 @@ class World:
     def _join(self) -> None:
         if self._path is None:
             return
-        track, is_clear = self._recent_track(), self._mapper.is_clear
+        track, is_clear = self._recent_track(), self.mapper.is_clear
         # Going straight on, even within the margin, has priority over going back.
         for goes_back, margin_m in ((False, MARGIN_M), (False, 0.0), (True, MARGIN_M), (True, 0.0)):
             has_room = partial(is_clear, margin_m=margin_m)
@@ -247,12 +232,12 @@ class World:
     def _may_try_again(self) -> bool:
         """Return whether the robot, stopped for the first time on its path, has come to rest."""
         is_first = self.stops == self._stopped_at + 1
-        return self.activity is Activity.STOPPED and is_first and not self._drive.moving
+        return self.activity is Activity.STOPPED and is_first and not self.drive.moving
 
     def _recent_track(self) -> NDArray[np.float64]:
         """Return the track's last metres, to where the robot can come to rest, on its map."""
         here = (self.pose.x, self.pose.y)
-        rest = stopping_point(self._drive, self.config)
+        rest = stopping_point(self.drive, self.config)
         points = 2 + int(math.dist(here, rest) / TRACK_SPACING_M)
         ahead = np.linspace(here, rest, points).tolist()
         track = [*self._track[-RECENT_TRACK_POINTS:], *ahead]
@@ -260,7 +245,7 @@ class World:
 
     def _on_map(self, place: Point) -> Point:
         """Return the position of a place on the robot's map."""
-        pose = self._mapper.believed(Pose2D(*place))
+        pose = self.mapper.believed(Pose2D(*place))
         return pose.x, pose.y
 
     def _move(self) -> None:
@@ -273,15 +258,15 @@ class World:
         if not self._corners:
             if self.activity in (Activity.DRIVING, Activity.STOPPED):
                 self.activity = Activity.IDLE
-            if not self._drive.moving:
+            if not self.drive.moving:
                 return
         goal = self._goal() if self._corners and self._looks_ahead() else None
-        if goal is not None or self._drive.moving:
-            self._go_on(driven(self._drive, goal, self.config))
+        if goal is not None or self.drive.moving:
+            self._go_on(driven(self.drive, goal, self.config))
 
     def _goal(self) -> Point:
         """Return the true position of the next corner."""
-        return self._mapper.true_place(*self._corners[-1])
+        return self.mapper.true_place(*self._corners[-1])
 
     def _looks_ahead(self) -> bool:
         """Return whether the robot may drive on: it stops before obstacles on its own map.
@@ -290,13 +275,13 @@ class World:
         """
         if self.activity is Activity.STOPPED:
             return False
-        ahead = driven(self._drive, self._goal(), self.config)
+        ahead = driven(self.drive, self._goal(), self.config)
         rest = stopping_point(ahead, self.config)
         was_held, self._is_held = self._is_held, self._meets(rest)
         if self._is_held:
             self.meetings += not was_held
             return False
-        if ahead.speed == 0.0 or self._mapper.is_clear_at(self._on_map(rest)):
+        if ahead.speed == 0.0 or self.mapper.is_clear_at(self._on_map(rest)):
             return True
         self.activity = Activity.STOPPED
         self.stops += 1
@@ -305,7 +290,7 @@ class World:
     def _move_as_told(self, speed_m_s: float, turn_rad_s: float, tick: int) -> None:
         if (self._ticks - tick) * self.config.tick_s > DEAF_S:
             speed_m_s = turn_rad_s = 0.0
-        ahead = moved_by(self._drive, speed_m_s, turn_rad_s, self.config)
+        ahead = moved_by(self.drive, speed_m_s, turn_rad_s, self.config)
         was_touching = self.activity is Activity.COLLIDED
         self.activity = Activity.DRIVING if ahead.moving else Activity.IDLE
         hits = ahead.moving and not _fits(self._truth, ahead.pose, self.config)
@@ -313,7 +298,7 @@ class World:
             self.collisions += not was_touching
             self._go_on(slid)
             self.activity = Activity.COLLIDED
-        elif ahead.moving or self._drive.moving:
+        elif ahead.moving or self.drive.moving:
             self._go_on(ahead)
 
     def _slid(self, ahead: DriveState) -> DriveState | None:
@@ -339,28 +324,28 @@ class World:
     def _go_on(self, ahead: DriveState) -> None:
         """Take over a state that may be in a wall, or in another robot."""
         if self._meets((ahead.pose.x, ahead.pose.y), 0.0):
-            self.touches += self._drive.moving
-            self._drive = DriveState(self.pose)
+            self.touches += self.drive.moving
+            self.drive = DriveState(self.pose)
             return
         if not _fits(self._truth, ahead.pose, self.config):
             self._collide()
             return
         self._extend_track(ahead)
         self.distance_m += abs(ahead.speed) * self.config.tick_s
-        self._drive = ahead
+        self.drive = ahead
 
     def _collide(self) -> None:
         # A robot that is commanded to push on stands at the wall; this counts as one collision.
-        self.collisions += self._told is None or self._drive.moving
-        self._drive = DriveState(self.pose)
+        self.collisions += self._told is None or self.drive.moving
+        self.drive = DriveState(self.pose)
         self._path, self._corners = None, []
         self.activity = Activity.COLLIDED
 
     def _count_stand(self) -> None:
         """Count how long the robot stands, once it has moved."""
-        if self._drive.moving:
-            self._longest_stand = max(self._longest_stand, self._stands)
-            self._stands = 0
+        if self.drive.moving:
+            stood_s = self._stands * self.config.tick_s
+            self._stands, self.longest_stand_s = 0, max(self.longest_stand_s, stood_s)
         elif self.distance_m > 0.0:
             self._stands += 1
 
@@ -368,7 +353,7 @@ class World:
         """Add the point the robot is about to leave, if the track does not have it."""
         here = (self.pose.x, self.pose.y)
         gone = math.dist(self._track[-1], here)
-        turns_off = ahead.speed != 0.0 and self._drive.speed == 0.0
+        turns_off = ahead.speed != 0.0 and self.drive.speed == 0.0
         if gone >= TRACK_SPACING_M or (gone > 0.0 and turns_off):
             self._track.append(here)
 

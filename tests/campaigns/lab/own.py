@@ -94,7 +94,7 @@ class OwnBase:
     def tick(self) -> None:
         """Move on by a tick."""
         emission = self.world.tick()
-        self.wheels = Command(*self.world.velocity)
+        self.wheels = Command(self.world.drive.speed, self.world.drive.turn_rate)
         self.touches = self.world.activity is Activity.COLLIDED
         self.pose = emission.pose.pose if emission.pose is not None else self.pose
         self.map = emission.map or self.map
@@ -120,7 +120,7 @@ class OwnMapper:
     @property
     def loops(self) -> int:
         """How many loops were closed."""
-        return self._base.world.loops
+        return self._base.world.mapper.loops
 
     def corrected(self, _odometry: Pose2D) -> Pose2D:
         """Return the newest pose that the mapper has published."""
