@@ -322,24 +322,24 @@ class World:
         )
 
     def _go_on(self, ahead: DriveState) -> None:
-        """Take over a state that may be in a wall, or in another robot."""
+        """Take over a state that may be in a wall, or in another robot: there it stands."""
         if self._meets((ahead.pose.x, ahead.pose.y), 0.0):
             self.touches += self.drive.moving
             self.drive = DriveState(self.pose)
-            return
-        if not _fits(self._truth, ahead.pose, self.config):
-            self._collide()
-            return
-        self._extend_track(ahead)
-        self.distance_m += abs(ahead.speed) * self.config.tick_s
-        self.drive = ahead
-
-    def _collide(self) -> None:
-        # A robot that is commanded to push on stands at the wall; this counts as one collision.
-        self.collisions += self._told is None or self.drive.moving
-        self.drive = DriveState(self.pose)
-        self._path, self._corners = None, []
-        self.activity = Activity.COLLIDED
+        elif not _fits(self._truth, ahead.pose, self.config):
+            # A robot that is commanded to push on stands at the wall; this counts as one collision.
+            self.collisions += self._told is None or self.drive.moving
+            self.drive = DriveState(self.pose)
+            self._path, self._corners, self.activity = None, [], Activity.COLLIDED
+        else:
+            # The track gets the point the robot is about to leave, at times and at corners.
+            here = (self.pose.x, self.pose.y)
+            gone = math.dist(self._track[-1], here)
+            turns_off = ahead.speed != 0.0 and self.drive.speed == 0.0
+            if gone >= TRACK_SPACING_M or (gone > 0.0 and turns_off):
+                self._track.append(here)
+            self.distance_m += abs(ahead.speed) * self.config.tick_s
+            self.drive = ahead
 
     def _count_stand(self) -> None:
         """Count how long the robot stands, once it has moved."""
@@ -348,14 +348,6 @@ class World:
             self._stands, self.longest_stand_s = 0, max(self.longest_stand_s, stood_s)
         elif self.distance_m > 0.0:
             self._stands += 1
-
-    def _extend_track(self, ahead: DriveState) -> None:
-        """Add the point the robot is about to leave, if the track does not have it."""
-        here = (self.pose.x, self.pose.y)
-        gone = math.dist(self._track[-1], here)
-        turns_off = ahead.speed != 0.0 and self.drive.speed == 0.0
-        if gone >= TRACK_SPACING_M or (gone > 0.0 and turns_off):
-            self._track.append(here)
 
 
 def _fits(truth: OccupancyGrid, pose: Pose2D, config: SimulationConfig) -> bool:
