@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
     from fasaco_edge.bus.session import Bus
     from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.config.robot import RobotConfig
     from fasaco_edge.config.ros import RosConfig
+    from fasaco_edge.follow.estimate import Limits
     from fasaco_edge.follow.node import Node
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
 
@@ -140,15 +142,15 @@ def _become_small(args: argparse.Namespace) -> NoReturn:
 
 def _drive() -> int:
     """Drive, in the small process."""
-    from fasaco_edge.follow.node import native_node, run_follower
+    from fasaco_edge.follow.node import FollowerNode, run_follower
     from fasaco_edge.follow.settings import FollowSettings
 
     settings = FollowSettings.decode(sys.stdin.buffer.read())
-    node_of: Callable[[Bus, FollowSettings, Callable[[str], None]], Node] = native_node
+    node_of: Callable[[Bus, FollowSettings, Callable[[str], None]], Node] = FollowerNode
     if settings.nav2:
-        from fasaco_edge.follow.nav2_node import nav2_node as node_of
-    elif settings.ros:
-        from fasaco_edge.follow.ros import ros_node as node_of
+        from fasaco_edge.follow.nav2_node import Nav2Node
+
+        node_of = Nav2Node
     with stop_event() as stop:
         run_follower(settings, stop, node_of, lambda line: print(line, flush=True))
     return Exit.OK
@@ -174,12 +176,7 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         base=here.keys.base,
         connect=here.bus.connect,
         secured=here.bus.secured,
-        speed_m_s=robot.speed_m_s,
-        acceleration_m_s2=robot.acceleration_m_s2,
-        turn_deg_s=robot.turning_deg_s(),
-        turn_deg_s2=robot.turn_deg_s2,
-        steered_deg=robot.steered_deg,
-        turn_radius_m=robot.turn_radius_m,
+        limits=limits_of(robot),
         pose_schema=config.pose.schema,
         pose_age_s=args.pose_age,
         poses=_ros_poses(ros) if ros else poses,
@@ -194,6 +191,20 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         radius_m=robot.radius_m,
         pace=args.speed,
         dry_run=args.dry_run,
+    )
+
+
+def limits_of(robot: RobotConfig) -> Limits:
+    """Return the limits of a base."""
+    from fasaco_edge.follow.estimate import Limits
+
+    return Limits(
+        robot.speed_m_s,
+        robot.acceleration_m_s2,
+        math.radians(robot.turning_deg_s()),
+        math.radians(robot.turn_deg_s2),
+        math.radians(robot.steered_deg),
+        robot.turn_radius_m,
     )
 
 
@@ -221,7 +232,6 @@ def _scan(config: DaemonConfig) -> dict[str, object]:
             "yaw": math.radians(scan.yaw_deg),
             "upside_down": scan.upside_down,
         },
-        "radius_m": config.robot.radius_m,
         "lost_s": scan.lost_s,
         "free_at_most": config.map.free_at_most,
         "most_pixels": config.map.max_pixels,

@@ -24,6 +24,7 @@ from fasaco_edge.grid.map_files import find_map, map_sources, read_map
 
 if TYPE_CHECKING:
     from fasaco_edge.simulation.node import Progress
+    from fasaco_edge.simulation.world import World
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -114,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
             driver=args.driver,
             meets_others=args.meets_others,
             waits=True,
-            report=lambda progress: shown.update(task, description=_words(progress)),
+            report=lambda progress: shown.update(task, description=_words(world, progress)),
         )
     if result is None:
         return 0
@@ -122,24 +123,24 @@ def run(args: argparse.Namespace) -> int:
         with writing(args.trail_out) as file:
             np.savetxt(file, world.track, "%.4f", ",", header="x,y", comments="")
     print(
-        f"drove {result.distance_m:.1f} m in {result.sim_s:.0f} simulated s, "
-        f"{result.collisions} collisions, {result.stops} stops before a wall, "
-        f"stood {result.longest_stand_s:.1f} s at most"
+        f"drove {world.distance_m:.1f} m in {1e-9 * world.stamp_ns:.0f} simulated s, "
+        f"{world.collisions} collisions, {world.stops} stops before a wall, "
+        f"stood {world.longest_stand_s:.1f} s at most"
     )
     if args.meets_others:
-        print(f"touched other robots {result.touches} times, stopped {result.meetings} times")
+        print(f"touched other robots {world.touches} times, stopped {world.meetings} times")
     if world.battery is not None:
         battery = world.battery
         print(f"charged {battery.charges} times, never below {battery.lowest:.1%}")
     return 0
 
 
-def _words(progress: Progress) -> str:
+def _words(world: World, progress: Progress) -> str:
     """Return the robot's progress as one line of text."""
-    pose = progress.pose
+    sim_s, pose = 1e-9 * world.stamp_ns, world.pose
     return (
-        f"{progress.sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"
-        f"  {progress.distance_m:7.1f} m driven  {progress.collisions} collisions"
+        f"{sim_s:8.1f} s  x {progress.speed:5.1f}  ({pose.x:7.2f}, {pose.y:7.2f}) m"
+        f"  {world.distance_m:7.1f} m driven  {world.collisions} collisions"
     )
 
 

@@ -17,8 +17,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeGuard
 
 from fasaco_edge.bus.arrival import Sample
@@ -27,7 +26,7 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.follow.settings import FollowSettings
-from fasaco_edge.follow.supervision import State
+from fasaco_edge.follow.supervision import Reason, State
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -45,34 +44,25 @@ PLANS = "plans"
 
 @dataclass(slots=True)
 class News:
-    """Samples that arrived from the daemon that plans since the last call.
+    """The newest samples of a daemon.
 
     Attributes:
-        planner: its id; "" if none plans.
+        planner: its id; "" for none.
         status_at: arrival of its newest status [s]; None without a new one.
+        state: by its newest status; "" before there is one.
         path: its newest path; None without a new one.
-        revision: of the newest path; 0 if unknown.
-        speed_m_s: limit of the speed on the newest path; infinity without one [m/s].
+        revision: of its newest path; 0 if unknown.
+        speed_m_s: limit of the speed on its newest path; infinity without one [m/s].
         unnamed: newest path that names no daemon; None without a new one.
     """
 
-    planner: str
-    status_at: float | None = None
-    path: Sample | None = None
-    revision: int = 0
-    speed_m_s: float = math.inf
-    unnamed: Sample | None = None
-
-
-@dataclass(slots=True)
-class _Daemon:
-    """The newest samples of a daemon."""
-
+    planner: str = ""
     status_at: float | None = None
     state: str = ""
     path: Sample | None = None
     revision: int = 0
     speed_m_s: float = math.inf
+    unnamed: Sample | None = None
 
 
 class Daemons:
@@ -84,7 +74,7 @@ class Daemons:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._planners: set[str] = set()
-        self._daemons: dict[str, _Daemon] = {}
+        self._daemons: dict[str, News] = {}
         self._unnamed: Sample | None = None
 
     def take_claim(self, key: str, is_there: bool) -> None:
@@ -126,31 +116,23 @@ class Daemons:
                 self._unnamed = sample
 
     def news(self) -> News:
-        """Return the new samples of the daemon that plans; each sample once."""
+        """Return the newest samples of the daemon that plans; each status and path once."""
         with self._lock:
-            news = News(min(self._planners, default=""), unnamed=self._unnamed)
-            self._unnamed = None
-            if (daemon := self._daemons.get(news.planner)) is not None:
-                news.status_at, daemon.status_at = daemon.status_at, None
-                news.path, daemon.path = daemon.path, None
-                news.revision, news.speed_m_s = daemon.revision, daemon.speed_m_s
+            kept = self._daemons.get(self._planner) or News(self._planner)
+            news = replace(kept, unnamed=self._unnamed)
+            kept.status_at = kept.path = self._unnamed = None
             return news
 
     @property
-    def state(self) -> str:
-        """The state of the daemon that plans, by its newest status; "" for none."""
-        with self._lock:
-            daemon = self._daemons.get(min(self._planners, default=""))
-            return "" if daemon is None else daemon.state
+    def _planner(self) -> str:
+        return min(self._planners, default="")
 
-    def _daemon(self, own: str) -> _Daemon:
+    def _daemon(self, own: str) -> News:
         """Return the kept samples of a daemon; the caller holds the lock."""
         if own not in self._daemons:
-            planner = min(self._planners, default="")
-            others = [one for one in self._daemons if one != planner]
             if len(self._daemons) >= MOST_DAEMONS:
-                del self._daemons[others[0]]
-            self._daemons[own] = _Daemon()
+                del self._daemons[next(one for one in self._daemons if one != self._planner)]
+            self._daemons[own] = News(own)
         return self._daemons[own]
 
 
@@ -184,17 +166,11 @@ DRIVES = "drives"
 # after the last one [s].
 LOOKS, LOOK_S, LOOK_AGAIN_S = 5, 0.2, 5.0
 
-Standby = tuple[State, str]
 NO_RIGHT = "access rules keep its token from others: the role driver needs `driver/*/*`, too"
 
 
 class BaseClaim(BusClaim):
-    """The claim of this follower.
-
-    Args:
-        bus: its session.
-        settings: the follower's.
-    """
+    """The claim of this follower."""
 
     # Another follower that drives sees this token with its next query: until then this one must not
     # drive.
@@ -202,14 +178,11 @@ class BaseClaim(BusClaim):
 
     def __init__(self, bus: Bus, settings: FollowSettings) -> None:
         super().__init__(bus, Keys(settings.robot, settings.base), topics.DRIVER, DRIVES)
-        self._is_shown = _Shown(settings, self._keys.claim(bus.id, "*", topics.DRIVER))
+        self._second = BusSettings("client", settings.connect, secured=settings.secured)
+        self._is_seen, self._look_at = False, -math.inf
 
-    def standby(self, now: float) -> Standby | None:
-        """Return why this follower must leave the base alone; None if it drives.
-
-        Args:
-            now: monotonic time [s].
-        """
+    def standby(self, now: float) -> Reason | None:
+        """Return why this follower must leave the base alone; None if it drives."""
         if self.update(now):
             self.show()
             if self.state is ClaimState.PLANS and self.rival:
@@ -218,40 +191,22 @@ class BaseClaim(BusClaim):
             return State.LOOKS, ""
         if self.state.is_waiting:
             return State.SECOND, f"Zenoh id {self.rival}; this one waits"
-        if not self._is_shown(now):
-            return State.NO_RIGHT, NO_RIGHT
-        return None
-
-
-class _Shown:
-    """Whether others see a token, by the view of a second session; queried until they do."""
-
-    def __init__(self, settings: FollowSettings, token: str) -> None:
-        self._settings = BusSettings("client", settings.connect, secured=settings.secured)
-        self._token = token
-        self._is_shown = False
-        self._look_at = -math.inf
-
-    def __call__(self, now: float) -> bool:
-        if not self._is_shown and now >= self._look_at:
-            self._is_shown = self._look()
+        if not self._is_seen and now >= self._look_at:
+            self._is_seen = self._look()
             self._look_at = time.monotonic() + LOOK_AGAIN_S
-        return self._is_shown
+        return None if self._is_seen else (State.NO_RIGHT, NO_RIGHT)
 
     def _look(self) -> bool:
+        """Return whether a second session sees the token."""
+        token = self._keys.claim(self._bus.id, "*", topics.DRIVER)
         try:
-            with open_bus(self._settings) as other:
-                found = _any_of(LOOKS, lambda: bool(other.alive(self._token)))
+            with open_bus(self._second) as second:
+                for _ in range(LOOKS):
+                    if second.alive(token):
+                        return True
+                    time.sleep(LOOK_S)
         except BusUnavailable:
             return False
-        release_unused()
-        return found
-
-
-def _any_of(times: int, holds: Callable[[], bool]) -> bool:
-    """Return whether a condition holds, now or at one of the next looks."""
-    for _ in range(times):
-        if holds():
-            return True
-        time.sleep(LOOK_S)
-    return False
+        finally:
+            release_unused()
+        return False

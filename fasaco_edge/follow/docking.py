@@ -20,10 +20,14 @@ from functools import partial
 from typing import Any
 
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.action_client import ActionClient
-from fasaco_edge.follow.inputs import Inputs
-from fasaco_edge.follow.nav2_requests import Cancellations
+from fasaco_edge.follow.actions import (
+    ActionClient,
+    AskResult,
+    CancelGoal,
+    Request,
+    SendGoal,
+    said_of,
+)
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.supervision import Supervision
 from fasaco_edge.grid.geometry import Pose2D
@@ -35,15 +39,8 @@ from fasaco_edge.wire.messages.docking import (
     encode_dock,
     encode_undock,
 )
-from fasaco_edge.wire.messages.follow_path import (
-    GOAL_ID_BYTES,
-    UNKNOWN,
-    decode_accepted,
-    decode_cancel,
-    encode_cancel,
-    encode_goal_id,
-)
-from fasaco_edge.wire.ros_keys import DOCK_ROBOT, UNDOCK_ROBOT, Call
+from fasaco_edge.wire.messages.follow_path import GOAL_ID_BYTES, UNKNOWN
+from fasaco_edge.wire.ros_keys import DOCK_ROBOT, UNDOCK_ROBOT
 
 # A robot this near to the dock's pose is in its dock [m].
 DOCKED_M = 0.1
@@ -64,31 +61,7 @@ class Move(enum.Enum):
     UNDOCK = "undocking"
 
 
-@dataclass(frozen=True, slots=True)
-class Start:
-    """A request to move the robot into the dock, or out of it."""
-
-    move: Move
-    id: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Ask:
-    """A query for the result; the reply comes when the goal has ended."""
-
-    move: Move
-    id: bytes
-
-
-@dataclass(frozen=True, slots=True)
-class Cancel:
-    """A request to cancel a goal."""
-
-    move: Move
-    id: bytes
-
-
-DockRequest = Start | Ask | Cancel
+DockRequest = tuple[Move, Request]
 
 
 @dataclass(slots=True)
@@ -120,7 +93,7 @@ class Docking:
         # Whether the robot is in the dock; None before its first pose.
         self._is_docked: bool | None = None
         self._goal: _Goal | None = None
-        self._cancellations = {move: Cancellations() for move in Move}
+        self._requests: list[DockRequest] = []
         self._retry_at, self._retry_s = -math.inf, RETRY_S
 
     def step(
@@ -134,7 +107,6 @@ class Docking:
             here: the robot's pose; None without one.
             drives: whether there is a path to drive.
         """
-        requests: list[DockRequest] = []
         if here is not None:
             far = math.hypot(here.x - self._dock.x, here.y - self._dock.y)
             if self._is_docked is None:
@@ -143,16 +115,15 @@ class Docking:
             elif self._goal is None and far > self._approach + 2.0 * DOCKED_M:
                 self._is_docked = False
         if (goal := self._goal) is not None:
-            requests += self._watch(goal, now, state)
+            self._watch(goal, now, state)
         elif here is not None and now >= self._retry_at:
             if state == "charging" and not self._is_docked:
-                requests.append(self._start(Move.DOCK, now))
+                self._start(Move.DOCK, now)
             elif self._is_docked and drives and state in DRIVES:
-                requests.append(self._start(Move.UNDOCK, now))
+                self._start(Move.UNDOCK, now)
         is_in = bool(self._is_docked) and drives
         self.holds = self._goal.move.value if self._goal else "in its dock" if is_in else ""
-        for move, cancellations in self._cancellations.items():
-            requests += [Cancel(move, one.id) for one in cancellations.due(now)]
+        requests, self._requests = self._requests, []
         return requests
 
     def end(self) -> list[DockRequest]:
@@ -161,20 +132,19 @@ class Docking:
         if (goal := self._goal) is None:
             return []
         self._goal = None
-        return [Cancel(goal.move, goal.id)]
+        return [(goal.move, CancelGoal(goal.id))]
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
         """Take in whether the server accepted a goal; None without an answer."""
         goal = self._goal
         if goal is None or goal.id != goal_id:
             return
-        self._cancellations[goal.move].take_accepted(goal_id, accepted)
         if accepted:
             # Its result is queried at the next step.
             goal.is_accepted, goal.asked_at = True, -math.inf
             return
         if accepted is None:
-            self._cancellations[goal.move].add(goal_id, is_known=False)
+            self._cancel(goal)
         self._fail(why or "refused: is the docking server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: DockEnding | None, why: str, now: float) -> None:
@@ -182,9 +152,8 @@ class Docking:
         goal = self._goal
         if goal is None or goal.id != goal_id:
             return
-        self._cancellations[goal.move].drop(goal_id)
         if ending is None:
-            self._cancellations[goal.move].add(goal_id)
+            self._cancel(goal)
             self._fail(why, now)
         elif ending.is_done:
             self._goal, self.trouble = None, ""
@@ -195,31 +164,29 @@ class Docking:
         elif ending.status == UNKNOWN:
             self._fail("it does not know its goal: was it restarted?", now)
         else:
-            what = ERRORS.get(ending.code, "no code")
-            code = f"{ending.code} " if ending.code else ""
-            self._fail(code + what + (f": {ending.message}" if ending.message else ""), now)
+            self._fail(said_of(ending, ERRORS, "no code"), now)
 
-    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
-        """Take in the result of a request to cancel; None without an answer."""
-        for cancellations in self._cancellations.values():
-            cancellations.take_answer(goal_id, code)
+    def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
+        """Take in that a query for a result ended without one: it is asked for again."""
 
-    def _start(self, move: Move, now: float) -> Start:
+    def _start(self, move: Move, now: float) -> None:
         self._goal = _Goal(move, self._new_id(), now, asked_at=now)
-        return Start(move, self._goal.id)
+        self._requests.append((move, SendGoal(self._goal.id)))
 
-    def _watch(self, goal: _Goal, now: float, state: str) -> list[DockRequest]:
+    def _cancel(self, goal: _Goal) -> None:
+        self._requests.append((goal.move, CancelGoal(goal.id)))
+
+    def _watch(self, goal: _Goal, now: float, state: str) -> None:
         """Query the result again; cancel an unwanted goal; give up a goal that never ends."""
         if goal.move is Move.DOCK and state in LEAVES and not goal.is_cancelled:
             goal.is_cancelled = True
-            self._cancellations[goal.move].add(goal.id, is_known=goal.is_accepted)
+            self._cancel(goal)
         if now - goal.sent_at > GIVE_UP_S:
-            self._cancellations[goal.move].add(goal.id)
+            self._cancel(goal)
             self._fail("did not end", now)
         elif goal.is_accepted and now - goal.asked_at > RESULT_EVERY_S:
             goal.asked_at = now
-            return [Ask(goal.move, goal.id)]
-        return []
+            self._requests.append((goal.move, AskResult(goal.id)))
 
     def _fail(self, why: str, now: float) -> None:
         assert self._goal is not None
@@ -237,81 +204,42 @@ class DockingNode:
 
     def __init__(self, bus: Bus, settings: FollowSettings) -> None:
         dock: Any = settings.dock
-        self._dock = dock
-        self._pose = Pose2D(*dock["pose"])
-        self._actions = {Move.DOCK: dock["dock_action"], Move.UNDOCK: dock["undock_action"]}
-        types = {Move.DOCK: DOCK_ROBOT, Move.UNDOCK: UNDOCK_ROBOT}
-        self._clients = {
-            move: ActionClient(bus, settings.ros, name, types[move])
-            for move, name in self._actions.items()
-        }
+        pose = Pose2D(*dock["pose"])
         new_id = partial(os.urandom, GOAL_ID_BYTES)
-        self._docking = Docking(self._pose, dock["approach_m"], new_id)
-        self._said = ("", "")
+        docking = self._docking = Docking(pose, dock["approach_m"], new_id)
+        names = dock["id"], dock["type"]
+        client = partial(ActionClient, bus, settings.ros, sender=docking, clock=time.monotonic)
+        # The client of each motion, and what is sent to begin a goal, by its id.
+        self._actions: dict[Move, tuple[ActionClient, Callable[[bytes], bytes]]] = {
+            Move.DOCK: (
+                client(dock["dock_action"], DOCK_ROBOT, read_ending=decode_dock_ending),
+                lambda goal_id: encode_dock(goal_id, pose, dock["frame"], *names),
+            ),
+            Move.UNDOCK: (
+                client(dock["undock_action"], UNDOCK_ROBOT, read_ending=decode_undock_ending),
+                lambda goal_id: encode_undock(goal_id, dock["type"]),
+            ),
+        }
+        self._logged = ("", "")
 
-    def turn(self, inputs: Inputs, follower: Supervision) -> None:
+    def turn(self, state: str, follower: Supervision) -> None:
         """Run a cycle; the follower is held while the docking server moves the robot."""
-        for client in self._clients.values():
-            client.look()
-            client.take_replies()
-        requests = self._docking.step(
-            time.monotonic(),
-            inputs.daemon_state,
-            follower.newest_pose,
-            drives=follower.has_path,
-        )
-        follower.hold(self._docking.holds)
-        for request in requests:
-            self._ask(request)
-        self._say()
+        for client, _ in self._actions.values():
+            client.turn()
+        docking, pose = self._docking, follower.newest_pose
+        self._ask(docking.step(time.monotonic(), state, pose, drives=follower.has_path))
+        follower.held = docking.holds
+        (held, trouble), self._logged = self._logged, (docking.holds, docking.trouble)
+        if docking.trouble and docking.trouble != trouble:
+            log.warning("dock: %s", docking.trouble)
+        if docking.holds and docking.holds != held:
+            log.info("dock: %s", docking.holds)
 
     def end(self) -> None:
         """End the goals."""
-        for request in self._docking.end():
-            self._ask(request)
+        self._ask(self._docking.end())
 
-    def _say(self) -> None:
-        """Log what happens, and errors."""
-        docking, told = self._docking, self._said
-        self._said = (docking.holds, docking.trouble)
-        if docking.trouble and docking.trouble != told[1]:
-            log.warning("dock: %s", docking.trouble)
-        if docking.holds and docking.holds != told[0]:
-            log.info("dock: %s", docking.holds)
-
-    def _ask(self, request: DockRequest) -> None:
-        dock, client = self._dock, self._clients[request.move]
-        if isinstance(request, Start):
-            call: Call = "send_goal"
-            if request.move is Move.DOCK:
-                names = dock["id"], dock["type"]
-                payload = encode_dock(request.id, self._pose, dock["frame"], *names)
-            else:
-                payload = encode_undock(request.id, dock["type"])
-        elif isinstance(request, Ask):
-            call, payload = "get_result", encode_goal_id(request.id)
-        else:
-            call, payload = "cancel_goal", encode_cancel(request.id)
-        client.ask(call, payload, partial(self._take, request))
-
-    def _take(self, request: DockRequest, payload: bytes | None) -> None:
-        """Pass the result of a request on."""
-        docking, now = self._docking, time.monotonic()
-        why = f"{self._actions[request.move]} did not answer"
-        try:
-            if isinstance(request, Start):
-                accepted = None if payload is None else decode_accepted(payload)
-                docking.take_accepted(request.id, accepted, why if accepted is None else "", now)
-            elif isinstance(request, Ask):
-                read = decode_dock_ending if request.move is Move.DOCK else decode_undock_ending
-                # Without an answer the result is queried again.
-                if payload is not None:
-                    docking.take_ending(request.id, read(payload), "", now)
-            else:
-                code = None if payload is None else decode_cancel(payload)
-                docking.take_cancelled(request.id, code)
-        except MalformedMessage as error:
-            if isinstance(request, Start):
-                docking.take_accepted(request.id, None, str(error), now)
-            elif isinstance(request, Ask):
-                docking.take_ending(request.id, None, str(error), now)
+    def _ask(self, requests: list[DockRequest]) -> None:
+        for move, request in requests:
+            client, goal_of = self._actions[move]
+            client.ask(request, goal_of(request.id))

@@ -81,56 +81,54 @@ class PoseEstimate:
     Args:
         limits: of the base, which executes commands as fast as it can.
 
-        Attributes:
-            jump: distance [m] and angle [rad] of the newest pose from the expected one; None if it
-                is accepted.
-            pose_at: arrival of the newest accepted pose [s]; None before there is one.
-            measured: the newest pose, unfiltered.
-            commanded: motion along x and y [m] and turn [rad] that the commands up to that pose
-                should have caused, along the measured headings.
-            delay: between a command and its effect on an arriving pose [s].
+    Attributes:
+        jump: distance [m] and angle [rad] of the newest pose from the expected one; None if it is
+            accepted.
+        measured: the newest accepted pose, unfiltered.
+        commanded: motion along x and y [m] and turn [rad] that the commands up to that pose should
+            have caused, along the measured headings.
+        delay: between a command and its effect on an arriving pose [s].
     """
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self.jump: tuple[float, float] | None = None
-        self.pose_at: float | None = None
         self.delay = FIRST_DELAY_S
+        # By candidate, how unlike the poses are to the commands.
         self._unlike = [0.0] * len(DELAYS_S)
-        self._pose = Pose2D(0.0, 0.0)
-        self.measured = self._pose
-        self.commanded = (0.0, 0.0, 0.0)
-        self._doubted: Pose2D | None = None
-        self._agreeing = 0
+        # The filtered pose, and the arrival of the newest one accepted.
+        self._pose, self._pose_at = Pose2D(0.0, 0.0), -math.inf
+        self.measured, self.commanded = self._pose, (0.0, 0.0, 0.0)
+        self._doubted, self._agreeing = self._pose, 0
         self._sent = deque[tuple[float, Command]]()
 
     def take(self, pose: Pose2D, now: float) -> None:
         """Take in a pose on arrival."""
-        if self.pose_at is None or now - self.pose_at > FORGET_S:
-            self._believe(pose, now, pose)
+        if now - self._pose_at > FORGET_S:
+            self._believe(pose, pose, now)
             return
         here = self.at(now - self.delay)
         if _is_near(pose, here):
-            share = 1.0 - math.exp((self.pose_at - now) / BLEND_S)
-            self._believe(_between_poses(here, pose, share), now, pose)
+            share = 1.0 - math.exp((self._pose_at - now) / BLEND_S)
+            turn = math.remainder(pose.yaw - here.yaw, math.tau)
+            x, y = here.x + share * (pose.x - here.x), here.y + share * (pose.y - here.y)
+            blended = Pose2D(x, y, math.remainder(here.yaw + share * turn, math.tau))
+            self._believe(blended, pose, now)
             return
         self.jump = _apart(pose, here)
-        agrees = self._doubted is not None and _is_near(pose, self._doubted)
-        self._agreeing = self._agreeing + 1 if agrees else 1
+        self._agreeing = self._agreeing + 1 if _is_near(pose, self._doubted) else 1
         self._doubted = pose
         if self._agreeing >= AGREEING:
-            self._believe(pose, now, pose)
+            self._believe(pose, pose, now)
 
     def sent(self, command: Command, now: float) -> None:
         """Note the command sent to the base, in force from now on."""
         if self._sent:
-            before, last = self._sent[-1]
-            seconds = now - before
+            (before, last), limits = self._sent[-1], self._limits
+            faster, rate = limits.acceleration * (now - before), limits.turn_acceleration
             command = Command(
-                limited(last.speed, command.speed, self._limits.acceleration * seconds),
-                limited(
-                    last.turn_rate, command.turn_rate, self._limits.turn_acceleration * seconds
-                ),
+                limited(last.speed, command.speed, faster),
+                limited(last.turn_rate, command.turn_rate, rate * (now - before)),
             )
         self._sent.append((now, command))
         while self._sent[0][0] < now - REMEMBER_S:
@@ -143,9 +141,8 @@ class PoseEstimate:
 
     def at(self, now: float) -> Pose2D:
         """Return the robot's pose after all commands sent until ``now`` have taken effect."""
-        assert self.pose_at is not None
         pose = self._pose
-        for seconds, command in self._between(self.pose_at - self.delay, now):
+        for seconds, command in self._between(self._pose_at - self.delay, now):
             pose = moved(pose, command, seconds)
         return pose
 
@@ -159,41 +156,30 @@ class PoseEstimate:
 
     def _measure_delay(self, pose: Pose2D, now: float) -> None:
         """Compare the motion since the last pose with the commands sent earlier, for each delay."""
-        before = self.pose_at
         speeds, turns = [c.speed for _, c in self._sent], [c.turn_rate for _, c in self._sent]
-        if before is None or not self._sent:
-            return
         if max(speeds) - min(speeds) < VARIED_M_S and max(turns) - min(turns) < VARIED_RAD_S:
             return  # almost constant commands do not show the delay
+        went, _ = _apart(pose, self.measured)
         turned = math.remainder(pose.yaw - self.measured.yaw, math.tau)
-        went = math.hypot(pose.x - self.measured.x, pose.y - self.measured.y)
         for index, delay in enumerate(DELAYS_S):
             turn = way = 0.0
-            for seconds, command in self._between(before - delay, now - delay):
+            for seconds, command in self._between(self._pose_at - delay, now - delay):
                 turn += seconds * command.turn_rate
                 way += seconds * command.speed
             unlike = (turned - turn) ** 2 + (went - way) ** 2
             self._unlike[index] = FORGETTING * self._unlike[index] + unlike
         self.delay = DELAYS_S[self._unlike.index(min(self._unlike))]
 
-    def _add_commanded(self, now: float) -> None:
-        """Add the motion commanded since the last pose."""
-        if self.pose_at is None:
-            return
-        here, turned = self.measured, 0.0
-        for seconds, command in self._between(self.pose_at - self.delay, now - self.delay):
-            here = moved(here, command, seconds)
-            turned += command.turn_rate * seconds
-        x, y, turn = self.commanded
-        went = (here.x - self.measured.x, here.y - self.measured.y)
-        self.commanded = (x + went[0], y + went[1], turn + turned)
-
-    def _believe(self, pose: Pose2D, now: float, measured: Pose2D) -> None:
-        self._measure_delay(measured, now)
-        self._add_commanded(now)
-        self.measured = measured
-        self._pose, self.pose_at = pose, now
-        self.jump, self._doubted, self._agreeing = None, None, 0
+    def _believe(self, pose: Pose2D, measured: Pose2D, now: float) -> None:
+        if self._sent and self._pose_at > -math.inf:
+            self._measure_delay(measured, now)
+            here, (x, y, turned) = self.measured, self.commanded
+            for seconds, command in self._between(self._pose_at - self.delay, now - self.delay):
+                here = moved(here, command, seconds)
+                turned += command.turn_rate * seconds
+            self.commanded = (x + here.x - self.measured.x, y + here.y - self.measured.y, turned)
+        self._pose, self.measured, self._pose_at = pose, measured, now
+        self.jump, self._agreeing = None, 0
 
 
 def moved(pose: Pose2D, command: Command, seconds: float) -> Pose2D:
@@ -205,16 +191,6 @@ def moved(pose: Pose2D, command: Command, seconds: float) -> Pose2D:
         pose.x + way * math.cos(heading),
         pose.y + way * math.sin(heading),
         math.remainder(pose.yaw + turn, math.tau),
-    )
-
-
-def _between_poses(pose: Pose2D, other: Pose2D, share: float) -> Pose2D:
-    """Return the pose interpolated between two poses."""
-    turn = math.remainder(other.yaw - pose.yaw, math.tau)
-    return Pose2D(
-        pose.x + share * (other.x - pose.x),
-        pose.y + share * (other.y - pose.y),
-        math.remainder(pose.yaw + share * turn, math.tau),
     )
 
 

@@ -7,21 +7,19 @@ from __future__ import annotations
 
 import math
 
-from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.curve_pursuit import CurvePursuit
-from fasaco_edge.follow.curve_route import CurveRoute
 from fasaco_edge.follow.estimate import STAND, Command, Limits, PoseEstimate
 from fasaco_edge.follow.grip import Grip
-from fasaco_edge.follow.pursuit import Pursuit
-from fasaco_edge.follow.route import Joining, Route
-from fasaco_edge.follow.sight import AHEAD_M, Limit, Sight
+from fasaco_edge.follow.pursuit import CurvePursuit, Pursuit
+from fasaco_edge.follow.route import CurveRoute, Joining, Route
+from fasaco_edge.follow.sight import AHEAD_M, NO_LIMIT, Limit, Sight
 from fasaco_edge.follow.standstill import floor_ahead
-from fasaco_edge.follow.supervision import USUAL, Patience, State, Supervision
+from fasaco_edge.follow.supervision import Patience, Reason, State, Supervision
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.messages.path_points import PathPoints
 
 # Commands a second.
 RATE_HZ = 20.0
+PERIOD_S = 1.0 / RATE_HZ
 # Zeros are sent for this long after a stop; then another program may drive [s].
 ZEROS_S = 1.0
 # The path leads in the direction of its point this far ahead [m].
@@ -44,105 +42,82 @@ class Follower(Supervision):
     def __init__(
         self,
         limits: Limits,
-        patience: Patience = USUAL,
+        patience: Patience | None = None,
         *,
         moves: bool = True,
         sight: Sight | None = None,
         radius: float = 0.0,
     ) -> None:
-        super().__init__(patience)
-        self._limits = limits
-        self._moves = moves
+        super().__init__(patience or Patience())
+        self._limits, self._moves = limits, moves
         self._sight, self._radius = sight, radius
         self._estimate = PoseEstimate(limits)
-        self._pursuit = (CurvePursuit if limits.turn_radius else Pursuit)(limits, 1.0 / RATE_HZ)
+        self._pursuit = (CurvePursuit if limits.turn_radius else Pursuit)(limits, PERIOD_S)
         self._grip = Grip()
+        # The route that is driven, and the one to join.
         self._route: Route | None = None
-        # The route driven until a new path is joined.
-        self._before: Route | None = None
-        self._is_new = False
-        self._driven_at = -float("inf")
+        self._next: Route | None = None
+        self._driven_at = -math.inf
         self._stepped_at: float | None = None
 
     def step(self, now: float) -> Command | None:
         """Return the command to send now; None for none."""
         if self._stepped_at is not None:
             self._pursuit.passed(now - self._stepped_at)
-        self._stepped_at, self.ahead = now, ()
-        try:
-            self.state, self.detail = self._trouble(now)
-            if self.state is State.DRIVING and self._sight is not None:
-                self.state, self.detail = self._sight.trouble(self._path_frame, now) or (
-                    State.DRIVING,
-                    "",
-                )
-            command = self._steer(now) if self.state is State.DRIVING else None
-        except MalformedMessage as error:
-            # The rest of the path is malformed.
-            self._have_none(State.BAD_PATH, str(error))
-            self.state, self.detail, command = State.BAD_PATH, str(error), None
+        self._stepped_at = now
+        command = self._supervised(self._steer, now)
         if command is None:
             self._pursuit.stand()
         else:
             self._driven_at = now
         if self._moves:
             self._estimate.sent(command or STAND, now)
-            self._grip.sent(command or STAND, 1.0 / RATE_HZ)
+            self._grip.sent(command or STAND, PERIOD_S)
         if command is None and now - self._driven_at <= ZEROS_S:
             return STAND
         return command
 
     def take_scan(self, payload: bytes, now: float) -> None:
         """Take in a scan on arrival; before the first pose it cannot be placed."""
-        if self._sight is not None and self._estimate.pose_at is not None:
+        if self._sight is not None and self.newest_pose is not None:
             self._sight.take_scan(payload, self._estimate.at(now - self._estimate.delay), now)
 
     def _moved_to(self, pose: Pose2D, now: float) -> None:
         self._estimate.take(pose, now)
 
     def _have(self, points: PathPoints) -> None:
-        if not self._is_new:
-            self._before = self._route
-        if self._limits.turn_radius:
-            self._route = CurveRoute(points.take_poses, self._limits)
-        else:
-            self._route = Route(points.take, self._limits)
-        self._is_new = True
+        self._next = (CurveRoute if self._limits.turn_radius else Route)(points, self._limits)
 
     def _withdraw(self) -> None:
-        self._route, self._before, self._is_new = None, None, False
+        self._route = self._next = None
 
-    @property
-    def _has_path(self) -> bool:
-        return self._route is not None
-
-    @property
-    def _pose_at(self) -> float | None:
-        return self._estimate.pose_at
-
-    def _jump(self) -> str:
-        if self._estimate.jump is None:
-            return ""
-        far, turned = self._estimate.jump
-        return f"by {far:.1f} m and {math.degrees(turned):.0f} deg"
+    def _trouble(self, now: float) -> Reason | None:
+        if (reason := super()._trouble(now)) is not None:
+            return reason
+        if self._estimate.jump is not None:
+            far, turned = self._estimate.jump
+            return State.POSE_JUMPED, f"by {far:.1f} m and {math.degrees(turned):.0f} deg"
+        return self._sight.trouble(self.path_frame, now) if self._sight is not None else None
 
     def _steer(self, now: float) -> Command | None:
-        assert self._route is not None
         pose = self._estimate.at(now)
         here = (pose.x, pose.y)
-        if self._is_new:
+        if self._next is not None:
             heading = None
             if self._estimate.speed:
                 heading = pose.yaw if self._estimate.speed > 0.0 else pose.yaw + math.pi
-            joining = self._route.join(here, heading, self._before)
+            joining = self._next.join(here, heading, self._route)
             if joining is Joining.AT_REST:
                 return self._pursuit.brake()
             if joining is Joining.ELSEWHERE:
                 self.state = State.PATH_ELSEWHERE
                 return None
-            self._is_new, self._before = False, None
-        leg = self._route.leg
-        toward = self._route.toward(here, LEADS_M)
+            self._route, self._next = self._next, None
+        route = self._route
+        assert route is not None
+        leg = route.leg
+        x, y = route.line_ahead(here, LEADS_M)[-1]
+        toward = math.atan2(y - here[1], x - here[0])
         if leg is not None and self._grip.is_lost(self._estimate, toward, now):
             self.state, self.detail = State.NOT_MOVING, self._grip.detail
             self.ahead = floor_ahead(here, toward, self._radius)
@@ -150,24 +125,23 @@ class Follower(Supervision):
         if leg is not None and (off := leg.distance(here)) > OFF_PATH_M:
             self.state, self.detail = State.OFF_PATH, f"by {off:.2f} m"
             return None
-        limit = self._limit(pose, self._route)
+        limit = self._limit(pose, route)
         most = min(limit.speed, self._path_most_m_s)
-        command = self._pursuit.steer(pose, self._route, most)
-        if self._route.leg is None:
+        command = self._pursuit.steer(pose, route, most)
+        if route.leg is None:
             self.state = State.DRIVEN
             return None
         if self._pursuit.is_lost:
             self.state, self.detail = State.OFF_PATH, "it leads where the base cannot steer"
         elif limit.speed == 0.0 and command == STAND and not self._pursuit.is_turning:
-            self.state, self.detail = State.OBSTACLE, limit.why
-            self.ahead = self._sight.around(limit.thing) if self._sight is not None else ()
+            self.state, self.detail, self.ahead = State.OBSTACLE, limit.why, limit.around
         return command
 
     def _limit(self, pose: Pose2D, route: Route) -> Limit:
         """Return what the scan allows."""
         if self._sight is None or not self._sight.things:
-            return Limit(math.inf)
+            return NO_LIMIT
         line = route.line_ahead((pose.x, pose.y), AHEAD_M)
         if route.leg is not None and route.leg.is_back:
             pose = Pose2D(pose.x, pose.y, pose.yaw + math.pi)
-        return self._sight.limit(pose, line, self._limits.acceleration, 1.0 / RATE_HZ)
+        return self._sight.limit(pose, line, self._limits.acceleration, PERIOD_S)

@@ -12,17 +12,17 @@ import time
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.one_publisher import OnePublisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.follow.daemons import Daemons
+from fasaco_edge.follow.daemons import Daemons, News
 from fasaco_edge.follow.follower import Follower
+from fasaco_edge.follow.scanner import Mount
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
-from fasaco_edge.follow.sight import Sight, SightSettings
-from fasaco_edge.follow.supervision import LINK_S, Patience, Supervision
+from fasaco_edge.follow.sight import Sight
+from fasaco_edge.follow.supervision import Supervision
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_SCAN_BEAMS
@@ -37,33 +37,11 @@ SILENT_S = 2.0
 JUMP_S = 5.0
 
 
-class Clock(Protocol):
-    """The robot's time."""
-
-    def at(self, now: float) -> float:
-        """Return the robot's time at a monotonic time of the computer."""
-
-    def hear(self, stamp_ns: int, now: float) -> float:
-        """Take in the stamp of a pose that arrived then; return the robot's time of its arrival."""
-
-
-class RealClock:
-    """The computer's time."""
-
-    def at(self, now: float) -> float:
-        """Return the time unchanged."""
-        return now
-
-    def hear(self, _stamp_ns: int, now: float) -> float:
-        """Return the time unchanged."""
-        return now
-
-
-class SimulatedClock:
-    """A simulation's time; it never goes back.
+class Clock:
+    """The robot's time: the computer's, or a simulation's; it never goes back.
 
     Args:
-        pace: simulated seconds in a second.
+        pace: simulated seconds in a second; 1 for the computer's time.
     """
 
     def __init__(self, pace: float) -> None:
@@ -73,7 +51,7 @@ class SimulatedClock:
         self._time = self._heard_at = 0.0
 
     def at(self, now: float) -> float:
-        """Return the simulated time at a monotonic time of the computer."""
+        """Return the robot's time at a monotonic time of the computer."""
         if self._stamp_ns is None:
             return now * self._pace
         since = max(now - self._heard_at, 0.0)
@@ -81,7 +59,9 @@ class SimulatedClock:
         return self._time + lead + max(since - SILENT_S, 0.0) * self._pace
 
     def hear(self, stamp_ns: int, now: float) -> float:
-        """Take in the stamp of a pose; it arrives at the time that it says."""
+        """Take in the stamp of a pose that arrived then; return the robot's time of its arrival."""
+        if self._pace == 1.0:
+            return now
         time = self.at(now)
         if self._stamp_ns is not None:
             step = (stamp_ns - self._stamp_ns) * 1e-9
@@ -96,32 +76,30 @@ LOG = logging.getLogger(__name__)
 MOST_POSES = 256
 
 
-def patience_of(settings: FollowSettings) -> Patience:
-    """Return the timeouts of a follower's inputs."""
-    return Patience(
-        settings.pose_age_s,
-        max(settings.pose_age_s, LINK_S),
-        Patience().status_s * settings.pace,
-    )
+class WatchedPublisher(OnePublisher):
+    """The publisher of an input that counts; another one is logged."""
+
+    _logged = ""
+
+    def log(self) -> None:
+        """Log a conflict of two publishers once."""
+        conflict = self.conflict(time.monotonic())
+        if conflict and not self._logged:
+            LOG.warning("%s", conflict, extra={"event": "two_publishers"})
+        self._logged = conflict
 
 
 class Inputs:
-    """Subscribes, and passes the inputs since the last cycle to a follower.
-
-    Attributes:
-        planner, revision: the daemon that plans, "" for none, and the revision of its newest path.
-    """
+    """Subscribes, and passes the inputs since the last cycle to a follower."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
-        real = settings.pace == 1.0
-        self._clock: Clock = RealClock() if real else SimulatedClock(settings.pace)
+        # Of the daemon that plans, in the last cycle.
+        self.news = News()
+        self._clock = Clock(settings.pace)
         self._decoder = PoseDecoder(settings.pose_schema, settings.frames)
         self._poses = deque[tuple[Sample, PoseSource, float]](maxlen=MOST_POSES)
-        self._publisher = OnePublisher("poses", topics.POSE.one_publisher_s, bus)
-        self._conflict = ""
+        self._publisher = WatchedPublisher("poses", topics.POSE.one_publisher_s, bus)
         self._daemons = Daemons()
-        # The daemon that plans, and the revision of its newest path.
-        self.planner, self.revision = "", 0
         keys = Keys(settings.robot, settings.base)
         for source in settings.poses:
             bus.subscribe(source.key, self._pose_taker(source), source.latched, source.depth)
@@ -130,22 +108,16 @@ class Inputs:
         bus.listen(keys, topics.PATH, self._daemons.take_path)
 
     def now(self) -> float:
-        """Return the time by the clock of the robot's seconds [s]."""
-        return self._clock.at(time.monotonic())
+        """Return the robot's time [s]."""
+        return self.time_of(time.monotonic())
 
     def time_of(self, came_at: float) -> float:
         """Return the robot's time of an arrival, given by the computer's monotonic clock [s]."""
         return self._clock.at(came_at)
 
-    @property
-    def daemon_state(self) -> str:
-        """The state of the daemon that plans, by its newest status; "" for none."""
-        return self._daemons.state
-
     def feed(self, follower: Supervision) -> None:
         """Pass the inputs to a follower."""
-        news = self._daemons.news()
-        self.planner, self.revision = news.planner, news.revision
+        news = self.news = self._daemons.news()
         follower.take_planner(news.planner)
         if news.status_at is not None:
             follower.heard_status(news.status_at)
@@ -164,22 +136,16 @@ class Inputs:
                     came_at=at,
                 )
             except FasacoError as error:
-                follower.refuse_pose(error)
+                follower.pose_fault = error
                 continue
             if pose is not None:
                 follower.take_pose(pose, self._clock.hear(pose.stamp_ns, came_at))
-            if (link := self._decoder.oldest_link) is not None:
-                follower.heard_link(link)
-        self._warn(self._publisher.conflict(time.monotonic()))
+            follower.link = self._decoder.oldest_link
+        self._publisher.log()
         if news.path is not None:
             follower.take_path(news.path.payload, news.speed_m_s)
         if news.unnamed is not None:
             follower.take_unnamed_path(news.unnamed.payload)
-
-    def _warn(self, conflict: str) -> None:
-        if conflict and not self._conflict:
-            LOG.warning("%s", conflict, extra={"event": "two_publishers"})
-        self._conflict = conflict
 
     def _pose_taker(self, source: PoseSource) -> Callable[[Sample], None]:
         def take(sample: Sample) -> None:
@@ -202,19 +168,16 @@ MAP, UPDATE, SCAN = topics.MAP.name, topics.MAP_UPDATE.name, topics.SCAN.name
 
 
 class ScanInputs:
-    """Subscribes, and passes on the samples since the last cycle.
-
-    Attributes:
-        sight: takes in maps.
-    """
+    """Subscribes to scans and maps, and passes on those since the last cycle."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
-        self.sight = Sight(SightSettings.of(settings.scan))
-        self._most_map_bytes: int = settings.scan["most_pixels"] + HEADER_BYTES
+        scan = settings.scan
+        mount = Mount(**scan["mount"])
+        self.sight = Sight(mount, settings.radius_m, scan["lost_s"], scan["free_at_most"])
+        self._most_map_bytes: int = scan["most_pixels"] + HEADER_BYTES
         self._scans = deque[tuple[Sample, float]](maxlen=MOST_SCANS)
         self._maps = deque[tuple[bool, bytes]](maxlen=MOST_UPDATES)
-        self._publisher = OnePublisher("scans", topics.SCAN.one_publisher_s, bus)
-        self._conflict = ""
+        self._publisher = WatchedPublisher("scans", topics.SCAN.one_publisher_s, bus)
         keys = Keys(settings.robot, settings.base)
         takers: dict[str, Callable[[Sample], None]] = {
             MAP: partial(self._take_map, is_update=False),
@@ -223,18 +186,12 @@ class ScanInputs:
         }
         for topic in (topics.MAP, topics.MAP_UPDATE, topics.SCAN):
             bus.listen(keys, topic, takers[topic.name])
-        for name, key, latched, depth in settings.scan["topics"]:
+        for name, key, latched, depth in scan["topics"]:
             in_order = name in topics.IN_ORDER
             bus.subscribe(key, takers[name], latched, depth, in_order=in_order)
 
     def feed(self, follower: Follower, time_of: Callable[[float], float]) -> None:
-        """Pass on maps and scans.
-
-        Args:
-            follower: takes the scans.
-            time_of: returns the robot's time of an arrival, given by the computer's monotonic clock
-                [s].
-        """
+        """Pass maps to the sight, scans to a follower; ``time_of``: as of ``Inputs``."""
         while self._maps:
             is_update, payload = self._maps.popleft()
             self.sight.take_map(payload, is_update=is_update)
@@ -242,10 +199,7 @@ class ScanInputs:
             sample, came_at = self._scans.popleft()
             if self._publisher.takes(sample.sender, came_at):
                 follower.take_scan(sample.payload, time_of(came_at))
-        conflict = self._publisher.conflict(time.monotonic())
-        if conflict and not self._conflict:
-            LOG.warning("%s", conflict, extra={"event": "two_publishers"})
-        self._conflict = conflict
+        self._publisher.log()
 
     def _take_scan(self, sample: Sample) -> None:
         if sample.size <= MOST_SCAN_BYTES:

@@ -5,7 +5,7 @@ reaches the end: Nav2 switches to it without a stop. Where the path returns to i
 begins only shortly before the end: a controller continues at the nearest part of a path, and would
 skip the rest of the last goal. The last pose of a goal has the heading in which the path leads on:
 the robot turns while the next goal is under way. A robot that cannot turn on the spot gets pieces
-of a curve, see ``follow/curve_pieces.py``. No clock, no session.
+of a curve, each driven forward or backward as a whole. No clock, no session.
 """
 
 from __future__ import annotations
@@ -14,13 +14,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.curve_pieces import CurveLine
-from fasaco_edge.follow.goals import COAST_M, TIP_M, Goal, PathDriven
-from fasaco_edge.follow.nav2_requests import AskResult, Cancellations, Request, SendGoal
-from fasaco_edge.follow.pieces import LEAST_M, STEP_M, Line, end_of_piece
+from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, said_of
+from fasaco_edge.follow.pieces import (
+    COAST_M,
+    LEAST_M,
+    STEP_M,
+    TIP_M,
+    Goal,
+    Line,
+    PathDriven,
+    end_of_piece,
+)
 from fasaco_edge.follow.standstill import Tries, floor_ahead
-from fasaco_edge.follow.supervision import Patience, State, Supervision
+from fasaco_edge.follow.supervision import Patience, Reason, State, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.follow_path import (
     ABORTED,
@@ -51,6 +57,8 @@ PROGRESS_M, LEADS_M = 0.5, 0.5
 # after a longer timeout the goal is given up [s].
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
+# A server that ends a query for a result sooner, without a reply, is gone [s].
+GONE_S = 290.0
 # Time constant of the filtered position that shows whether it stands [s]: poses scatter.
 STEADY_S = 1.0
 
@@ -58,17 +66,19 @@ STEADY_S = 1.0
 NO_CODE = "without a code; does another program send goals, too?"
 
 
-@dataclass(slots=True)
-class Tally:
-    """Counts for reports.
+@dataclass(frozen=True, slots=True)
+class SendPiece(SendGoal):
+    """A request to follow points [m] in a frame.
 
     Attributes:
-        goals: goals sent.
-        errors: goals that failed.
+        end_yaw: heading at the last point [rad]; None for that with which the robot arrives.
+        is_back: whether it is driven backward: headings are opposite to the way.
     """
 
-    goals: int = 0
-    errors: int = 0
+    points: list[Point]
+    frame: str
+    end_yaw: float | None = None
+    is_back: bool = False
 
 
 class Nav2Follower(Supervision):
@@ -94,64 +104,47 @@ class Nav2Follower(Supervision):
         is_curved: bool = False,
     ) -> None:
         super().__init__(patience)
-        self._radius, self._is_curved = radius, is_curved
-        self.tally = Tally()
-        self._near = near
-        self._ahead = AHEAD_M + AHEAD_S * speed
+        self._near, self._ahead = near, AHEAD_M + AHEAD_S * speed
         self._new_id = new_id
-        self._here: Point | None = None
-        # The robot's position, filtered against the scatter of single poses.
+        self._radius, self._is_curved = radius, is_curved
+        # The robot's position; and filtered against the scatter of single poses.
+        self._here: Point = (0.0, 0.0)
         self._steady: Point = (0.0, 0.0)
-        self._came_at: float | None = None
+        self._moved_last: tuple[Point, float] | None = None
         self._path: PathDriven | None = None
         # The path that replaces the present one, once Nav2 has answered the pending request.
         self._next: Line | None = None
         # The goal that Nav2 drives, and the one sent but not answered yet.
         self._active: Goal | None = None
         self._pending: Goal | None = None
-        self._cancellations = Cancellations()
-        self._moved_last: tuple[Point, float] | None = None
-        self._asked_again = -math.inf
+        self._asked_at = -math.inf
         self._tries = Tries(PROGRESS_M, RETRY_S, MOST_RETRY_S)
         self._is_canceled = False
-        self._trouble_of_nav2: tuple[State, str] | None = None
+        self._trouble_of_nav2: Reason | None = None
+        # Requests that the next step returns.
         self._requests: list[Request] = []
-        # Requests that follow from answers, sent at the next step.
-        self._requests_later: list[Request] = []
 
     def step(self, now: float) -> list[Request]:
         """Return the requests to Nav2 now."""
-        self._requests, self.ahead = [], ()
-        try:
-            self.state, self.detail = self._trouble(now)
-            if self.state is State.DRIVING:
-                self._drive(now)
-            else:
-                self._stop()
-        except MalformedMessage as error:
-            # The rest of the path is malformed.
-            self._have_none(State.BAD_PATH, str(error))
-            self.state, self.detail = State.BAD_PATH, str(error)
+        if not self._supervised(self._drive, now):
             self._stop()
-        if self.state in (State.STANDS, State.GIVEN_UP) and self._path and self._here:
+        if self.state in (State.STANDS, State.GIVEN_UP) and self._path:
             self.ahead = floor_ahead(self._here, self._toward(self._path), self._radius)
-        return self._requests + self._cancellations.due(now)
+        return self._taken()
 
     def end(self) -> list[Request]:
         """Return the requests that end all goals."""
         self._stop()
-        return self._cancellations.due(math.inf)
+        return self._taken()
 
     def take_unsent(self, goal_id: bytes, why: str, now: float) -> None:
         """Take in that a goal could not be sent."""
         if self._pending is not None and self._pending.id == goal_id:
             self._pending = None
             self._fail(State.NO_NAV2, why, now)
-        self._cancellations.drop(goal_id)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
         """Take in whether Nav2 accepted a goal; None without an answer: then Nav2 must end it."""
-        self._cancellations.take_accepted(goal_id, accepted)
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
@@ -162,57 +155,58 @@ class Nav2Follower(Supervision):
                 self._moved_last = None
             self._active, self._is_canceled = goal, False
             self._trouble_of_nav2 = None
-            self._asked_again = now
-            self._requests_later.append(AskResult(goal_id))
+            self._asked_at = now
+            self._requests.append(AskResult(goal_id))
             return
         if accepted is None:
-            self._cancellations.add(goal_id)
+            self._requests.append(CancelGoal(goal_id))
         state = State.REFUSED if accepted is False else State.NO_NAV2
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
         """Take in how a goal ended; None if Nav2 will not answer: it may still drive the goal."""
-        if ending is not None:
-            self._cancellations.drop(goal_id)
         if self._active is None or self._active.id != goal_id:
             return
         goal, self._active = self._active, None
         if ending is None:
-            self._cancellations.add(goal_id)
-        self._requests_later.clear()
+            self._requests.append(CancelGoal(goal_id))
         if self._pending is not None:
             # Nav2 switches to the next goal.
             return
         if ending is None:
             self._fail(State.NO_NAV2, why, now)
         elif ending.status == SUCCEEDED:
-            self._take_done(goal, now)
+            if (path := self._path) is None:
+                return
+            far = math.dist(self._here, path.line.at(goal.end))
+            if far > DONE_M and goal.end - path.way > DONE_M:
+                self._fail(State.GIVEN_UP, f"reported as done {far:.1f} m before the end", now)
+            else:
+                path.finish(goal)
         elif ending.status == ABORTED:
-            what = ERRORS.get(ending.code, "no code") if ending.code else NO_CODE
-            code = f"{ending.code} " if ending.code else ""
-            said = f": {ending.message}" if ending.message else ""
-            self._fail(State.GIVEN_UP, f"{code}{what}{said}", now)
+            self._fail(State.GIVEN_UP, said_of(ending, ERRORS, NO_CODE), now)
         elif ending.status == CANCELED:
             self._is_canceled = True
             self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)
         else:
             self._fail(State.NO_NAV2, "it does not know its goal: was it restarted?", now)
 
-    def take_cancelled(self, goal_id: bytes, code: int | None) -> None:
-        """Take in the result of a request to cancel; None without an answer."""
-        self._cancellations.take_answer(goal_id, code)
+    def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
+        """Take in that a query for a result ended without one; if soon, the server is gone."""
+        if waited_s < GONE_S:
+            self.take_ending(goal_id, None, "it went away", now)
+        elif self._active is not None and self._active.id == goal_id:
+            self._requests.append(AskResult(goal_id))
 
-    def _drive(self, now: float) -> None:
-        self._requests += self._requests_later
-        self._requests_later.clear()
+    def _drive(self, now: float) -> bool:
+        """Send what is due; return whether there is a path from here."""
         if self._path is not None:
-            assert self._here is not None
             self._tries.moved_to(self._here)
             # The robot may also be on an unanswered goal, as answers may be lost.
             self._path.advance(self._here, self._active or self._pending)
             self._believe_motion(self._path, now)
         if self._next is not None and self._pending is None and not self._join(self._next, now):
-            return
+            return False
         assert self._path is not None
         path, goal = self._path, self._pending or self._active
         whole = path.line.length(path.way + 2 * self._ahead)
@@ -222,6 +216,7 @@ class Nav2Follower(Supervision):
             self._watch(path, goal, now)
             if goal.end - path.way <= self._ahead and goal.end < whole:
                 self._send_next(path, goal)
+        return True
 
     def _believe_motion(self, path: PathDriven, now: float) -> None:
         """Treat a goal as accepted once the robot drives it."""
@@ -246,7 +241,6 @@ class Nav2Follower(Supervision):
         """Send the next goal, once the robot is near enough to its start."""
         if goal.next_start is None:
             goal.next_start = path.start_after(goal, self._ahead, self._near)
-        assert self._here is not None
         is_there = path.is_near_end(self._here, goal, TIP_M + EARLY_M)
         if goal.next_start - path.way <= EARLY_M or (is_there and goal.next_start < math.inf):
             self._send(path, max(goal.next_start, path.way))
@@ -255,23 +249,18 @@ class Nav2Follower(Supervision):
         """Send the piece that begins there."""
         end = end_of_piece(path.line, start, self._near)
         goal = self._pending = Goal(self._new_id(), start, end)
-        self.tally.goals += 1
-        points = path.line.poses(goal.start, goal.end)
-        yaw = path.heading_after(goal)
-        is_back = path.line.is_back(start + LEAST_M)
-        self._requests.append(SendGoal(goal.id, points, self._path_frame, yaw, is_back))
+        points = [path.line.at(way) for way in path.line.ways(start, end)]
+        yaw, is_back = path.heading_after(goal), path.line.is_back(start + LEAST_M)
+        self._requests.append(SendPiece(goal.id, points, self.path_frame, yaw, is_back))
 
     def _join(self, line: Line, now: float) -> bool:
-        """Switch to a new path; if it is the same ahead, Nav2 keeps its goal.
+        """Switch to a new path, unless it begins elsewhere; return whether it does not.
 
-        Returns:
-            whether the path begins at the robot.
+        If it is the same ahead, Nav2 keeps its goal.
         """
-        assert self._here is not None
         way, far = line.nearest(self._here, 0.0, line.length(BEGINNING_M))
         if far > BEGINNING_M:
             self.state, self.detail = State.PATH_ELSEWHERE, f"{far:.2f} m away"
-            self._stop()
             return False
         goal, before = self._active, self._path
         self._path, self._next = (path := PathDriven(line, way)), None
@@ -301,51 +290,39 @@ class Nav2Follower(Supervision):
         if stands_s > STANDS_S:
             self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
         if stands_s > GIVE_UP_S:
-            self._cancellations.add(goal.id)
+            self._requests.append(CancelGoal(goal.id))
             self._active = None
             self._fail(State.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
-        elif now - self._asked_again > longest_s:
-            self._asked_again = now
+        elif now - self._asked_at > longest_s:
+            self._asked_at = now
             self._requests.append(AskResult(goal.id))
 
-    def _take_done(self, goal: Goal, now: float) -> None:
-        if self._path is None or self._here is None:
-            return
-        far = math.dist(self._here, self._path.line.at(goal.end))
-        if far > DONE_M and goal.end - self._path.way > DONE_M:
-            self._fail(State.GIVEN_UP, f"reported as done {far:.1f} m before the end", now)
-            return
-        self._path.finish(goal)
-
     def _fail(self, state: State, detail: str, now: float, *, for_good: bool = False) -> None:
-        self.tally.errors += 1
         self._trouble_of_nav2 = (state, detail)
-        if self._path is not None and self._here is not None:
+        if self._path is not None:
             self._tries.failed(self._here, self._toward(self._path), now, for_good=for_good)
 
     def _toward(self, path: PathDriven) -> float:
         """Return the direction from the robot to where a path leads [rad]."""
-        assert self._here is not None
         x, y = path.line.at(path.way + LEADS_M)
         return math.atan2(y - self._here[1], x - self._here[0])
 
     def _stop(self) -> None:
         """End all goals."""
-        for goal, is_known in ((self._active, True), (self._pending, False)):
-            if goal is not None:
-                self._cancellations.add(goal.id, is_known=is_known)
+        self._requests += [CancelGoal(goal.id) for goal in (self._active, self._pending) if goal]
         self._active = self._pending = None
-        self._requests_later.clear()
+
+    def _taken(self) -> list[Request]:
+        requests, self._requests = self._requests, []
+        return requests
 
     def _moved_to(self, pose: Pose2D, now: float) -> None:
-        before, here = self._came_at, (pose.x, pose.y)
-        share = 1.0 if before is None else 1.0 - math.exp((before - now) / STEADY_S)
-        x, y = self._steady
-        self._steady = (x + share * (here[0] - x), y + share * (here[1] - y))
-        self._here, self._came_at = here, now
+        share = 1.0 - math.exp((self._pose_at - now) / STEADY_S)
+        (x, y), self._here = self._steady, (pose.x, pose.y)
+        self._steady = (x + share * (pose.x - x), y + share * (pose.y - y))
 
     def _have(self, points: PathPoints) -> None:
-        self._next = CurveLine(points.take_poses) if self._is_curved else Line(points.take)
+        self._next = Line(points, is_curved=self._is_curved)
 
     def _withdraw(self) -> None:
         self._path = self._next = None
@@ -353,11 +330,3 @@ class Nav2Follower(Supervision):
         if self._is_canceled:
             self._is_canceled = False
             self._tries.forget()
-
-    @property
-    def _has_path(self) -> bool:
-        return self._path is not None or self._next is not None
-
-    @property
-    def _pose_at(self) -> float | None:
-        return self._came_at

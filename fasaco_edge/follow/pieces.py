@@ -1,4 +1,4 @@
-"""Pieces of a path that neither cross nor approach themselves, as poses for a controller.
+"""Pieces of a path that neither cross nor approach themselves: the goals of Nav2's controller.
 
 A coverage path crosses and touches itself. A controller with the whole path would continue at the
 nearest part, and finish wherever the end is near. So it gets a simple piece at a time: two poses
@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
+from collections.abc import Iterable
+from dataclasses import dataclass
 
-from fasaco_edge.grid.geometry import Point
+from fasaco_edge.follow.legs import apart
+from fasaco_edge.grid.geometry import Point, Pose2D
 
 # Spacing of the poses of a piece [m]: controllers search the nearest one.
 STEP_M = 0.05
@@ -22,36 +24,38 @@ APART = 2.0
 CORNER_RAD = math.radians(60.0)
 # Longest piece [m].
 MOST_M = 20.0
-# Points are read on demand, this many at a time.
-CHUNK = 500
+# A robot that cannot turn on the spot changes between forward and backward at a sharper bend [rad].
+REVERSAL_RAD = math.radians(120.0)
 # Points nearer to each other than this count as one [m].
 LEAST_M = 1e-3
 
 
 class Line:
-    """A path parametrised by arc length, from 0 at its start.
+    """A path parametrised by arc length, from 0 at its start; read as far as it is needed."""
 
-    Args:
-        take: returns the next points of the path [m], at most as many as asked for.
-    """
-
-    def __init__(self, take: Callable[[int], list[Point]]) -> None:
-        self._take = take
+    def __init__(self, poses: Iterable[Pose2D], *, is_curved: bool = False) -> None:
+        self._coming = apart(poses, LEAST_M)
+        # Whether the robot cannot turn on the spot, and may drive backward.
+        self._is_curved = is_curved
+        # Robot's heading at its beginning [rad].
+        self._yaw = 0.0
         self._points: list[Point] = []
         self._ways: list[float] = []
-        self._is_read = False
 
     def length(self, most: float) -> float:
         """Return its length, at most ``most`` [m]."""
-        while not self._is_read and (not self._ways or self._ways[-1] < most):
-            points = self._take(CHUNK)
-            self._is_read = len(points) < CHUNK
-            for point in points:
-                way = math.dist(self._points[-1], point) if self._points else 0.0
-                if not self._points or way >= LEAST_M:
-                    self._points.append(point)
-                    self._ways.append(self._ways[-1] + way if self._ways else 0.0)
-        return min(self._ways[-1], most) if self._ways else 0.0
+        while not self._ways or self._ways[-1] < most:
+            pose = next(self._coming, None)
+            if pose is None:
+                return self._ways[-1] if self._ways else 0.0
+            point = pose.x, pose.y
+            if self._points:
+                self._ways.append(self._ways[-1] + math.dist(self._points[-1], point))
+            else:
+                self._yaw = pose.yaw
+                self._ways.append(0.0)
+            self._points.append(point)
+        return most
 
     def at(self, way: float) -> Point:
         """Return the point at an arc length [m]; the end or begin for values beyond."""
@@ -89,12 +93,20 @@ class Line:
         return self.bends(start, stop, CORNER_RAD)
 
     def reversals(self, start: float, stop: float) -> list[float]:
-        """Return the arc lengths where a piece must end; see ``CurveLine``. Here there are none."""
-        return []
+        """Return the arc lengths between two limits where the robot turns back, in order [m].
+
+        A piece ends there: the robot comes to rest, and a controller that may reverse would cut
+        the ends of lanes. One that turns on the spot always drives forward.
+        """
+        return self.bends(start, stop, REVERSAL_RAD) if self._is_curved else []
 
     def is_back(self, way: float) -> bool:
-        """Return whether the robot drives backward from an arc length on; see ``CurveLine``."""
-        return False
+        """Return whether the robot drives backward from an arc length on."""
+        if not self._is_curved:
+            return False
+        (x, y), (to_x, to_y) = self.at(0.0), self.at(LEAST_M)
+        along = math.atan2(to_y - y, to_x - x) - self._yaw
+        return (len(self.reversals(0.0, way)) % 2 == 1) != (math.cos(along) < 0.0)
 
     def bends(self, start: float, stop: float, least: float) -> list[float]:
         """Return the arc lengths of bends of more than ``least`` [rad] between two limits [m]."""
@@ -110,12 +122,8 @@ class Line:
                 found.append(self._ways[index])
         return found
 
-    def poses(self, start: float, stop: float) -> list[Point]:
-        """Return points between two arc lengths, ``STEP_M`` apart and at each corner [m]."""
-        return [self.at(way) for way in self.ways(start, stop)]
-
     def ways(self, start: float, stop: float) -> list[float]:
-        """Return the arc lengths of these points."""
+        """Return arc lengths between two, ``STEP_M`` apart and at each corner [m]."""
         first, last = bisect_right(self._ways, start), bisect_right(self._ways, stop)
         bends = [way for way in self._ways[first:last] if start < way < stop]
         ways = [start]
@@ -141,35 +149,129 @@ def end_of_piece(line: Line, start: float, near: float) -> float:
     stop = line.length(start + MOST_M)
     stop = min([stop, *line.reversals(start + LEAST_M, stop)])
     ways = line.ways(start, stop)
-    seen: dict[tuple[int, int], list[int]] = {}
     points = [line.at(way) for way in ways]
-    # Poses that are far enough behind to count are added as the piece grows.
+    # By square, the poses that are far enough behind to count; they are added as the piece grows.
+    seen: dict[tuple[int, int], list[int]] = {}
     filed = 0
-    for index, (way, point) in enumerate(zip(ways, points, strict=True)):
+    for index, (way, (x, y)) in enumerate(zip(ways, points, strict=True)):
         while way - ways[filed] > APART * near:
-            seen.setdefault(_cell(points[filed], near), []).append(filed)
+            square = math.floor(points[filed][0] / near), math.floor(points[filed][1] / near)
+            seen.setdefault(square, []).append(filed)
             filed += 1
-        if (other := _touched(seen, points, point, near)) is not None:
-            corners = line.corners(max(ways[other], start), ways[index - 1])
+        col, row = math.floor(x / near), math.floor(y / near)
+        around = [(col + right, row + up) for right in (-1, 0, 1) for up in (-1, 0, 1)]
+        others = [other for square in around for other in seen.get(square, ())]
+        touched = [other for other in others if math.dist(points[other], (x, y)) < near]
+        if touched:
+            corners = line.corners(max(ways[max(touched)], start), ways[index - 1])
             late = [corner for corner in corners if corner >= way - 2.0 * APART * near]
             return late[-1] if late and late[-1] > start + LEAST_M else ways[index - 1]
     return stop
 
 
-def _touched(
-    seen: dict[tuple[int, int], list[int]], points: list[Point], point: Point, near: float
-) -> int | None:
-    """Return the last stored point that a point is too near to."""
-    column, row = _cell(point, near)
-    touched = [
-        other
-        for east in (-1, 0, 1)
-        for north in (-1, 0, 1)
-        for other in seen.get((column + east, row + north), ())
-        if math.dist(points[other], point) < near
-    ]
-    return max(touched, default=None)
+# The next goal is sent only if it extends the last one by this much [m].
+GAIN_M = 0.3
+# Where the path returns to itself, the next goal begins this far before the end of the last one
+# [m]: the part skipped there is less than half of a tool.
+TIP_M = 0.1
+# If a part before that point returns to itself, the next goal begins earlier: one of these shares
+# of the usual distance before the end.
+SHARES = (1.0, 0.6, 0.35, 0.2)
+# A goal that begins early extends beyond the last one by as much as it begins before that one's
+# end, up to this [m].
+AMPLE_M = 2.0
+# Two paths nearer than this to each other are the same [m].
+SAME_M = 0.03
+# The robot is searched this far ahead along a goal [m].
+LOOK_AHEAD_M = 2.0
+# After its goal has ended the robot rolls on by at most this [m].
+COAST_M = 0.5
 
 
-def _cell(point: Point, near: float) -> tuple[int, int]:
-    return math.floor(point[0] / near), math.floor(point[1] / near)
+@dataclass(slots=True)
+class Goal:
+    """A piece sent to Nav2, from ``start`` to ``end`` on the line [m]."""
+
+    id: bytes
+    start: float
+    end: float
+    # Where the next one may begin [m]: infinite if it must wait for the end of this one; None if
+    # that is not computed yet.
+    next_start: float | None = None
+
+
+class PathDriven:
+    """A path driven goal by goal: its line, and the robot's distance along it [m]."""
+
+    def __init__(self, line: Line, way: float) -> None:
+        self.line, self.way = line, way
+        # End of the last finished goal: the next one begins there, even if the robot stopped
+        # elsewhere.
+        self._done = -1.0
+
+    def finish(self, goal: Goal) -> None:
+        """Note that a goal is done."""
+        self.way = self._done = goal.end
+
+    def advance(self, here: Point, goal: Goal | None) -> None:
+        """Update the robot's distance along the line: never backward nor beyond its goal."""
+        if goal is not None:
+            end = min(goal.end, self.way + LOOK_AHEAD_M)
+        elif self.way != self._done:
+            end = self.line.length(self.way + COAST_M)
+            end = min([end, *self.line.corners(self.way + STEP_M, end)])
+        else:
+            return
+        if end > self.way:
+            self.way, _ = self.line.nearest(here, self.way, end)
+
+    def start_after(self, goal: Goal, ahead: float, near: float) -> float:
+        """Return the earliest start of a piece that continues a goal; infinite if there is none.
+
+        Args:
+            goal: the last goal.
+            ahead: how far before its end the piece begins if possible [m].
+            near: least distance of a piece to itself [m].
+        """
+        if self.line.reversals(goal.end - LEAST_M, goal.end):
+            return math.inf  # the robot has to come to rest there
+        for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
+            start = max(goal.end - before_m, goal.start)
+            # A goal that begins early ends sooner: it must last until the next one arrives.
+            gain_m = max(min(before_m, AMPLE_M), GAIN_M)
+            if end_of_piece(self.line, start, near) >= goal.end + gain_m:
+                return start
+        return math.inf
+
+    def heading_after(self, goal: Goal) -> float | None:
+        """Return the heading in which the line leads on after a goal [rad]; None at its end."""
+        if self.line.length(goal.end + STEP_M) < goal.end + STEP_M:
+            return None
+        if self.line.reversals(goal.end - LEAST_M, goal.end):
+            return None
+        (x, y), (to_x, to_y) = self.line.at(goal.end), self.line.at(goal.end + STEP_M)
+        turned = math.pi if self.line.is_back(goal.end) else 0.0
+        return math.remainder(math.atan2(to_y - y, to_x - x) + turned, math.tau)
+
+    def is_near_end(self, here: Point, goal: Goal, within: float) -> bool:
+        """Return whether the robot is within a distance of the end of its goal [m].
+
+        Nav2 ends a goal by this distance, also where the robot has cut a bend before the end.
+        """
+        is_last_part = goal.end - self.way <= COAST_M
+        return is_last_part and math.dist(here, self.line.at(goal.end)) <= within
+
+    def shift_to(self, line: Line, way: float, goal: Goal) -> float | None:
+        """Return the offset of a goal's rest along another line [m]; None if that diverges before.
+
+        ``way``: the robot's distance along the other line [m].
+        """
+        was, far = self.line.nearest(line.at(way), self.way, goal.end)
+        left = goal.end - was
+        if far > SAME_M or line.length(way + left) < way + left - SAME_M:
+            return None
+        count = max(math.ceil(left / (2 * STEP_M)), 1)
+        parts = (left * part / count for part in range(count + 1))
+        at, there = self.line.at, line.at
+        is_same = all(math.dist(at(was + part), there(way + part)) <= SAME_M for part in parts)
+        return way - was if is_same else None

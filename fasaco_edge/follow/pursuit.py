@@ -5,7 +5,7 @@ the robot steers the arc through a point of the path some way ahead, of curvatur
 speed is regulated as by S. Macenski et al., Regulated Pure Pursuit for Robot Path Tracking (2023),
 but by the limits of the base: it brakes to come to rest at each stop, and respects the turn rate.
 Deviations: past a corner the point lies straight on, so that the corner is not cut; corners are
-rounded at the speed that ``follow/rounding.py`` allows; and a robot with a large heading error
+rounded at the speed that ``follow/legs.py`` allows; and a robot with a large heading error
 comes to rest and turns on the spot.
 """
 
@@ -31,6 +31,9 @@ BACK_RAD = 2.8
 MOST_PERIODS = 4.0
 FORGETTING = 0.98
 
+Ends = list[tuple[float, float]]
+"""Corners ahead: how far away each is [m], and the greatest speed there [m/s]."""
+
 
 class Pursuit:
     """Drives along routes, from one command to the next.
@@ -39,17 +42,13 @@ class Pursuit:
     command then brakes by as much as was possible since the last one. The robot also brakes
     earlier, by the distance that it would drive on in such a delay.
 
-    Args:
-        limits: of the base.
-        period: from one command to the next [s].
-
-    Attributes:
-        is_lost: whether the route leads where the robot cannot turn to.
+    ``period``: from one command to the next [s].
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
         self._limits = limits
         self._period = period
+        # Whether the robot turns on the spot; and whether the route leads where it cannot turn to.
         self._is_turning, self.is_lost = True, False
         # Time since the last command, and the delay to expect of the next one [s].
         self._seconds, self._late = period, 0.0
@@ -76,27 +75,34 @@ class Pursuit:
 
     def steer(self, pose: Pose2D, route: Route, most: float = math.inf) -> Command:
         """Return the next command, at most so fast [m/s]; ``STAND`` once the route is driven."""
-        limits = self._limits
-        here = (pose.x, pose.y)
+        limits, here, self.is_lost = self._limits, (pose.x, pose.y), False
         route.pass_bends(here)
         # Half a cycle early, so that the robot turns in the middle of a cycle, not after it.
-        route.round_corner(_ahead(pose, 0.5 * self._period * self.last.speed), self.last.speed)
+        early = 0.5 * self._period * self.last.speed
+        early_x, early_y = early * math.cos(pose.yaw), early * math.sin(pose.yaw)
+        route.round_corner((pose.x + early_x, pose.y + early_y), self.last.speed)
         while (leg := route.leg) is not None:
             along, _ = leg.placed(here)
             ends = route.ends(along, limits.speed**2 / limits.acceleration + limits.speed)
             left, speed = ends[0]
             if speed > 0.0 or left > ARRIVED_M or self._braked() > 0.0:
-                break
+                return self._along(pose, route, along, ends, most)
             route.next_leg(here)
             self._is_turning, route.rounds = True, 0.0
-        if leg is None:
-            self.stand()
-            return STAND
+        self.stand()
+        return STAND
+
+    def _along(self, pose: Pose2D, route: Route, along: float, ends: Ends, most: float) -> Command:
+        """Return the next command on a leg; the robot is ``along`` it [m]."""
         most = min(most, self._most(ends))
+        leg = route.leg
+        assert leg is not None
         if route.rounds > 0.0:
+            # Turn, and drive on.
             error = math.remainder(math.atan2(leg.uy, leg.ux) - pose.yaw, math.tau)
             self._is_turning = False
-            self.last = self._rounded(error, min(most, route.rounds))
+            speed = self._sped(min(most, route.rounds))
+            self.last = Command(speed, self._toward(self._turning(error)))
             if abs(error) <= ALIGNED_RAD:
                 route.rounds = 0.0
             return self.last
@@ -108,17 +114,26 @@ class Pursuit:
         elif abs(error) <= ALIGNED_RAD:
             self._is_turning = False
         if self._is_turning:
-            self.last = self._turned(error)
+            # Turn on the spot, once at rest.
+            speed = self._braked()
+            rate = self._turning(error) if speed == 0.0 else 0.0
         else:
-            self.last = self._driven(error, math.dist(here, (x, y)), most)
+            speed, rate = self._arc(
+                error, max(math.dist((pose.x, pose.y), (x, y)), LOOKAHEAD_M), most
+            )
+        self.last = Command(speed, self._toward(rate))
         return self.last
 
-    def _most(self, ends: list[tuple[float, float]]) -> float:
-        """Return the greatest speed from which the corners ahead can be passed [m/s].
+    def _arc(self, error: float, far: float, most: float) -> tuple[float, float]:
+        """Return the next speed [m/s], up to ``most``, and rate of turning [rad/s], on the arc
+        through a point ``far`` away [m] and ``error`` off the heading [rad]."""
+        tightest = 1.0 / self._limits.turn_radius if self._limits.turn_radius else math.inf
+        curvature = min(max(2.0 * math.sin(error) / far, -tightest), tightest)
+        speed = self._sped(min(most, self._limits.turn_rate / max(abs(curvature), 1e-9)))
+        return speed, speed * curvature
 
-        Args:
-            ends: distance [m] and greatest speed [m/s] of each.
-        """
+    def _most(self, ends: Ends) -> float:
+        """Return the greatest speed from which the corners ahead can be passed [m/s]."""
         limits, most = self._limits, self._limits.speed
         for left, speed in ends:
             # As if the robot came to rest beyond the corner.
@@ -126,21 +141,6 @@ class Pursuit:
             way = max(left + further - self.last.speed * self._late, 0.0)
             most = min(most, max(stopping_rate(way, limits.acceleration, self._period), speed))
         return most
-
-    def _turned(self, error: float) -> Command:
-        """Turn on the spot, once at rest."""
-        speed = self._braked()
-        return Command(speed, self._toward(self._turning(error) if speed == 0.0 else 0.0))
-
-    def _rounded(self, error: float, most: float) -> Command:
-        """Turn, and drive on at up to a speed."""
-        return Command(self._sped(most), self._toward(self._turning(error)))
-
-    def _driven(self, error: float, ahead: float, most: float) -> Command:
-        """Steer, at up to a speed."""
-        curvature = 2.0 * math.sin(error) / max(ahead, LOOKAHEAD_M)
-        speed = self._sped(min(most, self._limits.turn_rate / max(abs(curvature), 1e-9)))
-        return Command(speed, self._toward(speed * curvature))
 
     def _turning(self, error: float) -> float:
         """Return the rate at which to turn by an angle [rad/s]."""
@@ -165,5 +165,54 @@ class Pursuit:
         return limited(last, turn_rate, self._limits.turn_acceleration * seconds)
 
 
-def _ahead(pose: Pose2D, way: float) -> tuple[float, float]:
-    return pose.x + way * math.cos(pose.yaw), pose.y + way * math.sin(pose.yaw)
+# A curve leads elsewhere where the point ahead is farther off the heading; on it, it is by a third
+# of that [rad].
+BESIDE_RAD = math.radians(60.0)
+# On a curve the point ahead is at most this far away [turning radii]: arcs are hardly cut.
+MOST_AHEAD = 0.7
+
+
+class CurvePursuit(Pursuit):
+    """Drives along curves: pure pursuit by a base that cannot turn on the spot.
+
+    No arc is tighter than the base's turning radius, and legs may be driven backward: then the
+    point ahead on the path lies behind the robot, and it steers as if it looked there; ``last`` has
+    the speed in the direction of driving. It comes to rest where the path changes between forward
+    and backward.
+    """
+
+    def __init__(self, limits: Limits, period: float) -> None:
+        super().__init__(limits, period)
+        self._is_back = False
+
+    @property
+    def is_turning(self) -> bool:
+        """Never: it cannot turn on the spot."""
+        return False
+
+    def brake(self) -> Command:
+        """Return the next command of braking."""
+        return self._sent(self._braked(), 0.0)
+
+    def _along(self, pose: Pose2D, route: Route, along: float, ends: Ends, most: float) -> Command:
+        leg = route.leg
+        assert leg is not None
+        if leg.is_back != self._is_back:
+            if self._braked() > 0.0:
+                return self.brake()
+            self.last, self._is_back = STAND, leg.is_back
+        ahead = max(LOOKAHEAD_S * self.last.speed, LOOKAHEAD_M)
+        x, y = route.carrot(max(along, 0.0), min(ahead, MOST_AHEAD * self._limits.turn_radius))
+        yaw = pose.yaw + (math.pi if self._is_back else 0.0)
+        error = math.remainder(math.atan2(y - pose.y, x - pose.x) - yaw, math.tau)
+        if abs(error) > BESIDE_RAD:
+            self.is_lost = True
+            return self.brake()
+        far = max(math.dist((pose.x, pose.y), (x, y)), 1e-3)
+        return self._sent(*self._arc(error, far, min(most, self._most(ends))))
+
+    def _sent(self, speed: float, rate: float) -> Command:
+        """Return the next command, which turns no tighter than the base can."""
+        rate, tightest = self._toward(rate), speed / self._limits.turn_radius
+        self.last = Command(speed, min(max(rate, -tightest), tightest))
+        return Command(-speed if self._is_back else speed, self.last.turn_rate)

@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import islice, pairwise
 
 from fasaco_edge.follow.estimate import Limits
-from fasaco_edge.follow.rounding import rounding
-from fasaco_edge.grid.geometry import Point
+from fasaco_edge.follow.legs import LEAST_LEG_M, Leg, apart, leg_between, rounding
+from fasaco_edge.grid.geometry import Point, Pose2D
 
-# Points are read on demand, this many at a time.
-CHUNK = 500
-# Shorter legs have no direction of their own [m].
-LEAST_LEG_M = 1e-3
 # A new path is joined where it passes the robot within this distance of its start [m]: the robot
 # drove that stretch while the path was under way.
 JOIN_WITHIN_M = 0.3
@@ -34,8 +31,8 @@ LEAST_LEAD_M, LEAD_M = 0.15, 2.0
 MISSED_M = 0.03
 # A corner of the new path is the same as one of the old path if they are this near [m].
 SAME_M = 1e-3
-# Cosine of the angle up to which two legs lead in the same direction.
-SAME_DIRECTION = math.cos(ALONG_RAD)
+# Legs of a curve up to this long are chords of an arc [m].
+CHORD_M = 0.06
 
 
 class Joining(enum.Enum):
@@ -46,79 +43,16 @@ class Joining(enum.Enum):
     ELSEWHERE = "not from here"
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
-    """A straight part of the path.
-
-    Attributes:
-        start, end: [m].
-        ux, uy: its direction, of length 1.
-        length: [m].
-        most: greatest speed at its end [m/s]: 0 where the robot has to come to rest, infinity where
-            it just steers.
-        early_s: how long before its end the robot begins to turn there, if it rounds a corner [s].
-        is_back: whether it is driven backward.
-    """
-
-    start: Point
-    end: Point
-    ux: float
-    uy: float
-    length: float
-    most: float = 0.0
-    early_s: float = 0.0
-    is_back: bool = False
-
-    @property
-    def stops(self) -> bool:
-        """Whether the robot has to come to rest at its end."""
-        return self.most == 0.0
-
-    @property
-    def bends(self) -> bool:
-        """Whether it just steers at its end."""
-        return self.most == math.inf
-
-    def placed(self, point: Point) -> tuple[float, float]:
-        """Return a point's distance along the leg's line, and to its left [m]."""
-        dx, dy = point[0] - self.start[0], point[1] - self.start[1]
-        return dx * self.ux + dy * self.uy, self.ux * dy - self.uy * dx
-
-    def distance(self, point: Point) -> float:
-        """Return a point's distance from the leg [m]."""
-        along, aside = self.placed(point)
-        beyond = max(-along, along - self.length, 0.0)
-        return math.hypot(beyond, aside)
-
-    def leads_as(self, other: Leg | None) -> bool:
-        """Return whether another leg leads in the same direction."""
-        return other is not None and self.ux * other.ux + self.uy * other.uy >= SAME_DIRECTION
-
-    def at(self, along: float) -> Point:
-        """Return the point at a distance along its line [m]."""
-        return self.start[0] + along * self.ux, self.start[1] + along * self.uy
-
-
 class Route:
-    """A path, and the leg of it that the robot is on.
+    """A path, read as far as it is needed, and the leg of it that the robot is on."""
 
-    Args:
-        take: returns the next points of the path [m], at most as many as asked for.
-        limits: of the base.
-
-    Attributes:
-        rounds: greatest speed in the corner that the robot rounds to its leg; 0 for none [m/s].
-    """
-
-    def __init__(self, take: Callable[[int], list[Point]], limits: Limits) -> None:
+    def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
+        # Greatest speed in the corner that the robot rounds to its leg; 0 for none [m/s].
         self.rounds = 0.0
-        self._take = take
         self._limits = limits
-        # The first leg is the one that the robot is on; the end of the last leg may not be known
-        # yet.
+        # The first leg is the one that the robot is on; those that are not needed yet are coming.
         self._legs: list[Leg] = []
-        self._ahead: list[Point] = []
-        self._is_read = False
+        self._coming = self._legs_along(poses)
         # How far the robot was from the corner that it returns to; infinity if it does not return
         # [m].
         self._missed_by = math.inf
@@ -126,8 +60,7 @@ class Route:
     @property
     def leg(self) -> Leg | None:
         """The leg that the robot is on; None once the path is driven."""
-        self._fill(1)
-        return self._legs[0] if self._legs else None
+        return self._leg(0)
 
     def next_leg(self, here: Point | None = None) -> None:
         """Go on to the next leg.
@@ -137,7 +70,7 @@ class Route:
         brought it nearer: a robot whose pose is late, or not of the point that it turns about,
         would otherwise circle for ever about a corner that it cannot hit.
         """
-        self._fill(2)
+        self._leg(1)
         corner = self._legs[0].end if self._legs else None
         del self._legs[:1]
         before, self._missed_by = self._missed_by, math.inf
@@ -172,76 +105,51 @@ class Route:
         """Return how far ahead of ``along`` the robot must be slow [m], and its greatest speed
         there [m/s]; at least one place, up to the next stop or beyond ``horizon`` [m]."""
         found: list[tuple[float, float]] = []
-        left, index = -along, 0
-        while leg := self._leg(index):
+        left = -along
+        for leg in self._ahead():
             left += leg.length
             if not leg.bends or left > horizon:
                 found.append((left - leg.early_s * leg.most if leg.early_s else left, leg.most))
             if leg.stops or left > horizon:
                 break
-            index += 1
         return found
 
     def carrot(self, along: float, ahead: float) -> Point:
         """Return the point ``ahead`` of ``along`` the leg [m]; past a corner, straight on."""
-        index, to = 0, along + ahead
-        leg = self._leg(0)
-        assert leg is not None
-        while to > leg.length and leg.bends and (after := self._leg(index + 1)):
-            to -= leg.length
-            leg, index = after, index + 1
+        leg, _, to = self._leg_at(along + ahead)
         return leg.at(to)
 
     def line_ahead(self, here: Point, ahead: float) -> list[Point]:
         """Return the corners of the route from ``here`` on, at most ``ahead`` further [m]."""
-        line, index = [here], 0
-        while ahead > 0.0 and (leg := self._leg(index)):
+        line = [here]
+        for leg in self._ahead():
+            (x0, y0), (x1, y1) = line[-1], leg.end
             length = math.dist(line[-1], leg.end)
             share = min(ahead / length, 1.0) if length > 0.0 else 1.0
-            (x0, y0), (x1, y1) = line[-1], leg.end
             line.append((x0 + share * (x1 - x0), y0 + share * (y1 - y0)))
             ahead -= length
-            index += 1
+            if ahead <= 0.0:
+                break
         return line
-
-    def toward(self, here: Point, ahead: float) -> float:
-        """Return the direction from ``here`` to the point ``ahead`` along the route [rad].
-
-        Past corners, too: a path that begins a little beside the robot leads the same way.
-        """
-        leg, index = self._leg(0), 0
-        if leg is None:
-            return 0.0
-        to = min(max(leg.placed(here)[0], 0.0), leg.length) + ahead
-        while to > leg.length and (after := self._leg(index + 1)):
-            to -= leg.length
-            leg, index = after, index + 1
-        x, y = leg.at(min(to, leg.length))
-        return math.atan2(y - here[1], x - here[0])
 
     def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
         """Find the leg that passes the robot, near the beginning of a new path.
 
         That is the leg to the corner that the robot was driving to, if the path has it: on the same
-        leg it just goes on. Otherwise it is the leg where the distance to the robot stops
-        decreasing. If the path begins further along the last one, that one is driven until there.
+        leg it just goes on. If the path begins further along the last one, that one is driven until
+        there.
 
         Args:
             here: the robot's position.
             heading: its direction of driving [rad]; None at rest.
             before: the last route; None for none.
-
-        Returns:
-            how it can be joined; if it is, the robot is on its first leg.
         """
-        target = before._legs[0].end if before is not None and before._legs else None
-        kept = self._leg_to(target) if target else None
-        index = self._nearest(here) if kept is None else kept
+        index, is_kept = self._passing(here, before)
         leg = self._leg(index)
         if leg is None:
             return Joining.JOINED
         aside = leg.distance(here)
-        is_same = before is not None and kept is not None and leg.leads_as(before.leg)
+        is_same = before is not None and is_kept and leg.leads_as(before.leg)
         turn = math.atan2(leg.uy, leg.ux) - (heading or 0.0)
         is_along = heading is None or abs(math.remainder(turn, math.tau)) <= ALONG_RAD
         if (is_same and aside <= NEAREST_M) or (aside <= BESIDE_M and is_along):
@@ -267,16 +175,40 @@ class Route:
             self._legs.insert(0, leg_between(here, begin))
         return Joining.JOINED
 
+    def _passing(self, here: Point, before: Route | None) -> tuple[int, bool]:
+        """Return which leg passes ``here``, near the beginning; and whether it ends at the corner
+        that the robot was driving to."""
+        target = before._legs[0].end if before is not None and before._legs else None
+        way = 0.0
+        for index, leg in enumerate(self._ahead()):
+            if target is None or way > JOIN_WITHIN_M:
+                break
+            if math.dist(leg.end, target) <= SAME_M:
+                return index, True
+            way += leg.length
+        # Else it is the leg where the distance to the robot stops decreasing.
+        way, index = 0.0, 0
+        while (one := self._leg(index)) and (after := self._leg(index + 1)):
+            way += one.length
+            is_past = one.placed(here)[0] >= one.length
+            if way > JOIN_WITHIN_M or not is_past or after.distance(here) > one.distance(here):
+                break
+            index += 1
+        return index, False
+
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
         """Return the legs up to a point that they pass soon; none if they do not.
 
         None either for a robot that is off its leg, as the leg does not lead it there.
         """
-        leg = self.leg
-        if leg is None or leg.distance(here) > NEAREST_M:
-            return []
-        way, index = -leg.placed(here)[0], 0
-        while way <= LEAD_M and (leg := self._leg(index)):
+        way = 0.0
+        for index, leg in enumerate(self._ahead()):
+            if index == 0:
+                way = -leg.placed(here)[0]
+                if leg.distance(here) > NEAREST_M:
+                    break
+            if way > LEAD_M:
+                break
             along, aside = leg.placed(point)
             # The robot may be unable to come to rest at a nearer point.
             on_leg = LEAST_LEG_M <= along <= leg.length + LEAST_LEG_M
@@ -284,60 +216,108 @@ class Route:
             if is_ahead and abs(aside) <= BESIDE_M:
                 return [*self._legs[:index], leg_between(leg.start, leg.at(along))]
             way += leg.length
-            index += 1
         return []
 
-    def _leg_to(self, target: Point) -> int | None:
-        """Return which of the first legs ends at ``target``."""
-        way, index = 0.0, 0
-        while way <= JOIN_WITHIN_M and (leg := self._leg(index)):
-            if math.dist(leg.end, target) <= SAME_M:
-                return index
-            way += leg.length
-            index += 1
-        return None
+    def _leg_at(self, to: float) -> tuple[Leg, Leg | None, float]:
+        """Return the leg where the robot is after some way from here [m], up to the next corner;
+        the leg before it, if it is not the first; and how far along it that is [m]."""
+        before = None
+        for leg in self._ahead():
+            if to <= leg.length or not leg.bends:
+                return leg, before, to
+            to, before = to - leg.length, leg
+        raise AssertionError("the last leg does not bend")
 
-    def _nearest(self, here: Point) -> int:
-        """Return the leg at which the distance to ``here`` stops decreasing."""
-        way, index = 0.0, 0
-        while (leg := self._leg(index)) and (after := self._leg(index + 1)):
-            way += leg.length
-            is_past = leg.placed(here)[0] >= leg.length
-            if way > JOIN_WITHIN_M or not is_past or after.distance(here) > leg.distance(here):
-                break
+    def _ahead(self) -> Iterator[Leg]:
+        """Yield the legs, from that of the robot on."""
+        index = 0
+        while (leg := self._leg(index)) is not None:
+            yield leg
             index += 1
-        return index
 
     def _leg(self, index: int) -> Leg | None:
-        self._fill(index + 1)
+        self._legs += islice(self._coming, max(index + 1 - len(self._legs), 0))
         return self._legs[index] if index < len(self._legs) else None
 
-    def _fill(self, count: int) -> None:
-        """Read until there are ``count`` legs, if the path has them."""
-        while len(self._legs) < count and self._read():
-            start, end = self._ahead[:2]
-            leg = leg_between(start, end)
-            if len(self._ahead) > 2:
-                after = leg_between(end, self._ahead[2])
-                turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
-                room = 0.5 * min(leg.length, after.length)
-                most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
-                leg = replace(leg, most=most, early_s=early_s)
-            self._legs.append(leg)
-            del self._ahead[0]
+    def _legs_along(self, poses: Iterable[Pose2D]) -> Iterator[Leg]:
+        leg = None
+        for start, end in pairwise(apart(poses, LEAST_LEG_M)):
+            after = self._leg_between(start, end)
+            if leg is not None:
+                yield self._ending(leg, after)
+            leg = after
+        if leg is not None:
+            yield leg
 
-    def _read(self) -> bool:
-        """Read the next two points and the one after them, if there is one."""
-        while len(self._ahead) < 3 and not self._is_read:
-            points = self._take(CHUNK)
-            self._is_read = len(points) < CHUNK
-            for point in points:
-                if not self._ahead or math.dist(point, self._ahead[-1]) >= LEAST_LEG_M:
-                    self._ahead.append(point)
-        return len(self._ahead) >= 2
+    def _leg_between(self, start: Pose2D, end: Pose2D) -> Leg:
+        return leg_between((start.x, start.y), (end.x, end.y))
+
+    def _ending(self, leg: Leg, after: Leg) -> Leg:
+        """Return a leg with what the robot does at its end, where it goes on to another one."""
+        turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
+        room = 0.5 * min(leg.length, after.length)
+        most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
+        return replace(leg, most=most, early_s=early_s)
 
 
-def leg_between(start: Point, end: Point) -> Leg:
-    """Return the leg from one point to another."""
-    length = math.dist(start, end)
-    return Leg(start, end, (end[0] - start[0]) / length, (end[1] - start[1]) / length, length)
+class CurveRoute(Route):
+    """A curve, and the leg of it that a robot is on that cannot turn on the spot.
+
+    Its legs are chords of arcs, and lanes; the robot steers from each to the next. It comes to rest
+    only where it changes between forward and backward: a leg is driven backward if the path's
+    heading is opposite to it.
+    """
+
+    def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
+        super().__init__(poses, limits)
+        # The leg before the first one, unless the robot comes to rest between them.
+        self._behind: Leg | None = None
+
+    def next_leg(self, here: Point | None = None) -> None:
+        """Go on to the next leg; the robot does not return to a corner that it has missed."""
+        leg = self.leg
+        self._behind = None if leg is None or leg.stops else leg
+        super().next_leg()
+
+    def carrot(self, along: float, ahead: float) -> Point:
+        """Return the point ``ahead`` of ``along`` the leg [m]; past a stop, further on the arc."""
+        leg, before, to = self._leg_at(along + ahead)
+        before = before or self._behind
+        beyond = to - leg.length
+        if beyond <= 0.0 or before is None or max(before.length, leg.length) > CHORD_M:
+            return leg.at(to)
+        heading = math.atan2(leg.uy, leg.ux)
+        turn = math.remainder(heading - math.atan2(before.uy, before.ux), math.tau)
+        curvature = 2.0 * turn / (before.length + leg.length)
+        # At its end, an arc has turned by half of a chord's angle more.
+        heading += 0.5 * (curvature * leg.length + curvature * beyond)
+        x, y = leg.end
+        return x + beyond * math.cos(heading), y + beyond * math.sin(heading)
+
+    def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
+        """Find the leg that passes the robot; see ``Route.join``.
+
+        The robot steers to a leg beside it: it cannot turn towards the nearest point.
+        """
+        leg = self.leg
+        if leg is None:
+            return Joining.JOINED
+        index, _ = self._passing(here, before)
+        if self._legs[index].distance(here) <= NEAREST_M:
+            del self._legs[:index]
+            return Joining.JOINED
+        if before is not None and (lead := before._lead_to(leg.start, here)):
+            is_back = before._legs[len(lead) - 1].is_back
+            most = math.inf if is_back == leg.is_back else 0.0
+            self._legs[:0] = [*lead[:-1], replace(lead[-1], most=most, is_back=is_back)]
+            return Joining.JOINED
+        if heading is not None:
+            return Joining.AT_REST
+        return Joining.ELSEWHERE if math.dist(here, leg.start) > BEGINNING_M else Joining.JOINED
+
+    def _leg_between(self, start: Pose2D, end: Pose2D) -> Leg:
+        leg = super()._leg_between(start, end)
+        return replace(leg, is_back=leg.ux * math.cos(start.yaw) + leg.uy * math.sin(start.yaw) < 0)
+
+    def _ending(self, leg: Leg, after: Leg) -> Leg:
+        return replace(leg, most=math.inf if after.is_back == leg.is_back else 0.0)

@@ -9,11 +9,11 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.motion import stopping_rate
-from fasaco_edge.wire.messages.grid_octets import GridOctets, read_grid, with_update
+from fasaco_edge.wire.messages.grid_octets import GridOctets
 from fasaco_edge.wire.messages.scans import LaserScan
 
 # Points further away from the sensor do not matter yet [m].
@@ -88,35 +88,32 @@ class Thing(NamedTuple):
     moves: bool
 
 
-class Met(NamedTuple):
-    """A thing on the line, and how far the disc can go before it comes too near to it [m]."""
-
-    thing: Thing
-    way: float
+# A distance without an end, to nothing.
+NOTHING: Final[tuple[float, Thing | None]] = (math.inf, None)
 
 
-def first_met(things: Iterable[Thing], line: Sequence[Point], radius: float) -> Met | None:
-    """Return the first thing that a disc meets along a line; None for none.
+def first_met(
+    things: Iterable[Thing], line: Sequence[Point], radius: float
+) -> tuple[float, Thing | None]:
+    """Return how far a disc can go along a line [m], and the first thing that it meets there.
 
     Args:
         things: where the disc may not go.
-        line: from the disc's place on; two points at least, or it does not move.
+        line: from the disc's place on.
         radius: of the disc [m]; it keeps ``MARGIN_M`` from things.
+
+    Returns:
+        infinity and None if it meets nothing.
     """
-    first: Met | None = None
-    apart = [(thing, math.dist(line[0], thing[:2]) - ASIDE_M) for thing in things]
-    keeps = max(min((far for _, far in apart), default=math.inf), radius)
+    gaps = [(thing, math.dist(line[0], thing[:2]) - ASIDE_M) for thing in things]
+    keeps = max(min((gap for _, gap in gaps), default=math.inf), radius)
     keeps = min(keeps, radius + MARGIN_M)
-    for thing, far in apart:
-        near = min(keeps, far)
-        way = _way_to(thing, line, near) if near > 0.0 else None
-        if way is not None and (first is None or way < first.way):
-            first = Met(thing, way)
-    return first
+    ways = [(_way_to(thing, line, min(keeps, gap)), thing) for thing, gap in gaps]
+    return min(ways, key=lambda met: met[0], default=NOTHING)
 
 
-def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float | None:
-    """Return the way along a line to where a thing is within ``radius`` [m]; None if nowhere."""
+def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float:
+    """Return the way along a line to where a thing is within ``radius`` [m], or infinity."""
     before = 0.0
     for (x0, y0), (x1, y1) in pairwise(line):
         length = math.hypot(x1 - x0, y1 - y0)
@@ -130,7 +127,7 @@ def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float | None:
             if way <= length:
                 return before + way
         before += length
-    return None
+    return math.inf
 
 
 def speed_before(way: float, acceleration: float, period: float) -> float:
@@ -148,76 +145,36 @@ def speed_beside(
     The gap must be as long as the robot's way before it reacts and while it brakes, plus the
     thing's way in that time: v late + v^2 / 2a + walk (late + v / a).
     """
-    nearest, decides = math.inf, None
+    nearest, decides = NOTHING
     for thing in things:
-        if not thing.moves:
-            continue
         dx, dy = thing.x - pose.x, thing.y - pose.y
         gap = math.hypot(dx, dy) - radius
         toward = math.remainder(math.atan2(dy, dx) - pose.yaw, math.tau)
-        if gap < nearest and abs(toward) <= AHEAD_RAD:
+        if thing.moves and gap < nearest and abs(toward) <= AHEAD_RAD:
             nearest, decides = gap, thing
     if decides is None:
-        return math.inf, None
+        return NOTHING
     half = LATE_S + WALK_M_S / acceleration
     left = half * half + 2.0 * (nearest - WALK_M_S * LATE_S) / acceleration
-    speed = acceleration * (math.sqrt(max(left, 0.0)) - half)
-    return max(speed, 0.0), decides
+    return max(acceleration * (math.sqrt(max(left, 0.0)) - half), 0.0), decides
 
 
 # A point of a scan this near to an obstacle of the map belongs to that obstacle [m]: ranges
 # scatter, and the pose is off by some centimetres.
 KNOWN_M = 0.15
-UNKNOWN = 255
 
 
-class KnownMap:
-    """Keeps the newest map.
+def shows(grid: GridOctets, free: bytes, x: float, y: float) -> bool:
+    """Return whether an obstacle of a map is at most about ``KNOWN_M`` from a place [m].
 
-    Args:
-        free_at_most: occupancy up to which a pixel is free [percent].
+    ``free``: the values of pixels that are no obstacle.
     """
-
-    def __init__(self, free_at_most: int) -> None:
-        self._grid: GridOctets | None = None
-        # Values that are no obstacle: free and unknown pixels.
-        self._free = bytes([*range(free_at_most + 1), UNKNOWN])
-
-    @property
-    def frame(self) -> str | None:
-        """Name of its frame; None without a map."""
-        return self._grid.frame if self._grid is not None else None
-
-    def take_map(self, payload: bytes) -> None:
-        """Take in a nav_msgs/OccupancyGrid.
-
-        Raises:
-            MalformedMessage: it is malformed.
-        """
-        self._grid = read_grid(payload)
-
-    def take_update(self, payload: bytes) -> None:
-        """Take in a map_msgs/OccupancyGridUpdate; without a map it is ignored.
-
-        Raises:
-            MalformedMessage: it is malformed, or no part of the map.
-        """
-        if self._grid is not None:
-            self._grid = with_update(self._grid, payload)
-
-    def shows(self, x: float, y: float) -> bool:
-        """Return whether an obstacle of the map is at most about ``KNOWN_M`` from a place [m]."""
-        grid = self._grid
-        if grid is None:
-            return False
-        size, octets = grid.geometry, grid.octets
-        far = KNOWN_M / size.resolution
-        col, row = size.to_pixels(x, y)
-        left, right = max(math.floor(col - far), 0), min(math.floor(col + far) + 1, size.cols)
-        if left >= right:
-            return False
-        for line in range(max(math.floor(row - far), 0), min(math.floor(row + far) + 1, size.rows)):
-            start = line * size.cols
-            if bytes(octets[start + left : start + right]).translate(None, self._free):
-                return True
-        return False
+    size = grid.geometry
+    far = KNOWN_M / size.resolution
+    col, row = size.to_pixels(x, y)
+    left, right = max(math.floor(col - far), 0), min(math.floor(col + far) + 1, size.cols)
+    rows = range(max(math.floor(row - far), 0), min(math.floor(row + far) + 1, size.rows))
+    starts = (line * size.cols for line in rows if left < right)
+    return any(
+        bytes(grid.octets[start + left : start + right]).translate(None, free) for start in starts
+    )

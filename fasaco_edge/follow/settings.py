@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from fasaco_edge.follow.estimate import Limits
 from fasaco_edge.wire.schemas import TWIST
 
 
@@ -36,9 +37,7 @@ class FollowSettings:
         robot, base: name of the robot, and prefix of its keys.
         connect: endpoints of the bus.
         secured: credentials, a part of Zenoh's configuration.
-        speed_m_s, acceleration_m_s2: of driving.
-        turn_deg_s, turn_deg_s2, steered_deg: of turning; the largest bend that is steered.
-        turn_radius_m: of the tightest arc; 0 if the base turns on the spot.
+        limits: of the base.
         pose_schema: message type of poses whose samples name none.
         pose_age_s: timeout of the newest pose.
         poses: keys of poses.
@@ -51,7 +50,7 @@ class FollowSettings:
             distance of goals to themselves [m].
         dock: if Nav2's docking server docks: names of its actions, dock, its type, frame, pose x,
             y [m], yaw [rad], and how far in front of it paths end [m].
-        scan: if scans are used: where the lidar is (``mount``), ``radius_m`` of the robot,
+        scan: if scans are used: where the lidar is (``mount``),
             ``lost_s``, ``free_at_most``, ``most_pixels`` of a map, and further topics of scans,
             maps and updates: name, key, whether it is latched, depth.
         radius_m: of the robot's disc; 0 if unknown.
@@ -62,15 +61,10 @@ class FollowSettings:
     robot: str
     base: str
     connect: tuple[str, ...]
-    speed_m_s: float
-    acceleration_m_s2: float
-    turn_deg_s: float
-    turn_deg_s2: float
-    steered_deg: float
+    limits: Limits
     pose_schema: str
     poses: tuple[PoseSource, ...]
     cmd_key: str
-    turn_radius_m: float = 0.0
     pose_age_s: float = 0.5
     frames: tuple[str, str] | None = None
     schema: str = TWIST
@@ -93,6 +87,7 @@ class FollowSettings:
         """Return what ``encode`` made."""
         members = json.loads(document)
         members["poses"] = tuple(PoseSource(**source) for source in members["poses"])
+        members["limits"] = Limits(**members["limits"])
         members["connect"] = tuple(members["connect"])
         members["frames"] = tuple(members["frames"]) if members["frames"] else None
         return cls(**members)

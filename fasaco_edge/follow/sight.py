@@ -10,21 +10,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.scanner import (
-    KnownMap,
     Mount,
     Thing,
     first_met,
     points_of,
+    shows,
     speed_before,
     speed_beside,
 )
-from fasaco_edge.follow.supervision import State
+from fasaco_edge.follow.supervision import Reason, State
 from fasaco_edge.grid.geometry import Point, Pose2D
+from fasaco_edge.wire.messages.grid_octets import GridOctets, read_grid, with_update
 from fasaco_edge.wire.messages.scans import decode_scan
 
 # The path is checked this far ahead [m].
@@ -35,35 +36,11 @@ AHEAD_M = 1.5
 PLACE_M, STANDS_S, FORGET_S = 0.1, 1.5, 1.0
 # Points nearer to the robot's middle than this share of its radius are the robot itself.
 OWN_SHARE = 0.7
-# The report of a thing has the points within this distance of it [m].
+# The report of an obstacle has the points within this distance of it [m].
 AROUND_M = 0.5
+UNKNOWN = 255
 # A speed below this counts as 0 [m/s].
 LEAST_M_S = 0.02
-
-Trouble = tuple[State, str]
-
-
-@dataclass(frozen=True, slots=True)
-class SightSettings:
-    """Lidar and robot, as the follower knows them.
-
-    Attributes:
-        mount: where the lidar is.
-        radius: of the robot's disc [m].
-        lost_s: the robot stands after this time without a scan [s].
-        free_at_most: occupancy up to which a pixel of the map is free [percent].
-    """
-
-    mount: Mount
-    radius: float
-    lost_s: float = 1.0
-    free_at_most: int = 25
-
-    @classmethod
-    def of(cls, settings: Mapping[str, Any]) -> SightSettings:
-        """Return the settings in the member ``scan`` of the follower's settings."""
-        mount = Mount(**settings["mount"])
-        return cls(mount, settings["radius_m"], settings["lost_s"], settings["free_at_most"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,41 +50,52 @@ class Limit:
     Attributes:
         speed: the highest [m/s]; infinite without a limit.
         why: what limits it, in words.
-        thing: the thing that limits it; None for none.
+        around: the points seen around what limits it [m], the nearest first.
     """
 
     speed: float
     why: str = ""
-    thing: Thing | None = None
+    around: tuple[Point, ...] = ()
+
+
+NO_LIMIT = Limit(math.inf)
 
 
 class Sight:
     """Keeps the newest scan, without obstacles of the map.
 
+    Args:
+        mount: where the lidar is.
+        radius: of the robot's disc [m].
+        lost_s: the robot stands after this time without a scan [s].
+        free_at_most: occupancy up to which a pixel of the map is free [percent].
+
     Attributes:
         things: what the scan shows, in the map frame.
     """
 
-    def __init__(self, settings: SightSettings) -> None:
+    def __init__(
+        self, mount: Mount, radius: float, lost_s: float = 1.0, free_at_most: int = 25
+    ) -> None:
         self.things: list[Thing] = []
-        self._settings = settings
-        self._map = KnownMap(settings.free_at_most)
+        self._mount, self._radius, self._lost_s = mount, radius, lost_s
+        # Values of pixels that are no obstacle: free and unknown.
+        self._free = bytes([*range(free_at_most + 1), UNKNOWN])
+        self._grid: GridOctets | None = None
         self._scan_at: float | None = None
         self._stamp_ns = 0
-        self._fault: Trouble | None = None
+        self._fault: Reason | None = None
         self._is_first = True
         # Occupied squares: when they were first and last seen [s].
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
 
     def take_map(self, payload: bytes, *, is_update: bool = False) -> None:
         """Take in a map, or an update of it; one that is malformed is ignored, as by the daemon."""
-        try:
-            if is_update:
-                self._map.take_update(payload)
-            else:
-                self._map.take_map(payload)
-        except MalformedMessage:
-            return
+        with suppress(MalformedMessage):
+            if not is_update:
+                self._grid = read_grid(payload)
+            elif self._grid is not None:
+                self._grid = with_update(self._grid, payload)
 
     def take_scan(self, payload: bytes, pose: Pose2D, now: float) -> None:
         """Take in a scan that was made at ``pose``; one with the previous stamp is not new."""
@@ -119,29 +107,24 @@ class Sight:
         if scan.stamp_ns and scan.stamp_ns == self._stamp_ns:
             return
         self._stamp_ns = scan.stamp_ns
-        points = points_of(scan, self._settings.mount)
+        points = points_of(scan, self._mount)
         if points is None:
             self._fault = State.BAD_SCAN, "it sees nothing: is the lidar covered?"
             return
         self._fault, self._scan_at = None, now
         self._look(points, pose, now)
 
-    def trouble(self, frame: str, now: float) -> Trouble | None:
-        """Return why the robot must stand, with figures; None if it can see.
-
-        Args:
-            frame: of the path.
-            now: the time [s].
-        """
+    def trouble(self, frame: str, now: float) -> Reason | None:
+        """Return why the robot must stand, with figures; None if it can see in the path's frame."""
         if self._fault is not None:
             return self._fault
-        if self._map.frame is None:
+        if self._grid is None:
             return State.NO_SCAN, "no map to compare scans with"
-        if self._map.frame != frame:
-            return State.NO_SCAN, f"map in {self._map.frame!r}, path in {frame!r}"
+        if self._grid.frame != frame:
+            return State.NO_SCAN, f"map in {self._grid.frame!r}, path in {frame!r}"
         if self._scan_at is None:
             return State.NO_SCAN, "none has come"
-        if (age_s := now - self._scan_at) > self._settings.lost_s:
+        if (age_s := now - self._scan_at) > self._lost_s:
             return State.NO_SCAN, f"for {age_s:.1f} s"
         return None
 
@@ -156,30 +139,22 @@ class Sight:
             acceleration: of the base [m/s^2].
             period: from one command to the next [s].
         """
-        if not self.things:
-            return Limit(math.inf)
-        radius = self._settings.radius
+        radius, why = self._radius, "something moves"
         speed, thing = speed_beside(self.things, pose, radius, acceleration)
-        why = "something moves"
-        met = first_met(self.things, line, radius) if len(line) > 1 else None
-        if met is not None and (ahead := speed_before(met.way, acceleration, period)) < speed:
-            speed, thing, why = ahead, met.thing, "something stands"
-        if thing is None:
-            return Limit(math.inf)
+        way, met = first_met(self.things, line, radius)
+        if met is not None and (ahead := speed_before(way, acceleration, period)) < speed:
+            speed, thing, why = ahead, met, "something stands"
+        if thing is None or speed >= LEAST_M_S:
+            return Limit(speed)
         far = max(math.dist((pose.x, pose.y), thing[:2]) - radius, 0.0)
-        return Limit(speed if speed >= LEAST_M_S else 0.0, f"{why} {far:.2f} m away", thing)
-
-    def around(self, thing: Thing | None) -> tuple[Point, ...]:
-        """Return the points seen within ``AROUND_M`` of a thing [m], the nearest first."""
-        if thing is None:
-            return ()
         apart = sorted((math.dist(thing[:2], other[:2]), other[:2]) for other in self.things)
-        return tuple(place for far, place in apart if far <= AROUND_M)
+        around = tuple(place for off, place in apart if off <= AROUND_M)
+        return Limit(0.0, f"{why} {far:.2f} m away", around)
 
     def _look(self, points: list[Point], pose: Pose2D, now: float) -> None:
         """Keep points that no map shows, and separate standing things from those that may move."""
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-        own = OWN_SHARE * self._settings.radius
+        own = OWN_SHARE * self._radius
         places: dict[tuple[int, int], list[Point]] = {}
         for x, y in points:
             if math.hypot(x, y) < own:
@@ -194,10 +169,11 @@ class Sight:
         self.things = []
         for square, found in places.items():
             moves = now - self._since(known, square, begun) < STANDS_S
-            self.things += [
-                Thing(x, y, moves) for x, y in found if moves or not self._map.shows(x, y)
-            ]
+            self.things += [Thing(x, y, moves) for x, y in found if moves or not self._shows(x, y)]
         self._seen = known | {at: (known[at][0] if at in known else begun, now) for at in places}
+
+    def _shows(self, x: float, y: float) -> bool:
+        return self._grid is not None and shows(self._grid, self._free, x, y)
 
     @staticmethod
     def _since(

@@ -41,16 +41,20 @@ ANGLES_RAD = tuple(math.radians(angle) for angle in (0, -20, 20, -40, 40))
 
 
 class Standstill:
-    """Watches a follower; ``look`` is called once in each cycle."""
+    """Watches a follower; ``report`` is called once in each cycle."""
 
     def __init__(self) -> None:
         self._place: Point = math.inf, math.inf
         self._state: State | None = None
-        self._since = self._last = -math.inf
-        self._reported_at = -math.inf
+        self._since = self._last = self._reported_at = -math.inf
 
-    def look(self, follower: Supervision, now: float) -> float | None:
-        """Note the follower's state; return how long it has been kept [s] if a report is due."""
+    def report(
+        self, follower: Supervision, planner: str, revision: int, now: float
+    ) -> bytes | None:
+        """Return a report as JSON, see ``wire.documents.blocked``; None if none is due.
+
+        ``planner``, ``revision``: of the path.
+        """
         pose, state = follower.newest_pose, follower.state
         if state not in REASONS or pose is None:
             return None
@@ -59,46 +63,30 @@ class Standstill:
         if has_moved or state is not self._state or now - self._last > GONE_S:
             self._place, self._state, self._since = here, state, now
         self._last = now
-        held_s = now - self._since
-        if held_s < REASONS[state][1] or now - self._reported_at < EVERY_S:
+        (reason, least_s), held_s = REASONS[state], now - self._since
+        if held_s < least_s or now - self._reported_at < EVERY_S:
             return None
         self._reported_at = now
-        return held_s
-
-
-def report_of(follower: Supervision, held_s: float, planner: str, revision: int) -> bytes:
-    """Return the report as JSON, see ``wire.documents.blocked``.
-
-    Args:
-        follower: with its state, and what is ahead.
-        held_s: for how long it is kept [s].
-        planner, revision: of the path.
-    """
-    pose = follower.newest_pose
-    assert pose is not None
-    state, detail = follower.state, follower.detail
-    words = one_line(f"{state.value}: {detail}" if detail else state.value)
-    document = {
-        "daemon": planner,
-        "revision": revision,
-        "reason": REASONS[state][0],
-        "detail": words.encode()[:MAX_STRING_BYTES].decode(errors="ignore"),
-        "held_s": round(held_s, 1),
-        "frame": follower.path_frame,
-        "x": pose.x,
-        "y": pose.y,
-        "points": [(round(x, 3), round(y, 3)) for x, y in follower.ahead[:MAX_BLOCKED_POINTS]],
-    }
-    return json.dumps(document).encode()
+        detail = follower.detail
+        words = one_line(f"{state.value}: {detail}" if detail else state.value)
+        document = {
+            "daemon": planner,
+            "revision": revision,
+            "reason": reason,
+            "detail": words.encode()[:MAX_STRING_BYTES].decode(errors="ignore"),
+            "held_s": round(held_s, 1),
+            "frame": follower.path_frame,
+            "x": pose.x,
+            "y": pose.y,
+            "points": [(round(x, 3), round(y, 3)) for x, y in follower.ahead[:MAX_BLOCKED_POINTS]],
+        }
+        return json.dumps(document).encode()
 
 
 def floor_ahead(here: Point, toward: float, radius: float) -> tuple[Point, ...]:
     """Return the floor that a robot pushes against, places [m]; none for an unknown radius.
 
-    Args:
-        here: where the robot is.
-        toward: where it is to go [rad].
-        radius: of its disc [m].
+    ``toward``: where it is to go [rad]; ``radius``: of its disc [m].
     """
     if not radius:
         return ()
@@ -113,13 +101,7 @@ ALIKE_RAD = math.pi / 4
 
 @dataclass(slots=True)
 class _Direction:
-    """Tries in a direction.
-
-    Attributes:
-        toward: the direction [rad].
-        tries: failed ones in a row.
-        until: end of the pause [s].
-    """
+    """Failed tries in a direction [rad], and the end of the pause [s]."""
 
     toward: float
     tries: int = 0
@@ -155,10 +137,8 @@ class Tries:
         """Note a failed try; ``for_good``: nothing but progress ends its pause."""
         if self._place is None:
             self._place = here
-        direction = self._like(toward)
-        if direction is None:
-            direction = _Direction(toward)
-            self._directions.append(direction)
+        if (direction := self._like(toward)) is None:
+            self._directions.append(direction := _Direction(toward))
         direction.tries += 1
         ends = for_good or direction.tries >= self._most
         # Exponents stay small: more doublings are longer than any pause.
@@ -177,9 +157,6 @@ class Tries:
 
     def _like(self, toward: float) -> _Direction | None:
         """Return the nearest similar direction with tries; None for none."""
-
-        def off(one: _Direction) -> float:
-            return abs(math.remainder(one.toward - toward, math.tau))
-
-        nearest = min(self._directions, key=off, default=None)
-        return nearest if nearest is not None and off(nearest) < ALIKE_RAD else None
+        off = {abs(math.remainder(one.toward - toward, math.tau)): one for one in self._directions}
+        nearest = min(off, default=math.inf)
+        return off[nearest] if nearest < ALIKE_RAD else None

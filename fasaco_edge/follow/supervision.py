@@ -8,12 +8,16 @@ from __future__ import annotations
 import enum
 import math
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Point, Pose2D, StampedPose
 from fasaco_edge.wire.messages.path_points import PathPoints
 from fasaco_edge.wire.messages.poses import Link
+
+_Result = TypeVar("_Result")
 
 # Links of poses from transforms may be older than poses [s].
 LINK_S = 2.0
@@ -51,6 +55,10 @@ class State(enum.Enum):
     CANCELED = "canceled by another program"
 
 
+Reason = tuple[State, str]
+"""Why a robot stands: its state, and figures of that in words."""
+
+
 @dataclass(frozen=True, slots=True)
 class Patience:
     """Timeouts of a follower's inputs.
@@ -67,37 +75,38 @@ class Patience:
     status_s: float = 2.5
 
 
-USUAL = Patience()
-
-
 class Supervision:
     """Decides whether path, pose and daemon let the robot drive; base class of followers.
-
-    Args:
-        patience: timeouts of pose and status.
 
     Attributes:
         state: of the robot.
         detail: figures of the state, in words.
         ahead: places of what the robot stands before [m], the nearest first; () for none.
+        newest_pose: the newest pose; None before there is one.
+        link: the oldest transform between map and robot, by arrival; None for none.
+        pose_fault: what is wrong with the newest pose; None for nothing.
+        has_path: whether there is a path to follow.
+        path_frame: name of the frame of the newest path.
+        held: why the docking server has the robot; "" lets it drive.
+        standby: why the robot is to be left alone, with figures; None for no reason.
     """
 
     def __init__(self, patience: Patience) -> None:
         self.ahead: tuple[Point, ...] = ()
         self.state, self.detail = State.NO_DAEMON, ""
+        self.held = ""
+        self.standby: Reason | None = None
+        self.newest_pose: Pose2D | None = None
+        self.link: Link | None = None
+        self.pose_fault: FasacoError | None = None
+        self.has_path, self.path_frame = False, ""
         self._patience = patience
-        self._held = ""
-        self._standby: tuple[State, str] | None = None
-        self._newest: Pose2D | None = None
-        self._frame, self._stamp_ns = "", 0
-        self._repeats = False
-        self._link: Link | None = None
-        self._pose_fault: FasacoError | None = None
-        self._path_frame, self._path_most_m_s = "", math.inf
-        self._path_state = State.NO_PATH
-        self._path_detail = ""
-        self._planner = ""
-        self._path_of = ""
+        self._pose_at = -math.inf
+        self._frame, self._stamp_ns, self._repeats = "", 0, False
+        self._path_most_m_s = math.inf
+        # Why there is no path.
+        self._no_path: Reason = State.NO_PATH, ""
+        self._planner = self._path_of = ""
         self._statuses, self._status_at = 0, -math.inf
 
     def take_pose(self, stamped: StampedPose, now: float) -> None:
@@ -105,18 +114,9 @@ class Supervision:
         self._repeats = stamped.stamp_ns != 0 and stamped.stamp_ns == self._stamp_ns
         if self._repeats and stamped.frame == self._frame:
             return
-        self._pose_fault = None
-        self._frame, self._stamp_ns = stamped.frame, stamped.stamp_ns
-        self._newest = stamped.pose
+        self._frame, self._stamp_ns, self.pose_fault = stamped.frame, stamped.stamp_ns, None
         self._moved_to(stamped.pose, now)
-
-    def heard_link(self, link: Link) -> None:
-        """Note the oldest transform between map and robot, by arrival."""
-        self._link = link
-
-    def refuse_pose(self, error: FasacoError) -> None:
-        """Stop for a malformed pose, until the next one."""
-        self._pose_fault = error
+        self.newest_pose, self._pose_at = stamped.pose, now
 
     def take_path(self, payload: bytes, most_m_s: float = math.inf) -> None:
         """Follow another path of the planner; an empty or malformed one stops the robot.
@@ -132,13 +132,13 @@ class Supervision:
         if not points.left:
             self._have_none(State.EMPTY_PATH)
             return
-        self._path_frame = points.frame
+        self.has_path, self.path_frame = True, points.frame
         self._have(points)
 
     def take_unnamed_path(self, payload: bytes) -> None:
         """Stop for a path of an unknown daemon: it may be the planner's, and is never driven."""
         self.take_path(payload)
-        if self._has_path:
+        if self.has_path:
             self._have_none(
                 State.BAD_PATH, "it does not name its daemon: is that an older release?"
             )
@@ -151,29 +151,6 @@ class Supervision:
         if planner and planner != self._path_of:
             self._have_none(State.NO_PATH)
             self._path_of = ""
-
-    def hold(self, why: str) -> None:
-        """Make the robot stand, for a reason; "" lets it drive."""
-        self._held = why
-
-    def stand_by(self, why: tuple[State, str] | None) -> None:
-        """Leave the robot alone, for a reason with figures; None ends that."""
-        self._standby = why
-
-    @property
-    def newest_pose(self) -> Pose2D | None:
-        """The newest pose; None before there is one."""
-        return self._newest
-
-    @property
-    def path_frame(self) -> str:
-        """Name of the frame of the path."""
-        return self._path_frame
-
-    @property
-    def has_path(self) -> bool:
-        """Whether there is a path to follow."""
-        return self._has_path
 
     def heard_status(self, now: float) -> None:
         """Note a heartbeat of the planner: a status, except the first one, which may be cached."""
@@ -193,60 +170,51 @@ class Supervision:
     def _withdraw(self) -> None:
         """Follow nothing."""
 
-    @property
-    @abstractmethod
-    def _has_path(self) -> bool:
-        """Whether there is a path to follow."""
-
-    @property
-    @abstractmethod
-    def _pose_at(self) -> float | None:
-        """Arrival of the newest accepted pose [s]; None before there is one."""
-
-    def _jump(self) -> str:
-        """Return the jump of the newest pose as text; "" if it is accepted."""
-        return ""
-
     def _have_none(self, state: State, detail: str = "") -> None:
         """Drop the path; withdraw it from the follower, too."""
+        self.has_path, self._no_path = False, (state, detail)
         self._withdraw()
-        self._path_state, self._path_detail = state, detail
 
-    def _trouble(self, now: float) -> tuple[State, str]:
-        """Return the state: why the robot must stand, with figures, or that it may drive."""
-        if self._standby is not None:
-            return self._standby
+    def _supervised(self, drive: Callable[[float], _Result], now: float) -> _Result | None:
+        """Let the robot drive, unless it must stand; return what that gives, else None."""
+        self.ahead = ()
+        self.state, self.detail = self._trouble(now) or (State.DRIVING, "")
+        if self.state is not State.DRIVING:
+            return None
+        try:
+            return drive(now)
+        except MalformedMessage as error:
+            # The rest of the path is malformed.
+            self._have_none(State.BAD_PATH, str(error))
+            self.state, self.detail = self._no_path
+            return None
+
+    def _trouble(self, now: float) -> Reason | None:
+        """Return why the robot must stand, with figures; None if it may drive."""
+        if self.standby is not None:
+            return self.standby
         if not self._planner:
             return State.NO_DAEMON, "no daemon plans for this robot"
         if (silent_s := now - self._status_at) > self._patience.status_s:
             sent_any = silent_s < math.inf
             return State.SILENT_DAEMON, f"for {silent_s:.1f} s" if sent_any else "no status yet"
-        if not self._has_path:
-            return self._path_state, self._path_detail
-        if self._held:
-            return State.DOCK, self._held
-        return self._trouble_of_poses(now) or (State.DRIVING, "")
+        if not self.has_path:
+            return self._no_path
+        if self.held:
+            return State.DOCK, self.held
+        return self._trouble_of_poses(now)
 
-    def _trouble_of_poses(self, now: float) -> tuple[State, str] | None:
-        if self._pose_fault is not None:
-            return State.BAD_POSE, str(self._pose_fault)
-        pose_at = self._pose_at
-        if pose_at is None:
+    def _trouble_of_poses(self, now: float) -> Reason | None:
+        if self.pose_fault is not None:
+            return State.BAD_POSE, str(self.pose_fault)
+        if self.newest_pose is None:
             return State.NO_POSE, "none has come"
-        if jump := self._jump():
-            return State.POSE_JUMPED, jump
-        if age := self._age(pose_at, now):
-            return State.OLD_POSE, age
-        if self._frame != self._path_frame:
-            return State.WRONG_FRAME, f"pose in {self._frame!r}, path in {self._path_frame!r}"
-        return None
-
-    def _age(self, pose_at: float, now: float) -> str:
-        """Return the age of pose or link as text if too old; else ""."""
-        if (age_s := now - pose_at) > self._patience.pose_s:
+        if (age_s := now - self._pose_at) > self._patience.pose_s:
             why = ", and is repeated with the same stamp" if self._repeats else ""
-            return f"{age_s:.2f} s{why}"
-        if self._link and (age_s := now - self._link.came_at) > self._patience.link_s:
-            transform = self._link.transform
-            return f"{age_s:.2f} s: transform of {transform.child!r} in {transform.frame!r}"
-        return ""
+            return State.OLD_POSE, f"{age_s:.2f} s{why}"
+        if self.link and (age_s := now - self.link.came_at) > self._patience.link_s:
+            link = self.link.transform
+            return State.OLD_POSE, f"{age_s:.2f} s: transform of {link.child!r} in {link.frame!r}"
+        if self._frame != self.path_frame:
+            return State.WRONG_FRAME, f"pose in {self._frame!r}, path in {self.path_frame!r}"
+        return None

@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
-from fasaco_edge.simulation.robot import Point, SimulationConfig
+from fasaco_edge.simulation.robot import SimulationConfig
 
 # Spacing of the checks whether the hull has room along a straight line [m]: between two checks a
 # corner may reach less than a millimetre into the hull.
@@ -25,20 +25,18 @@ def rays_for(reach_px: float) -> int:
     holds a disc of diameter 1, which is 2 asin(1 / 2d) >= 1 / reach wide in angle, so
     at least one ray crosses it.
     """
-    return max(math.ceil(2.0 * math.pi * reach_px), 4)
+    return max(math.ceil(math.tau * reach_px), 4)
 
 
 class Mapper:
     """A scanner in a ground-truth map, and the robot's own map beside it.
 
-    Localisation is perfect: both maps share the frame and the pixel raster. The
-    robot's own map is published as SLAM would: only as large as what is known, so
-    its origin and its size change while the robot explores.
-
-    Attributes:
-        loops: how many loops were closed: none.
+    Localisation is perfect: both maps share the frame and the pixel raster. The robot's own map is
+    published as SLAM would: only as large as what is known, so its origin and its size change while
+    the robot explores.
     """
 
+    # How many loops were closed.
     loops = 0
 
     def __init__(self, truth: OccupancyGrid, config: SimulationConfig) -> None:
@@ -53,7 +51,7 @@ class Mapper:
         self._free_at_most = config.free_at_most
         self._chunk_px = max(1, round(config.map_chunk_m / resolution))
         rays = rays_for(self._reach_px)
-        self._angles = np.arange(rays) * (2.0 * math.pi / rays)
+        self._angles = np.arange(rays) * (math.tau / rays)
 
     def believed(self, pose: Pose2D) -> Pose2D:
         """Return the estimated pose of a robot at ``pose``: the same, without any error."""
@@ -64,11 +62,8 @@ class Mapper:
         return x, y
 
     def scan(self, pose: Pose2D) -> Window | None:
-        """Add a scan from ``pose``, and the ground under the robot, to the map.
-
-        Returns:
-            the window of the own map's pixels that changed, or None.
-        """
+        """Add a scan, and the ground under the robot, to the map; return the window of the pixels
+        that may have changed, or None."""
         geometry = self._truth.geometry
         x, y = geometry.to_pixels(pose.x, pose.y)
         # The scanner turns with the robot, so that turning on the spot sees a little more.

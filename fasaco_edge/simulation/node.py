@@ -6,8 +6,7 @@ import logging
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.joining import join
@@ -15,9 +14,8 @@ from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
-from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.host.processes import stop_event
-from fasaco_edge.simulation.world import Activity, Emission, World
+from fasaco_edge.simulation.world import Emission, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.battery import BatteryState, Power, encode_battery
@@ -34,6 +32,8 @@ Driver = Literal["ideal", "follow"]
 CYCLE_S = 0.02
 # Waits are no shorter than this, or a fast simulation would do nothing but wake up [s].
 WAIT_S = 0.004
+# A simulation is behind by so much at most [s].
+DEBT_S = 0.1
 # A robot that is silent for this long is no obstacle any more, in real time [s].
 CARRIED_AWAY_S = 10.0
 REPORT_EVERY_S = 0.5
@@ -45,20 +45,17 @@ ANSWER_S, PATIENCE_S = 0.1, 0.5
 class Pace:
     """Schedules ticks, so that ``speed`` simulated seconds pass in a second.
 
-    A machine that cannot keep up falls behind by ``patience_s`` at most; a larger debt is
-    dropped, so that the simulation slows down instead of racing later.
+    A machine that cannot keep up falls behind by ``DEBT_S`` at most; a larger debt is dropped, so
+    that the simulation slows down instead of racing later.
 
     Args:
         speed: simulated seconds per second, above 0.
         tick_s: simulated length of a tick [s].
         now_s: reading of a monotonic clock [s]; the first tick is due then.
-        patience_s: longest debt kept [s].
     """
 
-    def __init__(self, speed: float, tick_s: float, now_s: float, patience_s: float = 0.1) -> None:
-        self._interval_s = tick_s / speed
-        self._due_s = now_s
-        self._patience_s = patience_s
+    def __init__(self, speed: float, tick_s: float, now_s: float) -> None:
+        self._interval_s, self._due_s = tick_s / speed, now_s
 
     def behind_s(self, now_s: float) -> float:
         """Return how long the next tick has been due [s]; below 0 the time until it is due."""
@@ -66,35 +63,17 @@ class Pace:
 
     def ticked(self, now_s: float) -> None:
         """Note that a tick was run."""
-        self._due_s = max(self._due_s + self._interval_s, now_s - self._patience_s)
+        self._due_s = max(self._due_s + self._interval_s, now_s - DEBT_S)
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Progress of a simulation.
+class Progress(NamedTuple):
+    """Progress of a simulation, beside that of its world.
 
     Attributes:
-        sim_s: simulated time [s].
-        pose: the robot's pose.
-        activity: what it is doing.
-        distance_m: distance driven [m].
-        collisions: number of times a path led into an obstacle.
-        stops: number of stops before an obstacle on its map.
-        touches, meetings: how often it touched another robot, and stopped before one.
-        longest_stand_s: the longest time that it stood between two moves [s].
         refused: paths or velocities that were malformed, or in another frame.
         speed: simulated seconds per second, since the last report.
     """
 
-    sim_s: float
-    pose: Pose2D
-    activity: Activity
-    distance_m: float
-    collisions: int
-    stops: int
-    touches: int
-    meetings: int
-    longest_stand_s: float
     refused: int
     speed: float
 
@@ -113,15 +92,13 @@ def run_simulation(
 ) -> Progress | None:
     """Run the robot of ``world`` on the bus until it has to stop.
 
-    It publishes its map (latched) and its pose with simulated time as the stamp, and
-    drives along the newest path, or by velocities. In the main thread, SIGINT and SIGTERM end it
-    too. Its last map and pose are published before it returns its last progress; None if it was
-    stopped before it had joined the bus.
+    It publishes its map (latched) and its pose with simulated time as the stamp, and drives along
+    the newest path, or by velocities. In the main thread, SIGINT and SIGTERM end it too. Its last
+    map and pose are published before it returns its last progress; None if it was stopped before it
+    had joined the bus.
 
     Args:
-        world: the building and the robot.
-        keys: the robot's keys.
-        settings: how to join the bus.
+        world, keys, settings: the building and the robot, its keys, and how to join the bus.
         speed: simulated seconds per second, above 0; a machine that cannot keep up
             runs slower.
         driver: ideal: it follows paths itself; follow: velocities drive it.
@@ -157,8 +134,7 @@ class RobotOnBus:
 
     def __init__(self, world: World, keys: Keys, bus: Bus, driver: Driver = "ideal") -> None:
         self._world = world
-        self._reported_s = time.monotonic()
-        self._reported_sim_s = world.stamp_ns * 1e-9
+        self._reported = time.monotonic(), world.stamp_ns * 1e-9
         self._refused = 0
         self._map = bus.advertise(keys, topics.MAP)
         self._pose = bus.advertise(keys, topics.POSE)
@@ -192,7 +168,7 @@ class RobotOnBus:
                     break
                 self.publish(world.tick())
                 pace.ticked(now_s)
-            if now_s - self._reported_s >= REPORT_EVERY_S:
+            if now_s - self._reported[0] >= REPORT_EVERY_S:
                 self._part(now_s)
                 report(self.progress(now_s))
 
@@ -259,20 +235,6 @@ class RobotOnBus:
 
     def progress(self, now_s: float) -> Progress:
         """Return the progress, with the speed achieved since the last call."""
-        world = self._world
-        sim_s, elapsed_s = world.stamp_ns * 1e-9, max(now_s - self._reported_s, 1e-9)
-        speed = (sim_s - self._reported_sim_s) / elapsed_s
-        self._reported_s, self._reported_sim_s = now_s, sim_s
-        return Progress(
-            sim_s,
-            world.pose,
-            world.activity,
-            world.distance_m,
-            world.collisions,
-            world.stops,
-            world.touches,
-            world.meetings,
-            world.longest_stand_s,
-            self._refused,
-            speed,
-        )
+        (before_s, before_sim_s), sim_s = self._reported, self._world.stamp_ns * 1e-9
+        self._reported = now_s, sim_s
+        return Progress(self._refused, (sim_s - before_sim_s) / max(now_s - before_s, 1e-9))

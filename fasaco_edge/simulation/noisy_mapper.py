@@ -8,19 +8,19 @@ The poses of scans are not matched: they are the true ones with an error.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.grid.rotation import composed, inverse
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.kernels.lattice.raycast import Scanner, count_rays, ranges_of
 from fasaco_edge.simulation.mapper import Mapper
-from fasaco_edge.simulation.noise import MapperNoise, PoseError
 from fasaco_edge.simulation.robot import SimulationConfig
 
 # Rays of a scan, as of an LDS-01.
@@ -41,6 +41,57 @@ LOOP_EVERY, LOOP_AGE, LOOP_NEAR_M = 3, 40, 1.5
 LOOP_LEAST_M, LOOP_LEAST_RAD = 0.03, 0.01
 
 
+SHARES = ("specks", "leg_misses", "jumps")
+
+
+@dataclass(frozen=True, slots=True)
+class MapperNoise:
+    """How far a mapper's maps and poses are from the truth.
+
+    The defaults are about those of a scan matcher with a lidar of 12 mm, on pixels of 5 cm.
+
+    Attributes:
+        seed: of all noise.
+        range_m: standard deviation of the scanner's ranges [m].
+        specks: share of its rays that end in free space, before a wall.
+        leg_misses: share of its rays that miss thin legs, of a few pixels.
+        shift_m: largest offset of the map's pixels from the building's, along each axis.
+        match_m, match_rad: standard deviation of the pose at which a scan is added, along each
+            axis.
+        drift_m, drift_rad: standard deviation of the drift of the pose, and of newly mapped parts,
+            after a metre's way; after n metres it is sqrt(n) times as large.
+        closes_loops: whether the drift is corrected, in the map too, when the robot returns to a
+            place mapped long ago.
+        jumps: share of scans that are added at a wrong pose; the pose of the next scan is right
+            again.
+        jump_m: error of such a pose [m].
+        late_s: age of a pose when it is published [s].
+    """
+
+    seed: int = 0
+    range_m: float = 0.012
+    specks: float = 0.0005
+    leg_misses: float = 0.5
+    shift_m: float = 0.05
+    match_m: float = 0.006
+    match_rad: float = 0.002
+    drift_m: float = 0.005
+    drift_rad: float = 0.0015
+    closes_loops: bool = True
+    jumps: float = 0.0
+    jump_m: float = 0.1
+    late_s: float = 0.05
+
+    def times(self, level: float) -> Self:
+        """Return the noise with all amounts multiplied by a factor, 0 for none; shares up to 1."""
+        amounts = {
+            field.name: level * getattr(self, field.name)
+            for field in fields(self)
+            if field.name not in ("seed", "closes_loops")
+        }
+        return replace(self, **{n: min(a, 1.0) if n in SHARES else a for n, a in amounts.items()})
+
+
 @dataclass(slots=True)
 class _Scan:
     """An added scan: its true pose, its pose on the map, and the lengths of its rays [pixels]."""
@@ -58,7 +109,10 @@ class NoisyMapper(Mapper):
         self.loops = 0
         of_rays, of_poses, of_raster = map(PCG64, SeedSequence(noise.seed).spawn(3))
         self._noise, self._rng = noise, Generator(of_rays)
-        self._error = PoseError(noise, Generator(of_poses))
+        # The error of the pose: that of the map's frame, which drifts with the way; and that of the
+        # newest scan alone.
+        self._frame = self._match = Pose2D(0.0, 0.0)
+        self._poses_rng = Generator(of_poses)
         self._geometry = _beside(truth.geometry, noise.shift_m * Generator(of_raster).random(2))
         shape = self._geometry.rows, self._geometry.cols
         self._known = np.full(shape, UNKNOWN, np.int8)
@@ -69,24 +123,23 @@ class NoisyMapper(Mapper):
 
     def believed(self, pose: Pose2D) -> Pose2D:
         """Return the estimated pose of a robot at ``pose``."""
-        return self._error.believed(pose)
+        drifted, match = composed(self._frame, pose), self._match
+        yaw = math.remainder(drifted.yaw + match.yaw, math.tau)
+        return Pose2D(drifted.x + match.x, drifted.y + match.y, yaw)
 
-    def true_place(self, x: float, y: float) -> tuple[float, float]:
+    def true_place(self, x: float, y: float) -> Point:
         """Return the true position of a place on its map [m]."""
-        return self._error.true_place(x, y)
+        pose = composed(inverse(self._frame), Pose2D(x - self._match.x, y - self._match.y))
+        return pose.x, pose.y
 
     def scan(self, pose: Pose2D) -> Window | None:
-        """Add a scan from ``pose``, if that is far enough from the scan before.
-
-        Returns:
-            the window of the own map's pixels that the scan may have changed, or None.
-        """
+        """Add a scan as ``Mapper`` does, if it is far enough from the one before."""
         at, self._at = self._at or pose, pose
         if way_m := math.hypot(pose.x - at.x, pose.y - at.y):
-            self._error.drift(pose, way_m)
+            self._drift(pose, way_m)
         if self._scans and not _is_away(pose, self._scans[-1].pose):
             return None
-        self._error.match()
+        self._match = self._drawn_match()
         scan = _Scan(pose, self.believed(pose), self._ways(pose))
         self._scans.append(scan)
         changed = self._count(scan, 1)
@@ -96,6 +149,26 @@ class NoisyMapper(Mapper):
             self._draw(changed)
             self._extent = Window.around(self._extent, changed)
         return changed
+
+    def _drift(self, pose: Pose2D, way_m: float) -> None:
+        """Let the frame drift while the robot drives on to ``pose``; it turns about the robot."""
+        x, y, yaw = (math.sqrt(way_m) * self._poses_rng.standard_normal(3)).tolist()
+        noise, at = self._noise, composed(self._frame, pose)
+        moved = Pose2D(
+            at.x + noise.drift_m * x, at.y + noise.drift_m * y, at.yaw + noise.drift_rad * yaw
+        )
+        self._frame = composed(moved, inverse(pose))
+
+    def _drawn_match(self) -> Pose2D:
+        """Return the error of another scan's pose."""
+        noise, (x, y, yaw) = self._noise, self._poses_rng.standard_normal(3).tolist()
+        chance, toward = (self._poses_rng.random(2) * (1.0, math.tau)).tolist()
+        jump_m = noise.jump_m if chance < noise.jumps else 0.0
+        return Pose2D(
+            noise.match_m * x + jump_m * math.cos(toward),
+            noise.match_m * y + jump_m * math.sin(toward),
+            noise.match_rad * yaw,
+        )
 
     def _ways(self, pose: Pose2D) -> NDArray[np.float64]:
         """Return the lengths of a scan's rays, float64 (RAYS,) [pixels]; below 0: no return."""
@@ -149,7 +222,7 @@ class NoisyMapper(Mapper):
             taken_out = self._count(scan, -1)
             scan.there = Pose2D(was.x + share * dx, was.y + share * dy, was.yaw + share * turn)
             changed = Window.around(changed, taken_out, self._count(scan, 1))
-        self._error.place(newest.pose, better)
+        self._frame = composed(better, inverse(newest.pose))
         return changed
 
 

@@ -3,13 +3,10 @@
 It drives straight and turns on the spot. The drive is ideal (no slip, no delay), so that a run
 shows effects of the path alone. It comes to rest at every corner: that is the cost of turns.
 
-A path begins at the centre of the cell the robot was in when it was planned.
-Since then the robot has moved on: through the first waypoints, if the new path
-begins like the old one, or off to a side. Only waypoints that it has driven
-through may be skipped. The robot's position alone does not determine them: a
-path into a dead end and back passes the same point twice.
-
-Its battery has given times of charging and of driving.
+A path begins at the centre of the cell the robot was in when it was planned. Since then the robot
+has moved on: through the first waypoints, if the new path begins like the old one, or off to a
+side. Only waypoints that it has driven through may be skipped. The robot's position alone does not
+determine them: a path into a dead end and back passes the same point twice.
 """
 
 from __future__ import annotations
@@ -22,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.motion import limited, stopping_rate
 
-Point = tuple[float, float]
+MAY_BE_ZERO = ("padding_m", "free_at_most", "turn_radius_m", "battery_min")
 
 # Closer than this the robot is at a corner [m].
 ARRIVED_M = 1e-3
@@ -90,13 +87,7 @@ class SimulationConfig:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            may_be_zero = field.name in (
-                "padding_m",
-                "free_at_most",
-                "turn_radius_m",
-                "battery_min",
-            )
+            value, may_be_zero = getattr(self, field.name), field.name in MAY_BE_ZERO
             if not math.isfinite(value) or value < 0 or (value == 0 and not may_be_zero):
                 least = "at least 0" if may_be_zero else "above 0"
                 raise BadConfiguration(f"{field.name} must be {least}, got {value}")
@@ -152,7 +143,7 @@ def driven(state: DriveState, goal: Point | None, config: SimulationConfig) -> D
     speed_goal = turn_goal = 0.0
     if goal is not None:
         ahead_x, ahead_y = goal[0] - pose.x, goal[1] - pose.y
-        error = wrapped(math.atan2(ahead_y, ahead_x) - pose.yaw)
+        error = math.remainder(math.atan2(ahead_y, ahead_x) - pose.yaw, math.tau)
         if abs(error) <= (MISALIGNED_RAD if state.speed > 0.0 else ALIGNED_RAD):
             distance = math.hypot(ahead_x, ahead_y)
             speed_goal = stopping_rate(distance, config.acceleration_m_s2, dt)
@@ -161,7 +152,7 @@ def driven(state: DriveState, goal: Point | None, config: SimulationConfig) -> D
             turn_goal = math.copysign(min(rate, config.turn_rad_s), error)
     speed = limited(state.speed, min(speed_goal, config.speed_m_s), config.acceleration_m_s2 * dt)
     turn_rate = limited(state.turn_rate, turn_goal, config.turn_acceleration_rad_s2 * dt)
-    yaw = wrapped(pose.yaw + turn_rate * dt)
+    yaw = math.remainder(pose.yaw + turn_rate * dt, math.tau)
     moved = Pose2D(pose.x + speed * dt * math.cos(yaw), pose.y + speed * dt * math.sin(yaw), yaw)
     return DriveState(moved, speed, turn_rate)
 
@@ -182,7 +173,7 @@ def moved_by(
     pose = state.pose
     heading = pose.yaw + 0.5 * turn_rate * dt
     way = speed * dt
-    yaw = wrapped(pose.yaw + turn_rate * dt)
+    yaw = math.remainder(pose.yaw + turn_rate * dt, math.tau)
     moved = Pose2D(pose.x + way * math.cos(heading), pose.y + way * math.sin(heading), yaw)
     return DriveState(moved, speed, turn_rate)
 
@@ -197,11 +188,6 @@ def stopping_point(state: DriveState, config: SimulationConfig) -> Point:
     return pose.x + reach * math.cos(pose.yaw), pose.y + reach * math.sin(pose.yaw)
 
 
-def wrapped(angle: float) -> float:
-    """Return ``angle`` [rad] in [-pi, pi]."""
-    return math.remainder(angle, 2.0 * math.pi)
-
-
 def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a polyline's first point, its corners and its last point.
 
@@ -209,7 +195,7 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
         xy: points [m], float64 (n, 2); repeated ones count once.
 
     Returns:
-        float64 (m, 2), m <= n: the same line, without the points it runs straight through.
+        float64 (m, 2), m <= n.
     """
     if len(xy) == 0:
         return xy
@@ -274,14 +260,10 @@ def joined(
 
 
 def passed_waypoints(path: NDArray[np.float64], track: NDArray[np.float64]) -> int:
-    """Return how many of the first waypoints the robot drove through, in order.
+    """Return how many of the first waypoints the robot drove through, in order; as ``joined``.
 
-    Counted from its latest visit to the first one: visits before that belong to
-    paths before this one.
-
-    Args:
-        path: waypoints [m], float64 (n, 2).
-        track: points [m], float64 (m, 2), the latest last.
+    Counted from its latest visit to the first one: visits before that belong to paths before this
+    one.
     """
     since = 0
     for index, waypoint in enumerate(path):

@@ -9,24 +9,22 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import StartBlocked, StartOutsideMap
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.geometry import Point, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.mapper import Mapper
-from fasaco_edge.simulation.noise import MapperNoise
-from fasaco_edge.simulation.noisy_mapper import NoisyMapper
+from fasaco_edge.simulation.noisy_mapper import MapperNoise, NoisyMapper
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     Battery,
     DriveState,
-    Point,
     SimulationConfig,
     driven,
     joined,
@@ -100,8 +98,9 @@ class World:
         config: SimulationConfig,
         noise: MapperNoise | None = None,
     ) -> None:
-        self._truth = truth
-        self.config = config
+        self._truth, self.config = truth, config
+        # Name of the frame of everything the robot publishes.
+        self.frame = truth.frame
         col, row = truth.geometry.to_pixels(start.x, start.y)
         if not (0 <= row < truth.geometry.rows and 0 <= col < truth.geometry.cols):
             raise StartOutsideMap(f"start ({start.x:g}, {start.y:g}) m is not on the map")
@@ -110,13 +109,11 @@ class World:
                 f"a robot of radius {config.robot_radius_m:g} m does not fit at the start "
                 f"({start.x:g}, {start.y:g}) m"
             )
-        self._drive = DriveState(start)
-        noise = noise or MapperNoise.none()
-        is_ideal = not noise.is_in_map
-        self._mapper = Mapper(truth, config) if is_ideal else NoisyMapper(truth, config, noise)
-        # Poses that are not yet published, and for how many ticks each is delayed.
+        self.drive = DriveState(start)
+        self.mapper = NoisyMapper(truth, config, noise) if noise else Mapper(truth, config)
+        # Poses that are not yet published, and by how much each is delayed.
         self._poses: deque[StampedPose] = deque()
-        self._late_ticks = round(noise.late_s / config.tick_s)
+        self._late_ns = round(noise.late_s / config.tick_s) * config.tick_ns if noise else 0
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
         # The newest velocity, if one drives it: speed [m/s], turn rate [rad/s], and its tick.
@@ -129,45 +126,24 @@ class World:
         self.distance_m = 0.0
         self.collisions = 0
         self.stops = 0
-        # The other robots in the building, by name, and how often it touched one, or stopped
-        # before one.
+        # Other robots in the building, by name; how often it touched one, or stopped before one.
         self.others: dict[str, Point] = {}
         self.touches = self.meetings = 0
         self._is_held = False
         # Number of the robot's stops when its path came.
         self._stopped_at = 0
-        # For how many ticks the robot has stood, once it has moved; and the longest such time.
-        self._stands = self._longest_stand = 0
+        # For how many ticks the robot stands, once it has moved; and the longest such time [s].
+        self._stands, self.longest_stand_s = 0, 0.0
 
     @property
     def pose(self) -> Pose2D:
         """The robot's true pose."""
-        return self._drive.pose
+        return self.drive.pose
 
     @property
     def believed(self) -> Pose2D:
         """Its mapper's estimate of the pose; without noise the true one."""
-        return self._mapper.believed(self._drive.pose)
-
-    @property
-    def velocity(self) -> tuple[float, float]:
-        """Its speed [m/s] and rate of turning [rad/s]."""
-        return self._drive.speed, self._drive.turn_rate
-
-    @property
-    def loops(self) -> int:
-        """How many loops its mapper has closed."""
-        return self._mapper.loops
-
-    @property
-    def longest_stand_s(self) -> float:
-        """The longest time that the robot stood between two moves [s]."""
-        return self._longest_stand * self.config.tick_s
-
-    @property
-    def frame(self) -> str:
-        """Name of the frame of everything the robot publishes."""
-        return self._truth.frame
+        return self.mapper.believed(self.drive.pose)
 
     @property
     def stamp_ns(self) -> int:
@@ -177,18 +153,13 @@ class World:
     @property
     def track(self) -> NDArray[np.float64]:
         """Where the robot has been: points (x, y) [m], float64 (n, 2), the start first."""
-        pose = self._drive.pose
+        pose = self.drive.pose
         return np.array([*self._track, (pose.x, pose.y)], np.float64)
 
-    def emission(
-        self, *, with_map: bool = True, with_pose: bool = True, with_battery: bool = True
-    ) -> Emission:
+    def emission(self) -> Emission:
         """Return map and pose as they are now; there is no map before the first tick."""
-        return Emission(
-            self._mapper.snapshot(self.stamp_ns) if with_map else None,
-            StampedPose(self.believed, self.frame, self.stamp_ns) if with_pose else None,
-            self.battery if with_battery else None,
-        )
+        pose = StampedPose(self.believed, self.frame, self.stamp_ns)
+        return Emission(self.mapper.snapshot(self.stamp_ns), pose, self.battery)
 
     def follow(self, path: NDArray[np.float64]) -> None:
         """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); an empty one halts.
@@ -207,7 +178,7 @@ class World:
     @property
     def unanswered_s(self) -> float:
         """Time since the newest velocity while the robot moves, or is commanded to [s]."""
-        if self._told is None or not (self._drive.moving or any(self._told[:2])):
+        if self._told is None or not (self.drive.moving or any(self._told[:2])):
             return 0.0
         return (self._ticks - self._told[2]) * self.config.tick_s
 
@@ -217,31 +188,29 @@ class World:
         self._ticks += 1
         self._count_stand()
         self._drain()
-        config, since_first = self.config, self._ticks - 1
-        if since_first % config.period_ticks(config.scan_hz) == 0:
-            self._mapper.scan(self.pose)
+        if self._is_due(self.config.scan_hz):
+            self.mapper.scan(self.pose)
             if self.activity is Activity.NO_WAY or self._may_try_again():
                 self._join()
-        map_is_due = since_first % config.period_ticks(config.map_hz) == 0
-        pose_is_due = since_first % config.period_ticks(config.pose_hz) == 0
-        battery_is_due = since_first % config.period_ticks(BATTERY_HZ) == 0
-        now = self.emission(with_map=map_is_due, with_pose=pose_is_due, with_battery=battery_is_due)
-        return replace(now, pose=self._ripe(now.pose)) if self._late_ticks else now
+        if self._is_due(self.config.pose_hz):
+            self._poses.append(StampedPose(self.believed, self.frame, self.stamp_ns))
+        is_ripe = self._poses and self._poses[0].stamp_ns <= self.stamp_ns - self._late_ns
+        return Emission(
+            self.mapper.snapshot(self.stamp_ns) if self._is_due(self.config.map_hz) else None,
+            self._poses.popleft() if is_ripe else None,
+            self.battery if self._is_due(BATTERY_HZ) else None,
+        )
 
-    def _ripe(self, pose: StampedPose | None) -> StampedPose | None:
-        """Store a pose; return the delayed one to publish now, if any."""
-        if pose is not None:
-            self._poses.append(pose)
-        oldest_ns = self.stamp_ns - self._late_ticks * self.config.tick_ns
-        is_ripe = bool(self._poses) and self._poses[0].stamp_ns <= oldest_ns
-        return self._poses.popleft() if is_ripe else None
+    def _is_due(self, rate_hz: float) -> bool:
+        """Return whether this tick is one at a rate, from the first tick on."""
+        return (self._ticks - 1) % self.config.period_ticks(rate_hz) == 0
 
     def _drain(self) -> None:
-        battery, drive = self.battery, self._drive
+        battery, drive = self.battery, self.drive
         if battery is None:
             return
         if battery.level == 0.0:  # with an empty battery the robot stands
-            self._drive = DriveState(drive.pose)
+            self.drive = DriveState(drive.pose)
             self._path, self._corners, self.activity = None, [], Activity.IDLE
         away_m = math.dist(self._dock, (drive.pose.x, drive.pose.y))
         battery.tick(self.config.tick_s, moves=drive.moving, is_docked=away_m <= DOCK_M)
@@ -249,28 +218,26 @@ class World:
     def _join(self) -> None:
         if self._path is None:
             return
-        track, is_clear = self._recent_track(), self._mapper.is_clear
+        track, is_clear = self._recent_track(), self.mapper.is_clear
         # Going straight on, even within the margin, has priority over going back.
         for goes_back, margin_m in ((False, MARGIN_M), (False, 0.0), (True, MARGIN_M), (True, 0.0)):
             has_room = partial(is_clear, margin_m=margin_m)
             route = joined(self._path, track, has_room, goes_back=goes_back)
             if route is not None:
-                break
-        if route is None:
-            self._corners, self.activity = [], Activity.NO_WAY
-            return
-        self._corners = [(float(x), float(y)) for x, y in route[::-1]]
-        self.activity = Activity.DRIVING if self._corners else Activity.IDLE
+                self._corners = [(float(x), float(y)) for x, y in route[::-1]]
+                self.activity = Activity.DRIVING if self._corners else Activity.IDLE
+                return
+        self._corners, self.activity = [], Activity.NO_WAY
 
     def _may_try_again(self) -> bool:
         """Return whether the robot, stopped for the first time on its path, has come to rest."""
         is_first = self.stops == self._stopped_at + 1
-        return self.activity is Activity.STOPPED and is_first and not self._drive.moving
+        return self.activity is Activity.STOPPED and is_first and not self.drive.moving
 
     def _recent_track(self) -> NDArray[np.float64]:
         """Return the track's last metres, to where the robot can come to rest, on its map."""
         here = (self.pose.x, self.pose.y)
-        rest = stopping_point(self._drive, self.config)
+        rest = stopping_point(self.drive, self.config)
         points = 2 + int(math.dist(here, rest) / TRACK_SPACING_M)
         ahead = np.linspace(here, rest, points).tolist()
         track = [*self._track[-RECENT_TRACK_POINTS:], *ahead]
@@ -278,7 +245,7 @@ class World:
 
     def _on_map(self, place: Point) -> Point:
         """Return the position of a place on the robot's map."""
-        pose = self._mapper.believed(Pose2D(*place))
+        pose = self.mapper.believed(Pose2D(*place))
         return pose.x, pose.y
 
     def _move(self) -> None:
@@ -291,15 +258,15 @@ class World:
         if not self._corners:
             if self.activity in (Activity.DRIVING, Activity.STOPPED):
                 self.activity = Activity.IDLE
-            if not self._drive.moving:
+            if not self.drive.moving:
                 return
         goal = self._goal() if self._corners and self._looks_ahead() else None
-        if goal is not None or self._drive.moving:
-            self._go_on(driven(self._drive, goal, self.config))
+        if goal is not None or self.drive.moving:
+            self._go_on(driven(self.drive, goal, self.config))
 
     def _goal(self) -> Point:
         """Return the true position of the next corner."""
-        return self._mapper.true_place(*self._corners[-1])
+        return self.mapper.true_place(*self._corners[-1])
 
     def _looks_ahead(self) -> bool:
         """Return whether the robot may drive on: it stops before obstacles on its own map.
@@ -308,13 +275,13 @@ class World:
         """
         if self.activity is Activity.STOPPED:
             return False
-        ahead = driven(self._drive, self._goal(), self.config)
-        was_held, self._is_held = self._is_held, self._meets(stopping_point(ahead, self.config))
+        ahead = driven(self.drive, self._goal(), self.config)
+        rest = stopping_point(ahead, self.config)
+        was_held, self._is_held = self._is_held, self._meets(rest)
         if self._is_held:
             self.meetings += not was_held
             return False
-        stop = self._on_map(stopping_point(ahead, self.config))
-        if ahead.speed == 0.0 or self._mapper.is_clear_at(stop):
+        if ahead.speed == 0.0 or self.mapper.is_clear_at(self._on_map(rest)):
             return True
         self.activity = Activity.STOPPED
         self.stops += 1
@@ -323,26 +290,23 @@ class World:
     def _move_as_told(self, speed_m_s: float, turn_rad_s: float, tick: int) -> None:
         if (self._ticks - tick) * self.config.tick_s > DEAF_S:
             speed_m_s = turn_rad_s = 0.0
-        ahead = moved_by(self._drive, speed_m_s, turn_rad_s, self.config)
+        ahead = moved_by(self.drive, speed_m_s, turn_rad_s, self.config)
         was_touching = self.activity is Activity.COLLIDED
         self.activity = Activity.DRIVING if ahead.moving else Activity.IDLE
-        if ahead.moving and not _fits(self._truth, ahead.pose, self.config):
-            slid = self._slid(ahead)
-            if slid is not None:
-                self.collisions += not was_touching
-                self._go_on(slid)
-                self.activity = Activity.COLLIDED
-                return
-        if ahead.moving or self._drive.moving:
+        hits = ahead.moving and not _fits(self._truth, ahead.pose, self.config)
+        if hits and (slid := self._slid(ahead)) is not None:
+            self.collisions += not was_touching
+            self._go_on(slid)
+            self.activity = Activity.COLLIDED
+        elif ahead.moving or self.drive.moving:
             self._go_on(ahead)
 
     def _slid(self, ahead: DriveState) -> DriveState | None:
         """Return the state of a base that slides along a wall; None if it cannot."""
         here, pose = self.pose, ahead.pose
         way = math.dist((here.x, here.y), (pose.x, pose.y))
-        for deg in SLIDES_DEG:
-            along = pose.yaw + math.radians(deg)
-            share = math.cos(math.radians(deg))
+        for off in map(math.radians, SLIDES_DEG):
+            along, share = pose.yaw + off, math.cos(off)
             x, y = here.x + share * way * math.cos(along), here.y + share * way * math.sin(along)
             slid = Pose2D(x, y, pose.yaw)
             if _fits(self._truth, slid, self.config):
@@ -358,40 +322,32 @@ class World:
         )
 
     def _go_on(self, ahead: DriveState) -> None:
-        """Take over a state that may be in a wall, or in another robot."""
+        """Take over a state that may be in a wall, or in another robot: there it stands."""
         if self._meets((ahead.pose.x, ahead.pose.y), 0.0):
-            self.touches += self._drive.moving
-            self._drive = DriveState(self.pose)
-            return
-        if not _fits(self._truth, ahead.pose, self.config):
-            self._collide()
-            return
-        self._extend_track(ahead)
-        self.distance_m += abs(ahead.speed) * self.config.tick_s
-        self._drive = ahead
-
-    def _collide(self) -> None:
-        # A robot that is commanded to push on stands at the wall; this counts as one collision.
-        self.collisions += self._told is None or self._drive.moving
-        self._drive = DriveState(self.pose)
-        self._path, self._corners = None, []
-        self.activity = Activity.COLLIDED
+            self.touches += self.drive.moving
+            self.drive = DriveState(self.pose)
+        elif not _fits(self._truth, ahead.pose, self.config):
+            # A robot that is commanded to push on stands at the wall; this counts as one collision.
+            self.collisions += self._told is None or self.drive.moving
+            self.drive = DriveState(self.pose)
+            self._path, self._corners, self.activity = None, [], Activity.COLLIDED
+        else:
+            # The track gets the point the robot is about to leave, at times and at corners.
+            here = (self.pose.x, self.pose.y)
+            gone = math.dist(self._track[-1], here)
+            turns_off = ahead.speed != 0.0 and self.drive.speed == 0.0
+            if gone >= TRACK_SPACING_M or (gone > 0.0 and turns_off):
+                self._track.append(here)
+            self.distance_m += abs(ahead.speed) * self.config.tick_s
+            self.drive = ahead
 
     def _count_stand(self) -> None:
         """Count how long the robot stands, once it has moved."""
-        if self._drive.moving:
-            self._longest_stand = max(self._longest_stand, self._stands)
-            self._stands = 0
+        if self.drive.moving:
+            stood_s = self._stands * self.config.tick_s
+            self._stands, self.longest_stand_s = 0, max(self.longest_stand_s, stood_s)
         elif self.distance_m > 0.0:
             self._stands += 1
-
-    def _extend_track(self, ahead: DriveState) -> None:
-        """Add the point the robot is about to leave, if the track does not have it."""
-        here = (self.pose.x, self.pose.y)
-        gone = math.dist(self._track[-1], here)
-        turns_off = ahead.speed != 0.0 and self._drive.speed == 0.0
-        if gone >= TRACK_SPACING_M or (gone > 0.0 and turns_off):
-            self._track.append(here)
 
 
 def _fits(truth: OccupancyGrid, pose: Pose2D, config: SimulationConfig) -> bool:

@@ -28,10 +28,10 @@ import numpy as np
 import fasaco_edge as fe
 from fasaco_edge.cli.follow import NEAR_SHARE
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.follow.goals import GAIN_M, TIP_M
 from fasaco_edge.follow.nav2 import EARLY_M
-from fasaco_edge.follow.pieces import Line, end_of_piece
-from tests.follow.nav2_missions import Point, kind_of, nav2_follower, nav2_robot, passed
+from fasaco_edge.follow.pieces import GAIN_M, TIP_M, Line, end_of_piece
+from fasaco_edge.grid.geometry import Pose2D
+from tests.follow.nav2_missions import Point, Robot, kind_of, nav2_follower, passed
 from tests.support.driven_base import DrivenBase
 
 LIMIT_S = 600.0
@@ -86,8 +86,7 @@ def line_of(length_m: float, seed: int) -> list[Point]:
 
 def forced_s(pauses: list[dict[str, Any]], points: list[Point]) -> float:
     """Return how long the robot was forced to stand between goals [s]."""
-    rest = iter(points)
-    line, way, forced = Line(lambda count: list(itertools.islice(rest, count))), 0.0, 0.0
+    line, way, forced = Line(Pose2D(x, y) for x, y in points), 0.0, 0.0
     for pause in pauses:
         way, _ = line.nearest(pause["end"], way, line.length(math.inf))
         early_m = max(
@@ -121,7 +120,7 @@ def run_mission(faults: str, length_m: float, speed_m_s: float, seed: int) -> Mi
     try:
         with (
             tempfile.TemporaryDirectory() as folder,
-            nav2_robot(**robot) as nav2,
+            Robot(**robot) as nav2,
             nav2_follower(Path(folder), base.endpoint, kind_of(domain), speed_m_s=speed_m_s) as log,
         ):
             base.plans()

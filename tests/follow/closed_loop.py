@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,23 +28,24 @@ LIMITS = Limits(
 PERIOD_S = 0.05
 
 
-def path_message(xy, frame="map"):
-    """A path through points (x, y) [m]."""
+def path_message(xy, yaw=None):
+    """A path through points (x, y) [m], with headings [rad] or 0."""
     points = np.array(xy, np.float64).reshape(-1, 2)
-    return encode_path(points, np.zeros(len(points)), frame, 1)
+    return encode_path(points, np.zeros(len(points)) if yaw is None else yaw, "map", 1)
 
 
 class ClosedLoop:
     """A follower drives a world; poses and commands take a while, and cycles come late.
 
-    The robot turns about a point ``left_m`` to the left of its poses.
+    The robot turns about a point ``left_m`` to the left of its poses; with ``turn_m`` it is one
+    that cannot turn on the spot.
     """
 
     def __init__(self, truth: OccupancyGrid, start: Pose2D, *, delay_s=0.02, jitter_s=0.0,
-                 noise=0.0, turn_gain=1.0, pose_hz=10.0, late_s=0.0, left_m=0.0,
-                 seed=0):  # fmt: skip
-        self.world = World(truth, start, CONFIG)
-        self.follower = Follower(LIMITS)
+                 noise=0.0, turn_gain=1.0, pose_hz=10.0, late_s=0.0, left_m=0.0, turn_m=0.0,
+                 limits=LIMITS, seed=0):  # fmt: skip
+        self.world = World(truth, start, replace(CONFIG, turn_radius_m=turn_m))
+        self.follower = Follower(replace(limits, turn_radius=turn_m))
         self.follower.take_planner("a1")
         self.follower.heard_status(0.0)
         self.now = 0.0
@@ -56,9 +58,24 @@ class ClosedLoop:
         self._tick, self._pose_ticks = 0, CONFIG.period_ticks(pose_hz)
         self._due = 0.0
 
-    def send(self, xy):
+    def send(self, xy, yaw=None):
         """Publish a path."""
-        self.follower.take_path(path_message(xy))
+        self.follower.take_path(path_message(xy, yaw))
+
+    @property
+    def trail(self):
+        """Where the robot was, float64 (n, 2) [m]."""
+        points = np.array([(pose.x, pose.y) for pose in self.truth_at])
+        return points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)]
+
+    def wait(self, seconds):
+        """Let some time pass."""
+        until = self.now + seconds
+        self.run(lambda: self.now > until)
+
+    def drive(self, most_s=600.0):
+        """Let it drive its path to the end; return the seconds that took."""
+        return self.run(lambda: self.follower.state is State.DRIVEN, most_s)
 
     def run(self, until, most_s=600.0):
         """Let time pass until ``until()`` holds; return the seconds that took."""

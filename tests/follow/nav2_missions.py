@@ -20,11 +20,11 @@ Point = tuple[float, float]
 
 
 class Robot:
-    """A look-alike that runs; ``figures`` once it has ended."""
+    """A look-alike that runs."""
 
     def __init__(self, **wanted: Any) -> None:
         words = [sys.executable, "-m", "tests.support.nav2_robot", json.dumps(wanted)]
-        self.figures: dict[str, Any] = {}
+        self._figures: dict[str, Any] = {}
         self._process = subprocess.Popen(
             words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=ENVIRONMENT, text=True
         )
@@ -33,20 +33,16 @@ class Robot:
 
     def end(self) -> dict[str, Any]:
         """End it; return what it did."""
-        if not self.figures:
+        if not self._figures:
             out, _ = self._process.communicate(timeout=60)
-            self.figures = json.loads(out)
-        return self.figures
+            self._figures = json.loads(out)
+        return self._figures
 
+    def __enter__(self) -> Robot:
+        return self
 
-@contextmanager
-def nav2_robot(**wanted: Any) -> Iterator[Robot]:
-    """Run a look-alike."""
-    robot = Robot(**wanted)
-    try:
-        yield robot
-    finally:
-        robot.end()
+    def __exit__(self, *_: object) -> None:
+        self.end()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import numpy as np
 from fasaco_edge.follow.estimate import STAND, moved
 from fasaco_edge.follow.follower import Follower
 from fasaco_edge.follow.scanner import Mount
-from fasaco_edge.follow.sight import Sight, SightSettings
+from fasaco_edge.follow.sight import Sight
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.motion import limited
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -80,7 +80,7 @@ class Seeing:
         self.now, self.pose, self.last = 10.0, Pose2D(0.0, 0.0), STAND
         self.touched_at = []
         self._rng = np.random.default_rng(1)
-        self._sight = Sight(SightSettings(self.mount, RADIUS_M))
+        self._sight = Sight(self.mount, RADIUS_M)
         self._sight.take_map(plain_map(self.wall_y))
         self.follower = Follower(LIMITS, sight=self._sight)
         self.follower.take_planner("a1")

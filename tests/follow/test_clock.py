@@ -2,14 +2,14 @@
 
 import pytest
 
-from fasaco_edge.follow.inputs import LEAD_S, SimulatedClock
+from fasaco_edge.follow.inputs import LEAD_S, Clock
 
 SECOND = 1_000_000_000
 
 
 def test_time_goes_as_the_simulation_does_and_never_back():
     """Twenty times the speed was asked for; the computer does five."""
-    clock = SimulatedClock(20.0)
+    clock = Clock(20.0)
     times, begun = [], clock.hear(0, 100.0)
     for pose in range(1, 101):
         at = 100.0 + 0.02 * pose
@@ -20,7 +20,7 @@ def test_time_goes_as_the_simulation_does_and_never_back():
 
 
 def test_between_two_poses_it_goes_on_for_a_while():
-    clock = SimulatedClock(20.0)
+    clock = Clock(20.0)
     begun = clock.hear(0, 100.0)
     assert clock.at(100.002) - begun == pytest.approx(0.04)
     assert clock.at(100.4) - begun == pytest.approx(LEAD_S)
@@ -33,7 +33,7 @@ def test_between_two_poses_it_goes_on_for_a_while():
 
 
 def test_another_simulation_begins_where_the_last_one_was():
-    clock = SimulatedClock(10.0)
+    clock = Clock(10.0)
     clock.hear(50 * SECOND, 100.0)
     before = clock.hear(51 * SECOND, 100.1)
     assert before == pytest.approx(clock.at(100.1))

@@ -15,15 +15,6 @@ LANES = serpentine(range(2, 9), range(2, 12))
 START = Pose2D(*LANES[0])
 
 
-def trail(loop):
-    points = np.array([(pose.x, pose.y) for pose in loop.truth_at])
-    return points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)]
-
-
-def driven(loop):
-    return loop.run(lambda: loop.follower.state is State.DRIVEN)
-
-
 @pytest.mark.parametrize(
     ("conditions", "off_m"),
     [
@@ -40,11 +31,11 @@ def driven(loop):
 def test_it_stays_on_the_path_and_beats_stopping_at_corners(conditions, off_m):
     loop = ClosedLoop(ROOM, START, **conditions)
     loop.send(LANES)
-    seconds = driven(loop)
+    seconds = loop.drive()
     assert loop.world.collisions == 0
-    assert distances_to(LANES, trail(loop)).max() < off_m
+    assert distances_to(LANES, loop.trail).max() < off_m
     # And all of it was driven.
-    assert distances_to(trail(loop)[::5], LANES).max() < off_m + 0.01
+    assert distances_to(loop.trail[::5], LANES).max() < off_m + 0.01
     assert seconds < ideal_seconds(ROOM, START, LANES)
 
 
@@ -53,8 +44,8 @@ def test_cycles_that_come_late_do_not_carry_it_past_its_stops(seed):
     """It braked by a twentieth of a second's worth each cycle, whatever time had passed."""
     loop = ClosedLoop(ROOM, START, late_s=0.12, seed=seed)
     loop.send(LANES)
-    seconds = driven(loop)
-    assert distances_to(LANES, trail(loop)).max() < 0.04
+    seconds = loop.drive()
+    assert distances_to(LANES, loop.trail).max() < 0.04
     assert loop.world.collisions == 0
     assert seconds < 1.15 * ideal_seconds(ROOM, START, LANES)
 
@@ -77,10 +68,10 @@ def test_a_corner_is_rounded_in_motion_and_hardly_cut(turn_deg, conditions):
         return np.hypot(*(path[-1] - (loop.world.pose.x, loop.world.pose.y))) < 0.3
 
     loop.run(near_end)
-    driven(loop)
+    loop.drive()
     assert slowest > 0.02
-    assert distances_to(path, trail(loop)).max() < 0.025
-    assert distances_to(trail(loop), corner[None]).max() < 0.03
+    assert distances_to(path, loop.trail).max() < 0.025
+    assert distances_to(loop.trail, corner[None]).max() < 0.03
     stops_s = 0.25 / 0.5
     assert loop.now < ideal_seconds(ROOM, Pose2D(1.0, 2.0), path) - 0.8 * stops_s
 
@@ -93,9 +84,9 @@ def test_a_same_path_received_in_a_corner_does_not_stop_it():
     pose = loop.world.pose
     assert 0.2 < pose.yaw < 0.6
     loop.send([(pose.x, 1), (3, 1), (4, 2), (4, 2.5)])
-    before = loop.world.distance_m, loop.now
-    loop.run(lambda: loop.now > before[1] + 2.0)
-    assert loop.world.distance_m - before[0] > 0.9 * 0.25 * 2.0
+    before = loop.world.distance_m
+    loop.wait(2.0)
+    assert loop.world.distance_m - before > 0.9 * 0.25 * 2.0
 
 
 def test_a_self_crossing_path_is_driven_in_its_order():
@@ -106,10 +97,10 @@ def test_a_self_crossing_path_is_driven_in_its_order():
     )  # fmt: skip
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), delay_s=0.05, jitter_s=0.02)
     loop.send(path)
-    driven(loop)
+    loop.drive()
     assert loop.world.distance_m == pytest.approx(np.hypot(*np.diff(path, axis=0).T).sum(), abs=0.3)
     # Each corner is reached after the one before it, although others lie beside it.
-    way, at = trail(loop), 0
+    way, at = loop.trail, 0
     for corner in path:
         near = np.flatnonzero(np.hypot(*(way[at:] - corner).T) < 0.03)
         assert len(near), corner
@@ -127,8 +118,8 @@ def test_a_path_with_the_same_beginning_is_joined_without_a_stop():
         loop.run(lambda until=before + 100: len(loop.truth_at) > until)
         x = [pose.x for pose in loop.truth_at[before:]]
         assert min(np.diff(x)) > 0.95 * 0.25 * 0.02
-    driven(loop)
-    assert np.hypot(*(trail(loop)[-1] - (5.0, 4.0))) < 0.01
+    loop.drive()
+    assert np.hypot(*(loop.trail[-1] - (5.0, 4.0))) < 0.01
 
 
 def test_a_corner_that_was_missed_is_driven_back_to():
@@ -137,10 +128,10 @@ def test_a_corner_that_was_missed_is_driven_back_to():
     loop.send([(1, 1), (3, 1), (3, 3)])
     loop.run(lambda: loop.world.pose.x > 2.87)
     step, loop.follower.step = loop.follower.step, lambda now: None
-    loop.run(lambda until=loop.now + 0.6: loop.now > until)
+    loop.wait(0.6)
     loop.follower.step = step
-    driven(loop)
-    way = trail(loop)
+    loop.drive()
+    way = loop.trail
     assert way[:, 0].max() > 3.04
     # Beside the overshoot nothing is left of the path by more than that.
     assert distances_to(np.array([(1, 1), (3.2, 1), (3, 1), (3, 3)]), way).max() < 0.02
@@ -151,7 +142,7 @@ def test_a_corner_that_cannot_be_hit_is_not_returned_to_for_ever():
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), left_m=0.1, pose_hz=5.0)
     loop.send([(1, 1), (1.02, 1.05), (1, 3), (3, 3)])
     loop.run(lambda: loop.world.pose.y > 1.5, most_s=20.0)
-    driven(loop)
+    loop.drive()
     assert loop.now < 60.0
 
 
@@ -162,13 +153,11 @@ def test_a_path_that_goes_elsewhere_is_joined_from_rest():
     here = loop.world.pose
     path = np.array([(here.x, 1.0), (here.x, 4.0)])
     loop.send(path)
-    driven(loop)
+    loop.drive()
     # It comes to rest beside the new path, and drives to it on the shortest way.
-    assert trail(loop)[:, 0].max() < here.x + 0.1
-    assert (
-        distances_to(np.vstack(([(1, 1)], [(here.x + 0.1, 1.0)], path)), trail(loop)).max() < 0.02
-    )
-    assert np.hypot(*(trail(loop)[-1] - path[-1])) < 0.01
+    assert loop.trail[:, 0].max() < here.x + 0.1
+    assert distances_to(np.vstack(([(1, 1)], [(here.x + 0.1, 1.0)], path)), loop.trail).max() < 0.02
+    assert np.hypot(*(loop.trail[-1] - path[-1])) < 0.01
 
 
 def test_a_path_that_starts_ahead_on_the_old_one_is_joined_there():
@@ -177,10 +166,10 @@ def test_a_path_that_starts_ahead_on_the_old_one_is_joined_there():
     loop.run(lambda: loop.world.pose.x > 4.0)
     path = np.array([(5, 1.5), (5, 3), (2, 3)])
     loop.send(path)
-    driven(loop)
+    loop.drive()
     way = np.vstack(([(1, 1), (5, 1)], path))
-    assert distances_to(way, trail(loop)).max() < 0.02
-    assert distances_to(trail(loop), way).max() < 0.03
+    assert distances_to(way, loop.trail).max() < 0.02
+    assert distances_to(loop.trail, way).max() < 0.03
 
 
 def test_a_path_that_begins_far_away_is_not_driven_to():
@@ -190,18 +179,22 @@ def test_a_path_that_begins_far_away_is_not_driven_to():
     assert loop.follower.state is State.PATH_ELSEWHERE
     assert loop.world.distance_m == 0.0
     loop.send([(1.3, 1), (4, 1)])
-    driven(loop)
+    loop.drive()
+
+
+def carry(loop, left_m):
+    """Somebody carries it away, a little at a time."""
+    at = loop.world.pose
+    loop.world.drive = type(loop.world.drive)(Pose2D(at.x, at.y + left_m, at.yaw))
 
 
 def test_it_stands_once_it_is_off_the_path():
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0))
     loop.send([(1, 1), (5, 1)])
     loop.run(lambda: loop.world.pose.x > 2.0)
-    # Somebody carries it away, a little at a time.
     for _ in range(20):
-        drive = loop.world._drive
-        loop.world._drive = type(drive)(Pose2D(drive.pose.x, drive.pose.y + 0.05, drive.pose.yaw))
-        loop.run(lambda until=loop.now + 0.3: loop.now > until)
+        carry(loop, 0.05)
+        loop.wait(0.3)
     assert loop.follower.state in (State.OFF_PATH, State.POSE_JUMPED)
     assert loop.world.activity.value == "idle"
 
@@ -212,11 +205,10 @@ def test_off_its_path_it_joins_a_path_that_starts_ahead():
     loop.send([(1, 1), (5, 1)])
     loop.run(lambda: loop.world.pose.x > 2.0)
     while loop.follower.state is not State.OFF_PATH:
-        drive = loop.world._drive
-        loop.world._drive = type(drive)(Pose2D(drive.pose.x, drive.pose.y + 0.06, drive.pose.yaw))
-        loop.run(lambda until=loop.now + 0.2: loop.now > until)
+        carry(loop, 0.06)
+        loop.wait(0.2)
         assert loop.now < 20.0
-    loop.run(lambda until=loop.now + 1.0: loop.now > until)
+    loop.wait(1.0)
     here = loop.world.pose
     loop.send([(here.x + 0.4, 1.0), (5, 1)])
-    driven(loop)
+    loop.drive()

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.curve_route import CurveRoute
-from fasaco_edge.follow.follower import Follower
+from fasaco_edge.follow.route import CurveRoute
 from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor
@@ -15,13 +14,10 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import curve_along
-from fasaco_edge.simulation.world import World
-from fasaco_edge.wire.messages.paths import encode_path
 from tests.follow.closed_loop import CONFIG, LIMITS, ClosedLoop
 from tests.simulation.rooms import building, distances_to
 
 TURN_M, TOOL_M = 0.4, 0.3
-BASE = replace(CONFIG, turn_radius_m=TURN_M)
 ROOM = building(4.5, 3.5)
 
 
@@ -39,24 +35,11 @@ def curve_of(line_xy, *, reverses, clearance_m=0.05):
     return curve_along(line_xy, floor, floor.reachable, config)
 
 
-def message(curve):
-    return encode_path(curve.xy, curve.poses[:, 2], "map", 1)
-
-
 def loop_on(curve, **conditions):
     """A loop with a base of that radius, at the beginning of a curve."""
-    loop = ClosedLoop(ROOM, Pose2D(*curve.poses[0]), **conditions)
-    loop.world = World(ROOM, Pose2D(*curve.poses[0]), BASE)
-    loop.follower = Follower(replace(LIMITS, turn_radius=TURN_M))
-    loop.follower.take_planner("a1")
-    loop.follower.heard_status(0.0)
-    loop.follower.take_path(message(curve))
+    loop = ClosedLoop(ROOM, Pose2D(*curve.poses[0]), turn_m=TURN_M, **conditions)
+    loop.send(curve.xy, curve.poses[:, 2])
     return loop
-
-
-def trail(loop):
-    points = np.array([(pose.x, pose.y) for pose in loop.truth_at])
-    return points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)]
 
 
 @pytest.mark.parametrize(
@@ -70,25 +53,19 @@ def test_it_sweeps_a_room_without_a_touch(reverses, conditions, off_m):
     assert curve.spots == 0
     assert (curve.reversals > 0) == reverses
     loop = loop_on(curve, **conditions)
-    loop.run(lambda: loop.follower.state is State.DRIVEN, most_s=3000.0)
+    loop.drive(most_s=3000.0)
     assert loop.world.collisions == 0
-    assert distances_to(curve.xy, trail(loop)).max() < off_m
-    assert distances_to(trail(loop)[::10], curve.xy).max() < off_m + 0.015
+    assert distances_to(curve.xy, loop.trail).max() < off_m
+    assert distances_to(loop.trail[::10], curve.xy).max() < off_m + 0.015
     tool = SweepingRobot(TOOL_M, CONFIG.hull_radius_m)
-    planned, driven = (judge_floor(ROOM, xy, tool).figures for xy in (curve.xy, trail(loop)))
+    planned, driven = (judge_floor(ROOM, xy, tool).figures for xy in (curve.xy, loop.trail))
     assert driven.illegal_share == 0.0
     assert driven.swept_share > planned.swept_share - 0.005
 
 
 def test_a_leg_is_driven_backward_where_the_heading_is_opposite():
-    poses = [
-        Pose2D(1.0, 1.0),
-        Pose2D(2.0, 1.0),
-        Pose2D(1.5, 1.0),
-        Pose2D(1.5, 1.0),
-        Pose2D(1.2, 1.0),
-    ]
-    route = CurveRoute(lambda _: [poses.pop(0) for _ in poses[:]], replace(LIMITS, turn_radius=0.4))
+    poses = [Pose2D(x, 1.0) for x in (1.0, 2.0, 1.5, 1.5, 1.2)]
+    route = CurveRoute(poses, replace(LIMITS, turn_radius=0.4))
     legs = []
     while route.leg is not None:
         legs.append((route.leg.is_back, route.leg.stops))
@@ -99,14 +76,10 @@ def test_a_leg_is_driven_backward_where_the_heading_is_opposite():
 def test_no_command_asks_for_a_tighter_arc():
     """Not even while it brakes, and its rate of turning goes down more slowly."""
     curve = curve_of(lanes()[:8], reverses=True)
-    loop = loop_on(curve, noise=0.02)
-    loop.follower = Follower(replace(LIMITS, turn_radius=TURN_M, turn_acceleration=0.8))
-    loop.follower.take_planner("a1")
-    loop.follower.heard_status(0.0)
-    loop.follower.take_path(message(curve))
+    loop = loop_on(curve, noise=0.02, limits=replace(LIMITS, turn_acceleration=0.8))
     sent, move = [], loop.world.move
     loop.world.move = lambda speed, rate: (sent.append((speed, rate)), move(speed, rate))
-    loop.run(lambda: loop.follower.state is State.DRIVEN, most_s=1000.0)
+    loop.drive(most_s=1000.0)
     speeds, rates = np.array(sent).T
     assert (np.abs(rates) <= np.abs(speeds) / TURN_M + 1e-9).all()
     assert (speeds < 0.0).any()
@@ -119,12 +92,11 @@ def test_a_new_path_is_joined_on_an_arc_without_a_stop():
     loop.run(lambda: abs(loop.world.pose.yaw) > 1.0)
     pose = loop.world.pose
     near = int(np.argmin(np.hypot(*(curve.xy - (pose.x, pose.y)).T)))
-    loop.follower.take_path(encode_path(curve.xy[near:], curve.poses[near:, 2], "map", 2))
+    loop.send(curve.xy[near:], curve.poses[near:, 2])
     before = loop.world.distance_m
-    until = loop.now + 1.0
-    loop.run(lambda: loop.now > until)
+    loop.wait(1.0)
     assert loop.world.distance_m - before > 0.9 * CONFIG.speed_m_s
-    loop.run(lambda: loop.follower.state is State.DRIVEN)
+    loop.drive()
 
 
 def test_it_stands_before_a_path_that_leads_back():
@@ -132,11 +104,9 @@ def test_it_stands_before_a_path_that_leads_back():
     loop = loop_on(curve_of(lanes()[:2], reverses=False))
     loop.run(lambda: loop.world.pose.x > 2.0)
     x = loop.world.pose.x
-    back = np.array([(x + 0.05, 0.35), (x - 1.0, 0.35)])
-    loop.follower.take_path(encode_path(back, np.full(2, math.pi), "map", 2))
+    loop.send([(x + 0.05, 0.35), (x - 1.0, 0.35)], np.full(2, math.pi))
     loop.run(lambda: loop.follower.state is State.OFF_PATH)
-    until = loop.now + 5.0
-    loop.run(lambda: loop.now > until)
+    loop.wait(5.0)
     assert loop.follower.state is State.OFF_PATH
     assert "cannot steer" in loop.follower.detail
     assert loop.world.pose.x < x + 0.2

@@ -44,12 +44,12 @@ def path(own, payload=b"path"):
 )
 def test_no_other_status_is_a_sign_of_life(daemons, status):
     daemons.take_status(status, 1.0)
-    assert daemons.news().status_at is None
-    assert daemons.state == ""
+    news = daemons.news()
+    assert (news.status_at, news.state) == (None, "")
     daemons.take_status(status_of(A, "charging"), 2.0)
     daemons.take_status(status, 3.0)
-    assert daemons.news().status_at == 2.0
-    assert daemons.state == "charging"
+    news = daemons.news()
+    assert (news.status_at, news.state) == (2.0, "charging")
 
 
 def test_each_sample_is_news_once(daemons):
@@ -76,13 +76,6 @@ def test_of_two_that_plan_it_is_the_one_that_will_go_on(daemons):
     assert (daemons.news().planner, daemons.news().path) == (A, None)
 
 
-def test_a_path_without_a_daemon_is_handed_over_apart(daemons):
-    daemons.take_path(path(""))
-    news = daemons.news()
-    assert (news.path, news.unnamed) == (None, path(""))
-    assert daemons.news().unnamed is None
-
-
 def test_a_flood_of_daemons_is_bounded_and_keeps_the_planner(daemons):
     daemons.take_path(path(A))
     for number in range(100 * MOST_DAEMONS):
@@ -100,7 +93,8 @@ def test_a_token_that_is_no_id_does_not_replace_the_planner(daemons, own):
     """The daemons ignore it, too: the one that plans goes on."""
     daemons.take_claim(f"fasaco/@v1/robot/claim/{own}/plans", True)
     daemons.take_status(status_of(A), 1.0)
-    assert (daemons.news().planner, daemons.state) == (A, "covering")
+    news = daemons.news()
+    assert (news.planner, news.state) == (A, "covering")
 
 
 def test_the_planner_is_still_known_after_a_crowd_of_daemons(daemons):

@@ -39,6 +39,9 @@ class Told:
         where = Pose2D(self.x if x is None else x, y, yaw)
         self.follower.take_pose(StampedPose(where, frame, stamp_ns), self.now)
 
+    def refuse_pose(self, why):
+        self.follower.pose_fault = MalformedMessage(why)
+
     def states_where_it_is(self, seconds):
         """Return the state of each step while the pose stays as it is."""
         states = []
@@ -66,22 +69,50 @@ class Told:
             self.x += (command or STAND).speed * PERIOD_S
 
 
+def path_of(payload):
+    return lambda told: told.follower.take_path(payload)
+
+
 @pytest.fixture
 def told():
     return Told()
 
 
-def test_it_drives_as_fast_as_it_may(told):
+def stops(name, act, state, words=""):
+    return pytest.param(act, state, words, id=name)
+
+
+NAN = bytes.fromhex("000000000000f87f")
+
+
+@pytest.mark.parametrize(
+    ("act", "state", "words"),
+    [
+        stops("an empty path", path_of(path_message([])), State.EMPTY_PATH),
+        stops("no path", path_of(b""), State.BAD_PATH, "encapsulation header"),
+        stops("a short path", path_of(path_message(AHEAD)[:-1]), State.BAD_PATH, "poses"),
+        stops("a long path", path_of(path_message(AHEAD) + b"junk"), State.BAD_PATH, "payload"),
+        stops("NaN", path_of(path_message(AHEAD)[:-8] + NAN), State.BAD_PATH, "orientation"),
+        stops("another frame", lambda told: told.pose(frame="odom"), State.WRONG_FRAME, "'odom'"),
+        stops("a jump", lambda told: told.pose(y=2.0), State.POSE_JUMPED, "by 2.0 m"),
+        stops("a turn", lambda told: told.pose(yaw=2.5), State.POSE_JUMPED, "by 0.0 m and 14"),
+        stops("no pose", lambda told: told.refuse_pose("got nan"), State.BAD_POSE, "got nan"),
+        stops("no planner", lambda told: told.follower.take_planner(""), State.NO_DAEMON),
+    ],
+)
+def test_it_stands_at_once_and_says_why_and_goes_on_when_that_is_over(told, act, state, words):
     told.drive(1.0)
     command = told.step()
-    assert command.speed == LIMITS.speed
+    assert (command.speed, told.follower.state) == (LIMITS.speed, State.DRIVING)
     assert abs(command.turn_rate) < 1e-6
-
-
-def test_an_empty_path_stops_it_at_once(told):
-    told.follower.take_path(path_message([]))
+    act(told)
     assert told.step() == STAND
-    assert told.follower.state is State.EMPTY_PATH
+    assert told.follower.state is state
+    assert words in told.follower.detail
+    told.follower.take_planner("a1")
+    told.follower.take_path(path_message([(told.x, 0.0), (5.0, 0.0)]))
+    told.drive(0.5)
+    assert told.follower.state is State.DRIVING
 
 
 def test_zeros_are_sent_for_a_second_and_then_nothing(told):
@@ -124,25 +155,6 @@ def test_a_path_may_begin_exactly_where_the_robot_stands(told):
     assert told.follower.state is State.DRIVING
 
 
-@pytest.mark.parametrize(
-    ("payload", "words"),
-    [
-        (b"", "encapsulation header"),
-        (path_message(AHEAD)[:-1], "poses"),
-        (path_message(AHEAD) + b"junk", "payload"),
-        (path_message(AHEAD)[:-8] + bytes.fromhex("000000000000f87f"), "orientation"),
-    ],
-)
-def test_a_path_that_is_none_stops_it(told, payload, words):
-    told.follower.take_path(payload)
-    assert told.step() == STAND
-    assert told.follower.state is State.BAD_PATH
-    assert words in told.follower.detail
-    told.follower.take_path(path_message([(told.x, 0.0), (5.0, 0.0)]))
-    told.drive(0.5)
-    assert told.follower.state is State.DRIVING
-
-
 def test_a_pose_that_is_too_old_stops_it_until_the_next(told):
     limit = Patience().pose_s
     since = told.now
@@ -154,60 +166,23 @@ def test_a_pose_that_is_too_old_stops_it_until_the_next(told):
     assert told.step().speed > 0.0
 
 
-def test_a_pose_that_is_none_stops_it(told):
-    told.follower.refuse_pose(MalformedMessage("pose.position.x must be ..., got nan"))
-    assert told.step() == STAND
-    assert told.follower.state is State.BAD_POSE
-    assert "nan" in told.follower.detail
-
-
-def test_a_pose_that_jumps_stops_it_and_is_believed_if_it_stays(told):
+@pytest.mark.parametrize(("x", "y", "yaw"), [(None, 2.0, 0.0), (5.0, 2.0, math.pi / 2)])
+def test_a_pose_that_jumps_is_believed_if_it_stays(told, x, y, yaw):
+    """Beside the path, where the robot stands; a jump to its second leg does not skip the first."""
     told.pose(x=told.x, y=2.0)
     assert told.step() == STAND
-    assert told.follower.state is State.POSE_JUMPED
     # Back again: a localiser that erred once.
     told.pose()
     assert told.step().speed > 0.0
     for _ in range(10):
-        told.pose(y=2.0)
-        assert told.step() == STAND
-    # It is there now: beside the path, where the robot stands.
-    assert told.follower.state is State.OFF_PATH
-
-
-def test_a_jump_in_yaw_alone_stops_a_turning_robot(told):
-    told.begin_anew([(0.0, 0.0), (0.0, 5.0)])
-    yaw = 0.0
-    for _ in range(10):
-        told.pose(yaw=yaw)
-        yaw += told.step().turn_rate * PERIOD_S
-    assert told.follower.state is State.DRIVING
-    told.pose(yaw=yaw + 2.5)
-    assert told.step() == STAND
-    assert told.follower.state is State.POSE_JUMPED
-    assert told.follower.detail.startswith("by 0.0 m and 14")
-
-
-def test_a_pose_jump_along_the_path_does_not_count_as_driven(told):
-    """A jump to the second leg, 5 m away, does not skip the first leg."""
-    for _ in range(10):
-        told.pose(x=5.0, y=2.0, yaw=math.pi / 2)
+        told.pose(x=x, y=y, yaw=yaw)
         assert told.step() == STAND
     assert told.follower.state is State.OFF_PATH
 
 
-def test_a_pose_in_another_frame_stops_it(told):
-    told.pose(frame="odom")
-    assert told.step() == STAND
-    assert told.follower.state is State.WRONG_FRAME
-    assert "'odom'" in told.follower.detail
-
-
-def test_it_stands_without_a_daemon_and_resumes_with_the_same(told):
+def test_it_resumes_with_the_same_daemon_once_that_has_sent_two_statuses(told):
     told.follower.take_planner("")
-    told.pose()
-    assert told.step() == STAND
-    assert told.follower.state is State.NO_DAEMON
+    told.step()
     told.follower.take_planner("a1")
     told.pose()
     # The first status after that may be a cached one.

@@ -1,12 +1,12 @@
 """``fasaco-edge follow`` and a look-alike of Nav2, each in a process of its own."""
 
 import math
-import time
+from contextlib import contextmanager
 
 import pytest
 
 from fasaco_edge.wire.messages.poses import decode_pose
-from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot, passed
+from tests.follow.nav2_missions import Robot, kind_of, nav2_follower, passed
 from tests.support.driven_base import DrivenBase
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
@@ -50,21 +50,27 @@ def undisturbed(done):
     return None if done["counts"]["canceled"] else done["counts"]
 
 
-@pytest.mark.parametrize("release", ["humble", "jazzy", "lyrical"])
-@pytest.mark.parametrize("domain", [7, None], ids=["rmw_zenoh", "bridge"])
-def test_a_path_is_driven_to_its_end(base, tmp_path, release, domain):
-    robot = {"endpoint": base.endpoint, "domain": domain, "release": release, "start": (0.0, 0.0)}
-    ros2 = {**kind_of(domain), "nav2": {"release": release}}
-    if domain is not None:
-        # It is seen, whatever the configuration says.
-        ros2["nav2"] = {"release": "jazzy", "controller": "FollowPath"}
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
+@contextmanager
+def driving(base, folder, domain=7, nav2=None, **robot):
+    """A look-alike of Nav2 at 0, 0, a follower and a daemon that plans; where the follower logs."""
+    wanted = {"endpoint": base.endpoint, "domain": domain, "start": (0.0, 0.0), **robot}
+    ros2 = {**kind_of(domain), "nav2": nav2 or {}}
+    with Robot(**wanted) as look_alike, nav2_follower(folder, base.endpoint, ros2) as log:
         base.plans()
+        yield look_alike, log
+
+
+@pytest.mark.parametrize(
+    ("release", "domain"), [("humble", 7), ("lyrical", 7), ("humble", None), ("jazzy", None)]
+)
+def test_a_path_is_driven_to_its_end(base, tmp_path, release, domain):
+    # By rmw_zenoh it is seen, whatever the configuration says.
+    nav2 = {"release": release} if domain is None else {"controller": "FollowPath"}
+    with driving(base, tmp_path, domain, nav2, release=release) as (look_alike, log):
         base.send_path(*LANES)
         wait_log(log, "standing, the path is driven")
-    done = nav2.end()
-    assert done["refused"] == []
-    assert done["errors"] == []
+    done = look_alike.end()
+    assert (done["refused"], done["errors"]) == ([], [])
     # Lanes beside each other are one goal.
     assert undisturbed(done) in (None, {"goals": 1, "preempted": 0, "canceled": 0})
     assert passed(done["trail"], LANES)
@@ -72,66 +78,52 @@ def test_a_path_is_driven_to_its_end(base, tmp_path, release, domain):
 
 
 def test_a_path_that_crosses_itself_is_driven_without_standing(base, tmp_path):
-    robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.5}
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
-        base.plans()
+    with driving(base, tmp_path, speed=0.5) as (look_alike, log):
         base.send_path(*CROSSING)
         wait_log(log, "standing, the path is driven")
-    done = nav2.end()
+    done = look_alike.end()
     assert passed(done["trail"], CROSSING)
     # The next goal was sent while the robot drove.
     assert undisturbed(done) in (None, {"goals": 2, "preempted": 1, "canceled": 0})
 
 
-def test_a_replan_that_changes_nothing_ahead_changes_no_goal(base, tmp_path):
-    robot = {"endpoint": base.endpoint, "domain": None, "start": (0.0, 0.0), "speed": 0.3}
-    ros2 = kind_of(None)
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
-        base.plans()
-        base.send_path((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
-        wait_log(log, "driving")
-        time.sleep(0.5)
-        # As the daemon says it again: from somewhere before the robot on.
-        base.send_path((0.02, 0.0), (1.0, 0.0), (1.0, 1.0), (0.7, 1.0))
-        wait_log(log, "standing, the path is driven")
-    done = nav2.end()
-    counts = undisturbed(done)
-    assert counts is None or counts["goals"] == 2
-    assert math.dist((done["x"], done["y"]), (0.7, 1.0)) < 0.15
+# As the daemon says it again: from somewhere before the robot on.
+SAME = (0.02, 0.0), (1.2, 0.0), (1.2, 1.0), (0.9, 1.0)
+OTHER = (0.0, 0.0), (0.9, 0.0), (0.9, 0.8)
 
 
-def test_a_replan_that_changes_what_lies_ahead_replaces_the_goal(base, tmp_path):
-    robot = {"endpoint": base.endpoint, "domain": None, "start": (0.0, 0.0), "speed": 0.3}
-    ros2 = kind_of(None)
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, ros2) as log:
-        base.plans()
-        base.send_path((0.0, 0.0), (3.0, 0.0))
+@pytest.mark.parametrize("path", [SAME, OTHER])
+def test_a_replan_replaces_the_goal_only_if_it_changes_what_lies_ahead(base, tmp_path, path):
+    with driving(base, tmp_path, None, speed=0.3) as (look_alike, log):
+        base.send_path((0.0, 0.0), (1.2, 0.0), (1.2, 1.0))
         poses = listen(base, "pose")
         # Only what the controller drives already can be replaced.
         wait(lambda: bool(poses) and poses[-1].x > 0.05, log)
-        base.send_path((0.0, 0.0), (0.9, 0.0), (0.9, 0.8))
+        base.send_path(*path)
         wait_log(log, "standing, the path is driven")
-    done = nav2.end()
-    assert undisturbed(done) in (None, {"goals": 2, "preempted": 1, "canceled": 0})
-    assert math.dist((done["x"], done["y"]), (0.9, 0.8)) < 0.15
+    done = look_alike.end()
+    # The rest of the same path is a goal of its own.
+    assert done["counts"]["canceled"] or done["counts"]["goals"] == 2
+    assert math.dist((done["x"], done["y"]), path[-1]) < 0.15
 
 
-@pytest.mark.parametrize("why", ["empty path", "no daemon"])
-def test_what_stops_the_robot_cancels_its_goal(base, tmp_path, why):
-    robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.3}
-    with nav2_robot(**robot) as nav2, nav2_follower(tmp_path, base.endpoint, kind_of(7)) as log:
-        base.plans()
+@pytest.mark.parametrize(
+    ("stop", "why"),
+    [
+        (lambda base: base.send_path(), "stopped by an empty path"),
+        (lambda base: base.plans(False), "no daemon"),
+    ],
+)
+def test_what_stops_the_robot_cancels_its_goal(base, tmp_path, stop, why):
+    with driving(base, tmp_path, speed=0.3) as (look_alike, log):
         base.send_path((0.0, 0.0), (30.0, 0.0))
         poses = listen(base)
         wait(lambda: bool(poses) and poses[-1].x > 0.2, log)
-        if why == "empty path":
-            base.send_path()
-        else:
-            base.plans(False)
-        wait_log(log, f"standing, {'stopped by an empty path' if why == 'empty path' else why}")
+        stop(base)
+        wait_log(log, f"standing, {why}")
         # While the follower is there: its own end cancels, too.
         wait(lambda: len(poses) > STILL and len({(at.x, at.y) for at in poses[-STILL:]}) == 1, log)
-        done = nav2.end()
+        done = look_alike.end()
     assert done["counts"]["canceled"] >= 1
     assert done["x"] < 28.0
 
@@ -144,7 +136,7 @@ def test_no_server_and_an_error_are_said_with_their_reasons(base, tmp_path):
     base.send_path(*LANES)
     with nav2_follower(tmp_path, base.endpoint, ros2) as log:
         wait_log(log, "no pose")
-        with nav2_robot(**robot):
+        with Robot(**robot):
             wait_log(
                 log, "standing, given up by Nav2: 101 invalid controller: no controller Nothing"
             )
@@ -158,7 +150,7 @@ def test_a_mission_is_driven_by_nav2_to_its_end(tmp_path):
     with (
         daemon_process(tmp_path, ros2=ros2, robot=names) as daemon,
         Outsider(daemon.endpoint) as native,
-        nav2_robot(
+        Robot(
             endpoint=daemon.endpoint, domain=0, start=(0.6, 0.6), abort_every_s=6.0, delay_s=0.5,
             lost=0.02,
         ) as nav2,

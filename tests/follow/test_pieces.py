@@ -8,18 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fasaco_edge.follow.pieces import APART, LEAST_M, MOST_M, STEP_M, Line, end_of_piece
+from fasaco_edge.grid.geometry import Pose2D
 
 NEAR = 0.225
 
 
 def line_of(*points):
-    rest = list(points)
-
-    def take(most):
-        taken, rest[:most] = rest[:most], []
-        return taken
-
-    return Line(take)
+    return Line(Pose2D(x, y) for x, y in points)
 
 
 def pieces_of(line, near=NEAR):

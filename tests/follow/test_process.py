@@ -1,7 +1,6 @@
 """``fasaco-edge follow`` as a process of its own, on a real bus."""
 
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -10,9 +9,12 @@ import yaml
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.cli import main
 from fasaco_edge.follow.estimate import Command
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.host.processes import cpu_seconds, own_mb
 from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from fasaco_edge.wire.messages.twists import decode_velocity
 from tests.campaigns import stop_tries
 from tests.campaigns.raw_messages import transform
@@ -57,18 +59,6 @@ def test_it_drives_twenty_times_a_second_and_stays_small(base, tmp_path):
     assert process.returncode == 0
     assert base.heard[-1][1] == Command()
     assert "driving" in log.read_text()
-
-
-def test_it_drives_to_the_end_and_says_so(base, tmp_path):
-    base.plans()
-    log = tmp_path / "log"
-    with follower_process(base.endpoint, log):
-        base.send_path((0.0, 0.0), (0.4, 0.0), (0.4, 0.4))
-        until(lambda: "the path is driven" in log.read_text())
-        assert abs(base.pose.x - 0.4) < 0.05
-        assert abs(base.pose.y - 0.4) < 0.05
-        # After a second of zeros something else may drive.
-        until(lambda: base.newest() is None)
 
 
 def test_it_stops_in_time_whatever_fails():
@@ -124,46 +114,33 @@ def test_it_waits_for_the_bus_and_says_so(tmp_path):
             bus.close()
 
 
-def test_a_signal_while_it_waits_for_the_bus_ends_it_quietly(tmp_path):
-    log = tmp_path / "log"
-    with follower_process(free_endpoint(), log) as process:
-        until(lambda: "waiting for the bus" in log.read_text())
-    assert process.returncode == 0
-    assert len(log.read_text().splitlines()) == 1
-
-
-def test_it_starts_without_standard_input(tmp_path):
+def test_it_starts_without_standard_input_and_ends_quietly_while_it_waits(tmp_path):
     log = tmp_path / "log"
     words = ["sh", "-c", 'exec "$@" <&-', "sh", *PROGRAM, "follow", "--connect", free_endpoint()]
     with (
         log.open("wb") as stderr,
         subprocess.Popen(words, stderr=stderr, env=ENVIRONMENT) as process,
     ):
-        try:
-            until(lambda: process.poll() is not None or "waiting for the bus" in log.read_text())
-        finally:
-            process.terminate()
-    assert "waiting for the bus" in log.read_text()
+        until(lambda: process.poll() is not None or "waiting for the bus" in log.read_text())
+        process.terminate()
     assert process.returncode == 0
+    assert len(log.read_text().splitlines()) == 1
 
 
-def config_file(folder, endpoint, ros2):
-    """Return a configuration of a follower, in ROS 2 or, with nothing, by the native keys."""
+def config_file(folder, **sections):
     config = folder / "config.yaml"
-    bus = {"listen": [], "connect": [endpoint], "mode": "client"}
-    config.write_text(yaml.safe_dump({"bus": bus} | ({"ros2": ros2} if ros2 else {})))
+    config.write_text(yaml.safe_dump({name: held for name, held in sections.items() if held}))
     return config
 
 
 def test_limits_names_and_topics_come_from_the_configuration(base, tmp_path):
     """Under ROS 2 by rmw_zenoh: its key, its attachment, its tokens."""
-    config = tmp_path / "config.yaml"
-    sections = {
-        "robot": {"name": "robot", "speed_m_s": 0.11, "turn_deg_s": 90.0},
-        "bus": {"listen": [], "connect": [base.endpoint], "mode": "client"},
-        "ros2": {"kind": "rmw_zenoh", "domain": 7, "pose": schemas.POSE_STAMPED},
-    }
-    config.write_text(yaml.safe_dump(sections))
+    config = config_file(
+        tmp_path,
+        robot={"name": "robot", "speed_m_s": 0.11, "turn_deg_s": 90.0},
+        bus={"listen": [], "connect": [base.endpoint], "mode": "client"},
+        ros2={"kind": "rmw_zenoh", "domain": 7, "pose": schemas.POSE_STAMPED},
+    )
     heard = []
     base.bus.subscribe("7/cmd_vel/**", heard.append)
     poses = base.bus.publisher("7/pose/geometry_msgs::msg::dds_::PoseStamped_/RIHS01_0", "")
@@ -172,7 +149,7 @@ def test_limits_names_and_topics_come_from_the_configuration(base, tmp_path):
     base.send_path(*AHEAD)
     with subprocess.Popen(words, env=ENVIRONMENT) as process:
         try:
-            sent = pose_payload()
+            sent = encode_pose_stamped(StampedPose(Pose2D(0.0, 0.0)))
             until(lambda: poses.put(sent) or any(velocity(one).speed_m_s > 0.1 for one in heard))
             tokens = base.bus.alive("@ros2_lv/7/**")
         finally:
@@ -191,12 +168,9 @@ def test_limits_names_and_topics_come_from_the_configuration(base, tmp_path):
 )
 def test_a_robot_whose_localiser_or_odometry_is_silent_stands(base, tmp_path, silent, most_s, said):
     """Poses from transforms: the other one goes on, and what it says changes."""
-    config, log = tmp_path / "config.yaml", tmp_path / "log"
-    sections = {
-        "robot": {"name": "robot", "speed_m_s": 0.05},
-        "ros2": {"kind": "rmw_zenoh", "domain": 7, "pose": "tf"},
-    }
-    config.write_text(yaml.safe_dump(sections))
+    ros2 = {"kind": "rmw_zenoh", "domain": 7, "pose": "tf"}
+    config = config_file(tmp_path, robot={"name": "robot", "speed_m_s": 0.05}, ros2=ros2)
+    log = tmp_path / "log"
     tf = base.bus.publisher("7/tf/tf2_msgs::msg::dds_::TFMessage_/RIHS01_0", "")
     heard = []
     base.bus.subscribe("7/cmd_vel/**", heard.append)
@@ -226,13 +200,6 @@ def velocity(sample):
     return decode_velocity(sample.payload, schemas.TWIST_STAMPED)
 
 
-def pose_payload():
-    from fasaco_edge.grid.geometry import Pose2D, StampedPose
-    from fasaco_edge.wire.messages.poses import encode_pose_stamped
-
-    return encode_pose_stamped(StampedPose(Pose2D(0.0, 0.0)))
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -242,31 +209,18 @@ def pose_payload():
         (["--robot", "a/b"], "must be chunks of letters"),
     ],
 )
-def test_mistakes_are_named(words, said):
-    ended = subprocess.run(
-        [*PROGRAM, "follow", *words], capture_output=True, text=True, env=ENVIRONMENT, timeout=60,
-        check=False,
-    )  # fmt: skip
-    assert ended.returncode in (2, 78)
-    assert said in ended.stderr
-    assert "Traceback" not in ended.stderr
-
-
-def test_the_environment_says_which_robot_and_where(base):
-    base.plans()
-    env = ENVIRONMENT | {"FASACO_CONNECT": base.endpoint, "FASACO_ROBOT": "robot"}
-    base.send_path(*AHEAD)
-    with subprocess.Popen([sys.executable, "-m", "fasaco_edge", "follow"], env=env) as process:
-        try:
-            base.wait_until_it_moves()
-        finally:
-            process.terminate()
+def test_mistakes_are_named(words, said, capsys):
+    try:
+        code = main(["follow", *words])
+    except SystemExit as ended:
+        code = ended.code
+    assert code in (2, 78)
+    assert said in capsys.readouterr().err
 
 
 def test_it_takes_scans_and_compares_them_with_the_map(base, tmp_path):
     """Somebody stands in the way, and goes; the process stays small, and stops without scans."""
-    config = tmp_path / "config.yaml"
-    config.write_text("scan: {lost_s: 1.0}\n")
+    config = config_file(tmp_path, scan={"lost_s": 1.0})
     maps, scans = (base.bus.advertise(base.keys, topic) for topic in (topics.MAP, topics.SCAN))
     person = [Disc(1.0, 0.0)]
     base.plans()

@@ -2,13 +2,24 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from fasaco_edge.follow.scanner import MARGIN_M, STOP_M, Mount, Thing, first_met, points_of
-from fasaco_edge.follow.sight import STANDS_S
+from fasaco_edge.follow.scanner import (
+    KNOWN_M,
+    MARGIN_M,
+    STOP_M,
+    Mount,
+    Thing,
+    first_met,
+    points_of,
+)
+from fasaco_edge.follow.sight import STANDS_S, Sight
 from fasaco_edge.follow.supervision import State
-from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.messages.scans import LaserScan
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.wire.messages.maps import encode_map_update, encode_occupancy_grid
+from fasaco_edge.wire.messages.scans import LaserScan, encode_scan
 from tests.follow.closed_loop import LIMITS
 from tests.follow.seeing import RADIUS_M, Disc, Seeing, plain_map, scan_at
 
@@ -87,8 +98,6 @@ def test_it_stands_without_scans_and_says_why(how):
     if how == "malformed":
         seeing.follower.take_scan(b"\0\1\0\0junk", seeing.now)
     elif how == "blind":
-        from fasaco_edge.wire.messages.scans import encode_scan
-
         seeing.follower.take_scan(encode_scan(nothing), seeing.now)
     elif how == "repeated":
         for _ in range(30):
@@ -129,11 +138,10 @@ def test_a_scan_says_what_it_does():
 
 def test_the_first_thing_on_a_line_with_corners_is_met():
     line = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]
-    met = first_met([Thing(1.1, 0.8, False), Thing(3.0, 0.0, False)], line, 0.2)
-    assert met is not None
+    way, _ = first_met([Thing(1.1, 0.8, False), Thing(3.0, 0.0, False)], line, 0.2)
     near = 0.2 + MARGIN_M
-    assert met.way == pytest.approx(1.0 + 0.8 - math.sqrt(near * near - 0.01))
-    assert first_met([Thing(-0.3, 0.0, False)], line, 0.2) is None
+    assert way == pytest.approx(1.0 + 0.8 - math.sqrt(near * near - 0.01))
+    assert first_met([Thing(-0.3, 0.0, False)], line, 0.2)[0] == math.inf
 
 
 def test_what_moves_behind_the_robot_does_not_hold_it():
@@ -141,10 +149,7 @@ def test_what_moves_behind_the_robot_does_not_hold_it():
     seeing.send((0.0, 0.0), (1.0, 0.0))
     seeing.run(0.5)
     assert seeing.follower.state is State.DRIVING
-    assert seeing.last.speed == pytest.approx(
-        min(LIMITS.acceleration * 0.45, LIMITS.speed), abs=0.1
-    )
-    assert Pose2D(0.0, 0.0).x < seeing.pose.x
+    assert seeing.last.speed == pytest.approx(0.45 * LIMITS.acceleration, abs=0.1)
 
 
 def test_people_are_seen_where_the_map_shows_something_too():
@@ -155,3 +160,42 @@ def test_people_are_seen_where_the_map_shows_something_too():
         seeing.send((0.0, 0.0), (5.0, 0.0))
         assert (State.OBSTACLE in seeing.run(7.5)) == stops
         assert not stops or seeing.touched_at[:1] in ([], [0.0])
+
+
+def map_with(cells, yaw=0.0):
+    geometry = GridGeometry(*cells.shape, 0.05, Pose2D(1.0, 2.0, yaw))
+    return geometry, encode_occupancy_grid(OccupancyGrid(geometry, cells, "map", 1))
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7])
+def test_the_map_shows_places_near_occupied_pixels_at_any_yaw(yaw):
+    cells = np.zeros((40, 60), np.int8)
+    cells[20, 30], cells[5, 5], cells[6, 50] = 100, 25, -1
+    geometry, payload = map_with(cells, yaw)
+    sight = Sight(Mount(), RADIUS_M)
+
+    def shown(col, row):
+        return sight._shows(*geometry.to_map(col, row))
+
+    assert not shown(30.5, 20.5)
+    sight.take_map(payload)
+    near, far = KNOWN_M / 0.05 - 0.01, KNOWN_M / 0.05 + 1.5
+    for angle in np.linspace(0.0, math.tau, 8, endpoint=False):
+        right, up = math.cos(angle), math.sin(angle)
+        assert shown(30.5 + near * right, 20.5 + near * up)
+        right, up = right / max(abs(right), abs(up)), up / max(abs(right), abs(up))
+        assert not shown(30.5 + far * right, 20.5 + far * up)
+    # Neither free nor unknown pixels are obstacles; beside the map there are none.
+    for col, row in ((5.5, 5.5), (50.5, 6.5), (-90.0, 20.0), (30.0, 90.0)):
+        assert not shown(col, row)
+
+
+def test_updates_change_the_map():
+    geometry, payload = map_with(np.zeros((40, 60), np.int8))
+    sight = Sight(Mount(), RADIUS_M)
+    patch = encode_map_update(MapPatch(Window(10, 10, 12, 13), np.full((2, 3), 100, np.int8)))
+    place = geometry.to_map(11.5, 11.0)
+    # Without a map an update says nothing; a map takes the place of all before it.
+    for update in (True, False, True, False):
+        sight.take_map(patch if update else payload, is_update=update)
+        assert sight._shows(*place) == (update and sight._grid is not None)

@@ -6,7 +6,7 @@ import pytest
 
 from fasaco_edge.daemon.loop.inbox import blocked_of
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.standstill import EVERY_S, REASONS, Standstill, floor_ahead, report_of
+from fasaco_edge.follow.standstill import EVERY_S, REASONS, Standstill, floor_ahead
 from fasaco_edge.follow.supervision import State
 from tests.follow.closed_loop import PERIOD_S
 from tests.follow.seeing import RADIUS_M, Disc, Seeing
@@ -18,9 +18,7 @@ def reports(seeing, seconds):
     standstill, found, begun = Standstill(), [], seeing.now
     for _ in range(round(seconds / PERIOD_S)):
         seeing.step()
-        held_s = standstill.look(seeing.follower, seeing.now)
-        if held_s is not None:
-            payload = report_of(seeing.follower, held_s, "a1", 7)
+        if (payload := standstill.report(seeing.follower, "a1", 7, seeing.now)) is not None:
             found.append((seeing.now - begun, payload))
     return found
 
@@ -97,17 +95,8 @@ def test_the_floor_ahead_of_a_stalled_base_lies_before_its_disc():
     ids=str,
 )
 def test_reports_beyond_a_limit_are_refused(wrong):
-    document = {
-        "daemon": "a1",
-        "revision": 1,
-        "reason": "obstacle",
-        "detail": "",
-        "held_s": 5.0,
-        "frame": "map",
-        "x": 0.0,
-        "y": 0.0,
-        "points": [],
-    }
+    document = {"daemon": "a1", "revision": 1, "reason": "obstacle", "detail": "", "held_s": 5.0}
+    document |= {"frame": "map", "x": 0.0, "y": 0.0, "points": []}
     assert blocked_of(json.dumps(document).encode()).points == ()
     with pytest.raises(MalformedMessage):
         blocked_of(json.dumps(document | wrong).encode())

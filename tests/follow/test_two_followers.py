@@ -12,7 +12,7 @@ from fasaco_edge.follow.daemons import NO_RIGHT
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import topics
 from tests.campaigns.fault_links import Link
-from tests.follow.nav2_missions import kind_of, nav2_follower, nav2_robot
+from tests.follow.nav2_missions import Robot, kind_of, nav2_follower
 from tests.follow.test_process import AHEAD, config_file
 from tests.support.driven_base import DrivenBase, follower_process
 from tests.support.waiting import until
@@ -43,12 +43,12 @@ def commands_a_second(base, seconds=1.5):
     return (len(base.heard) - count) / seconds
 
 
-@pytest.mark.parametrize("ros2", [{}, RMW], ids=["native", "ROS 2"])
-@pytest.mark.parametrize("ends", [signal.SIGTERM, signal.SIGKILL], ids=["ends", "is killed"])
+@pytest.mark.parametrize(("ends", "ros2"), [(signal.SIGTERM, {}), (signal.SIGKILL, RMW)])
 def test_the_second_waits_in_silence_and_takes_over(base, tmp_path, ends, ros2):
     if ros2:
         base.take_ros(7)
-    config = config_file(tmp_path, base.endpoint, ros2)
+    bus = {"listen": [], "connect": [base.endpoint], "mode": "client"}
+    config = config_file(tmp_path, bus=bus, ros2=ros2)
     first_log, second_log = tmp_path / "first", tmp_path / "second"
     with follower_process(base.endpoint, first_log, "--config", str(config)) as first:
         base.wait_until_it_moves()
@@ -136,7 +136,7 @@ def test_nav2_gets_goals_from_one_of_two(base, tmp_path):
     robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.4}
     (tmp_path / "second").mkdir()
     with (
-        nav2_robot(**robot) as nav2,
+        Robot(**robot) as nav2,
         nav2_follower(tmp_path, base.endpoint, kind_of(7)) as first,
     ):
         until(lambda: "driving" in first.read_text())

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.daemon.loop.outbox import headings
-from fasaco_edge.follow.follower import Follower
 from fasaco_edge.follow.supervision import State as Following
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
@@ -20,9 +19,8 @@ from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from fasaco_edge.simulation.world import World
 from fasaco_edge.wire.messages.paths import encode_path
-from tests.follow.closed_loop import CONFIG, LIMITS, ClosedLoop
+from tests.follow.closed_loop import CONFIG, ClosedLoop
 
 TOOL_M, RADIUS_M, CLEARANCE_M, TURN_M = 0.3, 0.2, 0.02, 0.4
 CELL_M = TOOL_M * 0.92
@@ -54,11 +52,7 @@ class CurvedMission:
 
     def __init__(self, ground, start: Pose2D, **options):
         self.mission = Mission(configured(**options))
-        self.loop = ClosedLoop(ground, start, delay_s=0.05)
-        self.loop.world = World(ground, start, replace(CONFIG, turn_radius_m=TURN_M))
-        self.loop.follower = Follower(replace(LIMITS, turn_radius=TURN_M))
-        self.loop.follower.take_planner("a1")
-        self.loop.follower.heard_status(0.0)
+        self.loop = ClosedLoop(ground, start, delay_s=0.05, turn_m=TURN_M)
         self.paths, self.longest_s, self._plan = [], 0.0, None
         self._ground = ground
 
@@ -86,11 +80,6 @@ class CurvedMission:
             yaw = headings(xy) if decision.path.yaw is None else decision.path.yaw
             self.paths.append((now, decision.path))
             self.loop.follower.take_path(encode_path(xy, yaw, "map", round(1e9 * now)))
-
-    @property
-    def track(self):
-        points = np.array([(pose.x, pose.y) for pose in self.loop.truth_at])
-        return points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1e-9)]
 
     @property
     def standing_s(self):

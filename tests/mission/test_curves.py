@@ -40,7 +40,7 @@ def driven():
 
 def judged(run):
     """The floor that the planner holds for reachable, and what was swept of it."""
-    return judge_floor(ROOM, run.track, SweepingRobot(TOOL_M, RADIUS_M), stands_at=(1.0, 1.0))
+    return judge_floor(ROOM, run.loop.trail, SweepingRobot(TOOL_M, RADIUS_M), stands_at=(1.0, 1.0))
 
 
 def test_a_mission_sweeps_a_room_without_a_turn_on_the_spot(driven):
@@ -49,7 +49,7 @@ def test_a_mission_sweeps_a_room_without_a_turn_on_the_spot(driven):
     assert set(driven.standing_s) <= {Following.EMPTY_PATH}
     assert judged(driven).figures.swept_share > 0.94
     hull = SweepingRobot(TOOL_M, CONFIG.hull_radius_m)
-    assert judge_floor(ROOM, driven.track, hull).figures.illegal_share == 0.0
+    assert judge_floor(ROOM, driven.loop.trail, hull).figures.illegal_share == 0.0
 
 
 def test_a_path_is_a_curve_at_its_beginning(driven):

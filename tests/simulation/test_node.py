@@ -4,11 +4,12 @@ import itertools
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
 import time
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,36 +37,44 @@ ROBOT = """
 import json, sys
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.node import run_simulation
+from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import World
 from fasaco_edge.wire.keys import Keys
 from tests.simulation.rooms import building
 
 world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
-result = run_simulation(world, Keys("r1"), BusSettings(connect=(sys.argv[1],)), speed=40.0)
-print(json.dumps({"track": world.track.tolist(), "distance_m": result.distance_m,
-                  "sim_s": result.sim_s, "collisions": result.collisions}))
+run_simulation(world, Keys("r1"), BusSettings(connect=(sys.argv[1],)), speed=40.0)
+print(json.dumps([world.track.tolist(), world.stamp_ns, world.collisions]))
 """
+
+
+def new_world():
+    return World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
 
 
 class Planner:
     """What a planner sees and says: maps and poses come in, paths go out."""
 
     def __init__(self, robot):
-        with socket.socket() as free:
-            free.bind(("127.0.0.1", 0))
-            self.endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
-        self.keys = Keys(robot)
-        self.maps, self.poses = [], []
+        self.endpoint, self.keys = free_endpoint(), Keys(robot)
+        self.maps, self.poses, self.reports = [], [], []
         self.bus = open_bus(BusSettings(mode="router", connect=(), listen=(self.endpoint,)))
         self.bus.listen(self.keys, topics.MAP, self.maps.append)
         self.bus.listen(self.keys, topics.POSE, self.poses.append)
         self._path = self.bus.advertise(self.keys, topics.PATH)
 
+    def run(self, world, is_done, **options):
+        """Run the robot until a condition holds, or for a minute."""
+        settings, ends = BusSettings(connect=(self.endpoint,)), time.monotonic() + 60.0
+        run_simulation(
+            world, self.keys, settings, **options, report=self.reports.append,
+            should_stop=lambda: is_done() or time.monotonic() > ends,
+        )  # fmt: skip
+
     @property
-    def settings(self):
-        return BusSettings(connect=(self.endpoint,))
+    def refused(self):
+        return self.reports[-1].refused if self.reports else 0
 
     def send(self, xy, frame="map"):
         self._path.put(encode_path(xy, np.zeros(len(xy)), frame, 1))
@@ -111,92 +120,58 @@ def test_a_robot_in_another_process_maps_and_drives_until_ended(planner):
         robot.kill()
         robot.wait()
     assert robot.returncode == 0
-    result = json.loads(output)
-    assert result["collisions"] == 0
-    assert distances_to(np.array(result["track"]), path).max() < 0.03
+    track, stamp_ns, collisions = json.loads(output)
+    assert collisions == 0
+    assert distances_to(np.array(track), path).max() < 0.03
     # Its last words are its final state.
-    until(lambda: planner.pose().stamp_ns == round(result["sim_s"] * 1e9))
+    until(lambda: planner.pose().stamp_ns == stamp_ns)
     last = planner.map()
-    assert last.stamp_ns == planner.pose().stamp_ns
+    assert last.stamp_ns == stamp_ns
     assert np.count_nonzero(last.cells != -1) > np.count_nonzero(first.cells != -1)
 
 
 def test_bad_paths_cost_only_themselves(planner):
-    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
-    reports = []
-    stages = iter(
-        [
-            (lambda: world.stamp_ns > 0, planner.send_rubbish),
-            (lambda: refused(1), lambda: planner.send(centres((2, 2), (2, 5)), frame="odom")),
-            (lambda: refused(2), lambda: planner.send(centres((2, 2), (2, 5)))),
-            (lambda: world.activity is Activity.DRIVING, lambda: None),
-            (lambda: world.activity is Activity.IDLE, lambda: None),
-        ]
-    )
-
-    def refused(count):
-        return bool(reports) and reports[-1].refused == count
-
-    stage = [next(stages)]
-    ends = time.monotonic() + 120
+    world, path = new_world(), centres((2, 2), (2, 5))
+    stages = [
+        (lambda: world.stamp_ns > 0, planner.send_rubbish),
+        (lambda: planner.refused == 1, lambda: planner.send(path, frame="odom")),
+        (lambda: planner.refused == 2, lambda: planner.send(path)),
+        (lambda: world.activity is Activity.DRIVING, lambda: None),
+        (lambda: world.activity is Activity.IDLE, lambda: None),
+    ]
 
     def finished():
-        reached, act = stage[0]
-        if reached():
-            act()
-            stage[0] = next(stages, None)
-        return stage[0] is None or time.monotonic() > ends
+        if stages and stages[0][0]():
+            stages.pop(0)[1]()
+        return not stages
 
-    result = run_simulation(
-        world,
-        planner.keys,
-        planner.settings,
-        speed=20.0,
-        should_stop=finished,
-        report=reports.append,
-    )
-    assert stage[0] is None
-    assert reports[-1].refused == 2
-    assert world.track[-1] == pytest.approx(centres((2, 5))[0], abs=2e-3)
-    assert result.distance_m == pytest.approx(reports[-1].distance_m)
-    assert all(0.0 < report.speed < 40.0 for report in reports[1:])
+    planner.run(world, finished, speed=20.0)
+    assert stages == []
+    assert planner.refused == 2
+    assert world.track[-1] == pytest.approx(path[-1], abs=2e-3)
+    assert all(0.0 < report.speed < 40.0 for report in planner.reports[1:])
 
 
 def test_velocities_drive_it_and_it_stops_by_itself_without_them(planner):
-    config = SimulationConfig()
-    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), config)
+    world = new_world()
     velocities = planner.bus.advertise(planner.keys, topics.CMD_VEL)
-    reports = []
-    fast = encode_velocity(Velocity(99.0, 0.0))
 
     def driven():
         # A path is nothing to it, nor is what is no velocity.
         planner.send(centres((2, 2), (2, 5)))
         velocities.put(b"rubbish")
-        velocities.put(fast)
+        velocities.put(encode_velocity(Velocity(99.0, 0.0)))
         return world.distance_m > 0.5
 
-    def drive(until):
-        return run_simulation(
-            world,
-            planner.keys,
-            planner.settings,
-            driver="follow",
-            should_stop=until,
-            report=reports.append,
-        )
-
-    ends = time.monotonic() + 60
-    result = drive(lambda: driven() or time.monotonic() > ends)
-    assert result.distance_m > 0.5
-    assert result.refused > 0
-    seconds = result.sim_s
+    planner.run(world, driven, driver="follow")
+    driven_m, seconds = world.distance_m, 1e-9 * world.stamp_ns
+    assert planner.refused > 0
     # No faster than it can.
-    assert result.distance_m <= config.speed_m_s * seconds
-    still = drive(lambda: world.stamp_ns * 1e-9 > seconds + 2.0)
-    assert still.activity is Activity.IDLE
+    assert 0.5 < driven_m <= world.config.speed_m_s * seconds
+    planner.run(world, lambda: 1e-9 * world.stamp_ns > seconds + 2.0, driver="follow")
+    assert world.activity is Activity.IDLE
     # Half a second at full speed, and the way to rest.
-    assert still.distance_m - result.distance_m < 0.25 * 0.55 + 0.25**2 / 1.0 + 0.01
+    assert world.distance_m - driven_m < 0.25 * 0.55 + 0.25**2 / 1.0 + 0.01
 
 
 def test_a_fast_robot_waits_for_what_drives_it(planner):
@@ -204,80 +179,47 @@ def test_a_fast_robot_waits_for_what_drives_it(planner):
 
     Without that the robot drove on for half a second by each velocity, past its stops.
     """
-    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
+    world, gone = new_world(), []
     velocities = planner.bus.advertise(planner.keys, topics.CMD_VEL)
-    speed = encode_velocity(Velocity(0.25, 0.0))
-    gone = []
 
     def told_ten_times():
         if not gone or world.stamp_ns > gone[-1]:
             time.sleep(0.1)
             gone.append(world.stamp_ns)
-            velocities.put(speed)
+            velocities.put(encode_velocity(Velocity(0.25, 0.0)))
         return len(gone) >= 10 and world.distance_m > 0.0
 
-    ends = time.monotonic() + 60
-    result = run_simulation(
-        world,
-        planner.keys,
-        planner.settings,
-        speed=40.0,
-        driver="follow",
-        should_stop=lambda: told_ten_times() or time.monotonic() > ends,
-    )
+    planner.run(world, told_ten_times, speed=40.0, driver="follow")
     moved_s = [(after - before) * 1e-9 for before, after in itertools.pairwise(gone)]
     assert max(moved_s[2:]) <= 0.13, moved_s
     # Nobody tells it any more: it goes on without, and comes to rest.
-    still = run_simulation(
-        world,
-        planner.keys,
-        planner.settings,
-        speed=40.0,
-        driver="follow",
-        should_stop=lambda: world.stamp_ns * 1e-9 > result.sim_s + 2.0,
-    )
-    assert still.activity is Activity.IDLE
+    ends_ns = world.stamp_ns + 2_000_000_000
+    planner.run(world, lambda: world.stamp_ns > ends_ns, speed=40.0, driver="follow")
+    assert world.activity is Activity.IDLE
 
 
 def test_it_runs_outside_the_main_thread_without_signal_handlers(planner):
-    before = signal.getsignal(signal.SIGTERM)
-    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
-    results = []
-
-    def run():
-        results.append(
-            run_simulation(
-                world,
-                planner.keys,
-                planner.settings,
-                speed=10.0,
-                should_stop=lambda: world.stamp_ns >= 2_000_000_000,
-            )
-        )
-
+    before, world = signal.getsignal(signal.SIGTERM), new_world()
+    run = partial(planner.run, world, lambda: world.stamp_ns >= 2_000_000_000, speed=10.0)
     thread = threading.Thread(target=run)
     thread.start()
     thread.join(20)
     assert not thread.is_alive()
-    assert results[0].sim_s >= 2.0
-    assert results[0].distance_m == 0.0
+    assert world.stamp_ns >= 2_000_000_000
     assert signal.getsignal(signal.SIGTERM) is before
 
 
 def test_what_cannot_run_says_so():
-    world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
     with pytest.raises(BadConfiguration, match="speed"):
-        run_simulation(world, Keys(), BusSettings(), speed=0.0)
+        run_simulation(new_world(), Keys(), BusSettings(), speed=0.0)
     with pytest.raises(BusUnavailable):
-        run_simulation(world, Keys(), BusSettings(connect=("tcp/127.0.0.1:1",)))
+        run_simulation(new_world(), Keys(), BusSettings(connect=("tcp/127.0.0.1:1",)))
 
 
 def test_it_waits_for_a_bus_that_is_not_there_yet():
     """As the daemon and `follow` do: a bare base's manual starts the robot first."""
     endpoint = free_endpoint()
-    words = [*PROGRAM, "simulate", "office", "--connect", endpoint]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
-        assert b"waiting for the bus at " + endpoint.encode() in robot.stderr.readline()
+    with waiting_robot(endpoint) as robot:
         heard = threading.Event()
         with open_bus(BusSettings(mode="router", connect=(), listen=(endpoint,))) as bus:
             bus.listen(Keys(), topics.MAP, lambda _: heard.set())
@@ -287,9 +229,15 @@ def test_it_waits_for_a_bus_that_is_not_there_yet():
 
 
 def test_stopped_before_it_has_joined_it_ends_in_order():
-    words = [*PROGRAM, "simulate", "office", "--connect", free_endpoint()]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
-        assert b"waiting for the bus" in robot.stderr.readline()
+    with waiting_robot(free_endpoint()) as robot:
         robot.terminate()
         assert robot.wait(30.0) == 0
         assert robot.stderr.read() == b""
+
+
+@contextmanager
+def waiting_robot(endpoint):
+    words = [*PROGRAM, "simulate", "office", "--connect", endpoint]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
+        assert b"waiting for the bus at " + endpoint.encode() in robot.stderr.readline()
+        yield robot

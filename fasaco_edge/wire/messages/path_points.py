@@ -6,18 +6,23 @@ and the next path replaces it long before its end is driven.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.limits import MAX_PATH_POSES
 from fasaco_edge.wire.messages.cdr import CdrReader, refuse
 from fasaco_edge.wire.messages.fields import POSE, check_pose, read_header, yaw_of
 from fasaco_edge.wire.schemas import PATH
 
+# Poses are read this many at a time.
+CHUNK = 500
+
 LEAST_POSE_BYTES = 72
 """Size of a PoseStamped with an empty frame: stamp 8, length 4, NUL 1, padding 3, floats 56."""
 
 
 class PathPoints:
-    """The points of a path, in order.
+    """The points of a path, in order; iterated over, its poses, read as they are asked for.
 
     Attributes:
         frame: name of the frame of all poses.
@@ -42,9 +47,11 @@ class PathPoints:
         """
         return [(pose[0], pose[1]) for pose in self._take(most)]
 
-    def take_poses(self, most: int) -> list[Pose2D]:
-        """Return the next poses, at most ``most``; raises as ``take`` does."""
-        return [Pose2D(pose[0], pose[1], yaw_of(*pose[3:7])) for pose in self._take(most)]
+    def __iter__(self) -> Iterator[Pose2D]:
+        """Yield the next poses; raises as ``take`` does."""
+        while self.left:
+            for pose in self._take(CHUNK):
+                yield Pose2D(pose[0], pose[1], yaw_of(*pose[3:7]))
 
     def _take(self, most: int) -> list[tuple[float, ...]]:
         poses = []

@@ -25,8 +25,7 @@ from fasaco_edge.grid.lattice import UNKNOWN as UNKNOWN_CELL
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived
-from fasaco_edge.simulation.noise import MapperNoise
-from fasaco_edge.simulation.noisy_mapper import NoisyMapper
+from fasaco_edge.simulation.noisy_mapper import MapperNoise, NoisyMapper
 from fasaco_edge.simulation.robot import SimulationConfig
 from tests.benchmarks.online.buildings import Building
 

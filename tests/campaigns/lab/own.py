@@ -16,7 +16,7 @@ from fasaco_edge.follow.estimate import STAND, Command
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, ranges_of
-from fasaco_edge.simulation.noise import MapperNoise
+from fasaco_edge.simulation.noisy_mapper import MapperNoise
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from tests.campaigns.lab.building import Building
@@ -25,11 +25,11 @@ from tests.campaigns.lab.settings import BEAMS, MOST_RANGE_M, TICK_S, LabSetting
 FRAME = "map"
 MAP_EVERY_S = 3.0
 # Rough: twice as much of all, legs that are seldom seen, and jumps.
-NOISES = {
-    "none": MapperNoise.none(),
+NOISES: dict[str, MapperNoise | None] = {
+    "none": None,
     "usual": MapperNoise(),
-    "range": replace(MapperNoise.none(), range_m=0.02, shift_m=0.05),
-    "legs": replace(MapperNoise.none(), leg_misses=0.9, specks=0.002, shift_m=0.05),
+    "range": replace(MapperNoise().times(0.0), range_m=0.02, shift_m=0.05),
+    "legs": replace(MapperNoise().times(0.0), leg_misses=0.9, specks=0.002, shift_m=0.05),
     "drift": replace(MapperNoise(), drift_m=0.015, drift_rad=0.005),
     "jumps": replace(MapperNoise(), jumps=0.03),
     "late": replace(MapperNoise(), late_s=0.3),
@@ -65,7 +65,8 @@ class OwnBase:
             pose_hz=1.0 / TICK_S,
             turn_radius_m=settings.turn_radius_m,
         )
-        noise = replace(NOISES[settings.own], seed=settings.seed)
+        noise = NOISES[settings.own]
+        noise = replace(noise, seed=settings.seed) if noise else None
         truth = OccupancyGrid(building.geometry, cells, FRAME)
         self.world = World(truth, building.start, config, noise)
         self._truth = truth
@@ -93,7 +94,7 @@ class OwnBase:
     def tick(self) -> None:
         """Move on by a tick."""
         emission = self.world.tick()
-        self.wheels = Command(*self.world.velocity)
+        self.wheels = Command(self.world.drive.speed, self.world.drive.turn_rate)
         self.touches = self.world.activity is Activity.COLLIDED
         self.pose = emission.pose.pose if emission.pose is not None else self.pose
         self.map = emission.map or self.map
@@ -119,7 +120,7 @@ class OwnMapper:
     @property
     def loops(self) -> int:
         """How many loops were closed."""
-        return self._base.world.loops
+        return self._base.world.mapper.loops
 
     def corrected(self, _odometry: Pose2D) -> Pose2D:
         """Return the newest pose that the mapper has published."""

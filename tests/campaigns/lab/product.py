@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.cli.follow import limits_of
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.inbox import blocked_of, make_mailbox
@@ -21,11 +22,11 @@ from fasaco_edge.daemon.loop.loop import TICK_S as LOOP_S
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
-from fasaco_edge.follow.estimate import Command, Limits
+from fasaco_edge.follow.estimate import Command
 from fasaco_edge.follow.follower import Follower
 from fasaco_edge.follow.scanner import Mount
-from fasaco_edge.follow.sight import Sight, SightSettings
-from fasaco_edge.follow.standstill import Standstill, report_of
+from fasaco_edge.follow.sight import Sight
+from fasaco_edge.follow.standstill import Standstill
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import Event, MapReceived, PoseReceived
@@ -128,9 +129,7 @@ class Product:
             self.follower.heard_status(now)
         self._step_mission(now)
         command = self.follower.step(now)
-        held_s = self._standstill.look(self.follower, now)
-        if held_s is not None:
-            said = report_of(self.follower, held_s, NAME, self._revision)
+        if (said := self._standstill.report(self.follower, NAME, self._revision, now)) is not None:
             self._events.append(blocked_of(said))
         return command
 
@@ -199,27 +198,13 @@ def _sight(config: DaemonConfig) -> Sight | None:
     """Return what the follower sees by; None without scans."""
     if not config.scan:
         return None
-    settings = SightSettings(
-        Mount(), config.robot.radius_m, config.scan.lost_s, config.map.free_at_most
-    )
-    return Sight(settings)
+    scan = config.scan
+    return Sight(Mount(), config.robot.radius_m, scan.lost_s, config.map.free_at_most)
 
 
 def _follower(config: DaemonConfig, sight: Sight | None) -> Follower:
     """Return a follower as ``fasaco-edge follow`` makes it."""
-    robot = config.robot
-    follower = Follower(
-        Limits(
-            robot.speed_m_s,
-            robot.acceleration_m_s2,
-            math.radians(robot.turning_deg_s()),
-            math.radians(robot.turn_deg_s2),
-            math.radians(robot.steered_deg),
-            robot.turn_radius_m,
-        ),
-        sight=sight,
-        radius=robot.radius_m,
-    )
+    follower = Follower(limits_of(config.robot), sight=sight, radius=config.robot.radius_m)
     follower.take_planner(NAME)
     return follower
 

@@ -1,0 +1,274 @@
+"""Goals of a ROS 2 action: requests to its server, cancellations until they are confirmed, and its
+client on the bus.
+
+rmw_zenoh shows the server's types and keys in its graph; a bridge does not, and is queried by name.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol, TypeVar
+
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.errors import MalformedMessage
+from fasaco_edge.wire.messages.docking import DockEnding
+from fasaco_edge.wire.messages.follow_path import (
+    ENDED_BEFORE,
+    NO_SUCH_GOAL,
+    TAKEN,
+    Ending,
+    decode_accepted,
+    decode_cancel,
+    encode_cancel,
+    encode_goal_id,
+)
+from fasaco_edge.wire.ros_keys import (
+    Call,
+    RosNode,
+    attachment,
+    bridge_keys,
+    gid_of,
+    served_keys,
+    server_tokens,
+)
+
+_Value = TypeVar("_Value")
+
+# Retry period of a cancellation [s].
+CANCEL_EVERY_S = 1.0
+# Limit on the goals cancelled at a time, the newest ones: a server drives no other.
+MOST_CANCELLED = 8
+# Timeout of a reply [s], and of a result, which comes only when the goal has ended.
+ANSWER_S, RESULT_S = 2.5, 300.0
+# How long the end of goals is waited for at the exit [s].
+END_S = 1.0
+# Period of searching the graph for the action's server [s].
+LOOK_EVERY_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class SendGoal:
+    """A request to begin a goal."""
+
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class AskResult:
+    """A query for the result of a goal; the reply comes when it has ended."""
+
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoal:
+    """A request to cancel a goal; it is repeated until the server confirms it."""
+
+    id: bytes
+
+
+Request = SendGoal | AskResult | CancelGoal
+
+
+class Sender(Protocol):
+    """Who sends goals, and takes what comes of them."""
+
+    def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
+        """Take in whether a goal was accepted; None without an answer: the server must end it."""
+
+    def take_ending(
+        self,
+        goal_id: bytes,
+        ending: Any,  # noqa: ANN401 - what ``read_ending`` returns
+        why: str,
+        now: float,
+    ) -> None:
+        """Take in how a goal ended; None if the server's words are malformed."""
+
+    def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
+        """Take in that a query for a result ended after some time [s] without a reply."""
+
+
+class Cancellations:
+    """The goals to cancel, each second until the server confirms it."""
+
+    def __init__(self) -> None:
+        # Time of the last request, by goal [s]; and the goals that the server has not answered:
+        # it may not know them yet.
+        self._asked_at: dict[bytes, float] = {}
+        self._unanswered: set[bytes] = set()
+
+    def add(self, goal_id: bytes) -> None:
+        """Cancel a goal."""
+        self._asked_at[goal_id] = -math.inf
+        while len(self._asked_at) > MOST_CANCELLED:
+            self.drop(next(iter(self._asked_at)))
+
+    def drop(self, goal_id: bytes) -> None:
+        """Take in that a goal has ended."""
+        self._asked_at.pop(goal_id, None)
+
+    @property
+    def are_open(self) -> bool:
+        """Whether the server has to confirm any."""
+        return bool(self._asked_at)
+
+    def take_sent(self, goal_id: bytes) -> None:
+        """Take in that a goal was sent."""
+        self._unanswered.add(goal_id)
+
+    def take_accepted(self, goal_id: bytes, accepted: bool | None) -> None:
+        """Take in whether a goal was accepted; None without an answer."""
+        self._unanswered.discard(goal_id)
+        if accepted is False:
+            self.drop(goal_id)
+        elif goal_id in self._asked_at:
+            self._asked_at[goal_id] = -math.inf
+
+    def take_answer(self, goal_id: bytes, code: int | None) -> None:
+        """Take in the answer to a cancellation; None without one."""
+        if goal_id not in self._unanswered and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
+            self.drop(goal_id)
+
+    def due(self, now: float) -> list[bytes]:
+        """Return the goals to cancel now."""
+        due = [goal for goal, at in self._asked_at.items() if now - at >= CANCEL_EVERY_S]
+        self._asked_at |= dict.fromkeys(due, now)
+        return due
+
+
+def said_of(ending: Ending | DockEnding, errors: Mapping[int, str], no_code: str) -> str:
+    """Return what a server says of a goal that failed: code, its name, and its words."""
+    code = f"{ending.code} {errors.get(ending.code, 'no code')}" if ending.code else no_code
+    return f"{code}: {ending.message}" if ending.message else code
+
+
+class ActionClient:
+    """Sends requests to the server of an action, and passes on its replies.
+
+    Args:
+        bus: the session.
+        ros: how ROS is connected to Zenoh, as in ``FollowSettings``.
+        action: its name.
+        types: its types.
+        sender: takes the replies, in ``turn``.
+        read_ending: decodes a result.
+        clock: returns the time for the sender [s].
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        ros: Mapping[str, Any],
+        action: str,
+        types: tuple[str, ...],
+        sender: Sender,
+        read_ending: Callable[[bytes], object],
+        clock: Callable[[], float],
+    ) -> None:
+        self._bus, self._sender = bus, sender
+        self._read_ending, self._clock = read_ending, clock
+        self._domain: int = ros["domain"]
+        self._action, self._types = action, types
+        self._cancellations = Cancellations()
+        self._sequence = 0
+        self._gid = b""
+        self._roll = None
+        # Replies, from Zenoh's threads.
+        self._replies = deque[Callable[[], None]]()
+        if ros["kind"] == "rmw_zenoh":
+            node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
+            self._gid = gid_of(f"{node.token}/{action}")
+            self._roll = bus.roll(server_tokens(self._domain, action))
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether the graph shows servers, and their types."""
+        return self._roll is not None
+
+    def keys(self) -> dict[Call, str]:
+        """Return the keys of the server's services; none if the graph shows no server."""
+        if self._roll is None:
+            return bridge_keys(self._action)
+        return served_keys(self._domain, self._action, self._roll.there(), self._types)
+
+    def turn(self) -> None:
+        """Look for the server and cancel goals, at intervals, and pass on the replies."""
+        if self._roll is not None:
+            self._roll.ask(LOOK_EVERY_S)
+        while self._replies:
+            self._replies.popleft()()
+        self._cancel()
+
+    def end(self) -> None:
+        """Wait a little until the server has confirmed all cancellations."""
+        ends = time.monotonic() + END_S
+        while self._cancellations.are_open and time.monotonic() < ends:
+            self.turn()
+            time.sleep(0.01)
+
+    def ask(self, request: Request, goal: bytes = b"") -> None:
+        """Send a request; ``goal``: what is sent to begin a goal."""
+        if isinstance(request, SendGoal):
+            self._cancellations.take_sent(request.id)
+            self._ask("send_goal", goal, partial(self._take_accepted, request.id))
+        elif isinstance(request, AskResult):
+            take = partial(self._take_result, request.id, time.monotonic())
+            self._ask("get_result", encode_goal_id(request.id), take)
+        else:
+            self._cancellations.add(request.id)
+            self._cancel()
+
+    def _cancel(self) -> None:
+        for goal_id in self._cancellations.due(time.monotonic()):
+            self._ask("cancel_goal", encode_cancel(goal_id), partial(self._take_cancelled, goal_id))
+
+    def _take_accepted(self, goal_id: bytes, reply: bytes | None) -> None:
+        accepted, why = self._read(decode_accepted, reply)
+        self._cancellations.take_accepted(goal_id, accepted)
+        self._sender.take_accepted(goal_id, accepted, why, self._clock())
+
+    def _take_result(self, goal_id: bytes, asked_at: float, reply: bytes | None) -> None:
+        if reply is None:
+            self._sender.take_silence(goal_id, time.monotonic() - asked_at, self._clock())
+        else:
+            ending, why = self._read(self._read_ending, reply)
+            if ending is not None:
+                self._cancellations.drop(goal_id)
+            self._sender.take_ending(goal_id, ending, why, self._clock())
+
+    def _take_cancelled(self, goal_id: bytes, reply: bytes | None) -> None:
+        self._cancellations.take_answer(goal_id, self._read(decode_cancel, reply)[0])
+
+    def _read(
+        self, decode: Callable[[bytes], _Value], reply: bytes | None
+    ) -> tuple[_Value | None, str]:
+        """Return what a reply says; None, and why, without a reply or for a malformed one."""
+        if reply is None:
+            return None, f"{self._action} did not answer"
+        try:
+            return decode(reply), ""
+        except MalformedMessage as error:
+            return None, str(error)
+
+    def _ask(self, call: Call, payload: bytes, take: Callable[[bytes | None], None]) -> None:
+        """Send a request; ``take`` gets the reply in ``turn``, None for none."""
+
+        def end(replies: list[Reply]) -> None:
+            reply = next((reply.payload for reply in replies if not reply.is_error), None)
+            self._replies.append(partial(take, reply))
+
+        key = self.keys().get(call)
+        if key is None:
+            end([])
+            return
+        self._sequence += 1
+        beside = attachment(self._sequence, time.time_ns(), self._gid) if self._gid else b""
+        timeout_s = RESULT_S if call == "get_result" else ANSWER_S
+        self._bus.ask(key, payload, beside, timeout_s, end)

@@ -1,0 +1,48 @@
+"""Cancellations: each second until the server confirms them, or knows the goal no more."""
+
+import pytest
+
+from fasaco_edge.follow.actions import MOST_CANCELLED, Cancellations
+from fasaco_edge.wire.messages.follow_path import ENDED_BEFORE, NO_SUCH_GOAL, REJECTED, TAKEN
+
+
+@pytest.fixture
+def cancellations():
+    cancellations = Cancellations()
+    cancellations.take_sent(b"a")
+    return cancellations
+
+
+@pytest.mark.parametrize("answer", [TAKEN, NO_SUCH_GOAL, ENDED_BEFORE, REJECTED, None])
+@pytest.mark.parametrize("accepted", [True, None])
+def test_a_goal_is_cancelled_each_second_until_the_server_confirms(cancellations, answer, accepted):
+    """Also one whose answer was lost: docking cancelled such a goal for good."""
+    cancellations.take_accepted(b"a", accepted)
+    cancellations.add(b"a")
+    assert [cancellations.due(now) for now in (5.0, 5.9, 6.0)] == [[b"a"], [], [b"a"]]
+    cancellations.take_answer(b"a", answer)
+    assert cancellations.are_open == (answer in (REJECTED, None))
+
+
+def test_a_goal_that_was_just_sent_is_cancelled_again_once_it_is_there(cancellations):
+    """The server may not know it yet when the request to cancel comes."""
+    cancellations.add(b"a")
+    assert cancellations.due(5.0) == [b"a"]
+    cancellations.take_answer(b"a", NO_SUCH_GOAL)
+    cancellations.take_accepted(b"a", True)
+    assert cancellations.due(5.1) == [b"a"]
+    cancellations.take_answer(b"a", TAKEN)
+    assert not cancellations.are_open
+
+
+@pytest.mark.parametrize("ends", [lambda c: c.take_accepted(b"a", False), lambda c: c.drop(b"a")])
+def test_a_goal_that_was_refused_or_has_ended_is_not_cancelled(cancellations, ends):
+    cancellations.add(b"a")
+    ends(cancellations)
+    assert cancellations.due(9.0) == []
+
+
+def test_without_any_answer_only_so_many_goals_are_cancelled(cancellations):
+    for number in range(500):
+        cancellations.add(bytes([number % 250, number // 250]))
+    assert len(cancellations.due(0.0)) == MOST_CANCELLED
