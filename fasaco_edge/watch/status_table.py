@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.client import phrases
-from fasaco_edge.text import one_line
+from fasaco_edge.text import duration, one_line
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
@@ -124,6 +124,8 @@ def _mission(mission: MissionReport) -> list[Row]:
         more.append("returns home")
     if mission.left_out:
         more.append(f"leaves out {', '.join(mission.left_out)}")
+    if mission.time_left_s is not None:
+        more.append(f"{duration(mission.time_left_s)} left")
     if more:
         rows.append(("", _text(", ".join(more))))
     if mission.unreached.cells:

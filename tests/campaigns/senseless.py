@@ -337,6 +337,7 @@ class Senseless:
             "passes": self._rng.choice([1] * 6 + [2, MOST_PASSES, MOST_PASSES + 1]),
             "return_home": self._rng.random() < 0.5,
             "keep_covered": self._rng.random() < 0.5,
+            "until_min": self._rng.choice([None, None, 0.0, 0.05, 5.0, 1440.0, 1441.0]),
         }
 
     def _room(self) -> int | str:
@@ -461,6 +462,7 @@ class Senseless:
                 "retry_s": self._rng.choice([0.2, 30.0]),
                 "lost_pose_s": self._rng.choice([0.0, 1.0, 3.0]),
                 "stale_map_s": self._rng.choice([0.0, 0.0, 2.0]),
+                "until_min": self._rng.choice([0.0, 0.0, 0.1, 60.0]),
                 "keep_out": self._near_polygons(),
             },
         }

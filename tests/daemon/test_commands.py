@@ -181,6 +181,17 @@ def test_a_keep_out_zone_is_kept_out_of_and_named(tmp_path):
         assert outsider.ask_status()["state"] == "covering"
 
 
+def test_an_order_ends_at_its_time_limit(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        answer = told(running, "start", "--until-min", "0.03", "--yes")
+        assert 0.0 < answer["mission"]["time_left_s"] <= 1.8
+        status = outsider.wait_status(lambda status: status["state"] == "done")
+        assert status["reason"].startswith("time is up after 0.03 min: ")
+        assert status["mission"]["time_left_s"] is None
+        assert status["mission"]["unreached"]["areas"][0]["reason"] == "no time left"
+
+
 def test_cancelled_it_stays_so_after_a_kill(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)

@@ -189,6 +189,7 @@ def mission_report(
         keep_outs=keep_outs,
         waits_for_room=order_state.waits_for or None,
         left_out=() if order is None else left_out(order.zones),
+        time_left_s=rounded(mission.time_limit.left_s) if mission else None,
     )
 
 

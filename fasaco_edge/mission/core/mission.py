@@ -37,6 +37,7 @@ from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import Trouble
 from fasaco_edge.mission.core.way_out import WayOut
@@ -78,6 +79,7 @@ class Mission:
         route: the path and the pending plan, with counts; read-only.
         company: the other robots; read-only.
         charging: the battery, and when to charge; read-only.
+        time_limit: when the order has to end; read-only.
     """
 
     def __init__(
@@ -118,6 +120,7 @@ class Mission:
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
         self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
+        self.time_limit = TimeLimit(config, self._map, self._orders)
         ordered = self._map, self._ledger, self._orders, self.route, self._line
         is_alone = self._kind is ALONE
         self._changes = OrderChanges(
@@ -131,7 +134,7 @@ class Mission:
             *owners, self._line, self._trail, *measured, self._changes, self._rooms
         )
         self.giving_way = self._kind.waiting(config, self._map, self.route, self.company)
-        decided_by = self._line, self.company, self.charging, self.giving_way
+        decided_by = self._line, self.company, self.charging, self.time_limit, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
         self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)

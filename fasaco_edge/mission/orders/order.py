@@ -36,6 +36,7 @@ from fasaco_edge.mission.orders.room_requests import (
 from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
 
 MOST_ZONES = 100
+Minutes = Annotated[float, Meta(ge=0, le=1440)]
 
 
 class LeftOut(NamedTuple):
@@ -96,6 +97,8 @@ class MissionOrder:
         keep_covered: whether the first pass skips cells that were covered before.
         unknown: what becomes of a zone whose name is not known yet: the order is refused, or waits
             for a room of that name.
+        until_min: time after which it ends, with the robot at home [min]; 0 for no limit, None for
+            the one of the configuration.
         given: the order as given, in the map frame, if the polygons are rotated, see
             ``rotated_order``.
     """
@@ -105,6 +108,7 @@ class MissionOrder:
     return_home: bool = False
     keep_covered: bool = False
     unknown: Unknown = "refuse"
+    until_min: float | None = None
     given: MissionOrder | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -187,6 +191,8 @@ class OrderDocument(_Document, frozen=True):
             settings say.
         unknown: what becomes of a zone whose name is not known: the order is refused, or the zone
             waits, after all others, for a room of that name.
+        until_min: time after which the order ends, with the robot at home [min]; 0 for no limit,
+            null for `mission.until_min` of the configuration.
     """
 
     zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
@@ -195,6 +201,7 @@ class OrderDocument(_Document, frozen=True):
     return_home: bool = False
     keep_covered: bool = False
     unknown: Unknown = "refuse"
+    until_min: Minutes | None = None
 
 
 class CommandDocument(_Document, frozen=True):
@@ -275,6 +282,7 @@ def order_document(order: MissionOrder) -> dict[str, object]:
         "return_home": order.return_home,
         "keep_covered": order.keep_covered,
     } | ({} if order.unknown == "refuse" else {"unknown": order.unknown})
+    rest |= {} if order.until_min is None else {"until_min": order.until_min}
     first = order.zones[0]
     if first.polygon is None:
         return {"passes": passes_document(first.passes, first.kinds), **rest}
@@ -326,6 +334,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         document.return_home,
         document.keep_covered,
         document.unknown,
+        document.until_min,
     )
     # Checks beyond types that need no map.
     names = [zone.name for zone in order.zones]

@@ -405,6 +405,8 @@ class Sequencer:
         """Continue an order after a change of the map: an automatic one that was over; and one on
         its way home if floor has opened, at most once more than there are retries."""
         state, run, area = self.order_state, self._run, self._map.area
+        if state.late:
+            return
         if state.automatic and state.stage is Stage.OVER:
             self.order_state = replace(state, stage=Stage.COVERING, why="")
         if state.stage is not Stage.RETURNING or area is None:
@@ -415,6 +417,18 @@ class Sequencer:
             self.order_state = replace(state, stage=Stage.RETRYING, begun=True)
             run.done, run.in_vain = -1, 0
             self._company.try_again()
+
+    def spend(self, seconds: float) -> None:
+        """Count the robot's time [s] since the last call."""
+        state = self.order_state
+        self.order_state = replace(state, spent_s=state.spent_s + seconds)
+
+    def run_out_of_time(self, minutes: float) -> None:
+        """End the order, as its time of so many minutes is up: at home, or on an errand at once."""
+        self._run.retry_at = None
+        self.order_state = self.order_state.out_of_time(minutes)
+        if self.order_state.errand:
+            self._end()
 
     def waiting_reason(self) -> str:
         """Return the reason of a wait before a retry as text."""
@@ -441,7 +455,8 @@ class Sequencer:
         run, order = self._run, self.order_state.order
         run.retry_at = None
         state = self.order_state = replace(self.order_state, stage=Stage.OVER)
-        run.ending = self._unreached.ending(state) + self._sum_up()
+        late = f"{state.late}: " if state.late else ""
+        run.ending = late + self._unreached.ending(state) + self._sum_up()
         area, free = self._map.area, self._map.free
         if order is not None and area is not None and free is not None:
             run.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
