@@ -1,12 +1,19 @@
 """Orders with a time limit: when the robot turns home, and what it says is left."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PoseReceived, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from tests.mission.battery import AT_DOCK, Battery
+from tests.mission.line_robot import CONFIG as LINES
+from tests.mission.line_robot import LineRobot
 from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
 
 # A cell takes a second.
@@ -65,6 +72,22 @@ def test_the_robot_is_home_in_time_and_says_what_is_left(own_clock):
     assert len(drive.visited) == 120
 
 
+def test_a_line_leads_straight_home():
+    policy = MissionPolicy(retries=0, until_min=2.0)
+    robot = LineRobot(np.zeros((60, 160), np.int8), (0.5, 0.5), replace(LINES, policy=policy))
+    zones = [
+        {"name": name, "polygon": [[x, 0], [x + 4, 0], [x + 4, 3], [x, 3]]}
+        for name, x in (("far", 4), ("near", 0))
+    ]
+    order = read_order({"zones": zones})
+    robot.step(CommandReceived(1, "start", order, discard=True))
+    began = robot.now
+    assert robot.wait(200.0, lambda robot: robot.mission.state is State.DONE)
+    # Floor beside its way is left for another time.
+    assert 90.0 < robot.now - began <= 122.0
+    assert robot.mission.reason.startswith("time is up after 2 min in zone 'far', before 'near': ")
+
+
 def test_the_limit_of_the_configuration_counts_where_the_order_gives_none():
     drive = Clocked(order={}, until_min=0.5)
     drive.finish()
@@ -77,6 +100,8 @@ def test_the_limit_of_the_configuration_counts_where_the_order_gives_none():
 def test_an_order_by_itself_ends_too_and_new_floor_does_not_reopen_it():
     drive = Battery(None, rows=HALL, dock=None, until_min=0.5)
     drive.run(State.DONE)
+    assert drive.now < 36.0
+    assert drive.cell == (0, 0)
     assert drive.mission.reason.startswith("time is up after 0.5 min: ")
     drive.tell(MapReceived(building(*HALL, *HALL)))
     assert (drive.mission.state, drive.request) == (State.DONE, None)

@@ -134,6 +134,7 @@ class Executive:
             return
         if not self.orders.order_state.errand:
             self.route.abandon()
+            self.route.want("time is up")
         self.orders.run_out_of_time(self.time_limit.minutes)
 
     def _give_way(self) -> Doing | None:

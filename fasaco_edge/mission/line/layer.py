@@ -192,8 +192,12 @@ class LineLayer:
 
     @property
     def _is_way(self) -> bool:
-        """Whether the path is only a way: home, to the dock or to a refuge."""
-        return bool(self._orders.order_state.errand) or self._route.aside is not None
+        """Whether the path is only a way: home, to the dock or to a refuge.
+
+        At the usual end of an order the line home sweeps what floor is left beside it.
+        """
+        state = self._orders.order_state
+        return bool(state.errand or state.late) or self._route.aside is not None
 
     def _lay(
         self, ahead: LineAhead, cells: NDArray[np.int32], pose: Pose2D, *, is_cut: bool = False
