@@ -124,10 +124,15 @@ def _mission(mission: MissionReport) -> list[Row]:
         more.append("returns home")
     if mission.left_out:
         more.append(f"leaves out {', '.join(mission.left_out)}")
-    if mission.time_left_s is not None:
-        more.append(f"{duration(mission.time_left_s)} left")
     if more:
         rows.append(("", _text(", ".join(more))))
+    limit = []
+    if mission.time_left_s is not None:
+        limit.append(f"home in {duration(mission.time_left_s)}")
+    if mission.first_from is not None:
+        limit.append(f"priority {mission.first_from}+ first")
+    if limit:
+        rows.append(("limit", _text(", ".join(limit))))
     if mission.unreached.cells:
         left = f"{_cells(mission.unreached.cells)}, {mission.unreached.m2:.1f} m2"
         rows.append(("unreached", _text(left)))

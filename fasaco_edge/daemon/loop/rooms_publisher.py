@@ -58,4 +58,5 @@ def _report(room: Room, cells: int, covered: int) -> RoomReport:
         swept=round(covered / cells, 4) if cells else None,
         passes=tuple(passes) if isinstance(passes, list) else passes,  # type: ignore[arg-type]
         skip=settings.skip,
+        priority=settings.priority,
     )

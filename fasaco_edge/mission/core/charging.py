@@ -234,6 +234,14 @@ class Charging:
         needed = max(policy.low, policy.reserve) + drain * SPARE * self._rest_s
         return min(policy.enough, max(needed, policy.low + BETWEEN))
 
+    @property
+    def may_work_s(self) -> float:
+        """How long the robot may go on from here until it has to go and charge [s]."""
+        level, drain = self.gauge.level, self.gauge.drain_per_s
+        if self.policy is None or level is None or not drain:
+            return float("inf")
+        return max(level - self.turns_back_at, 0.0) / drain
+
     def is_enough(self, now: float, *, docked: bool) -> bool:
         """Return whether the battery of a robot in its dock, or on its way there, suffices."""
         level = self.gauge.level
@@ -304,6 +312,7 @@ class Charging:
         is_last = (
             state.is_open and state.next_pass() is state and not self.orders.cells.is_exploring
         )
+        is_last = is_last and not self.orders.worth.least
         if not is_last or area is None or goal is None or cells is None or not len(cells):
             return None
         ends = [(int(row), int(col)) for row, col in (cells[0], cells[-1])]

@@ -130,7 +130,10 @@ class Executive:
 
     def _end_in_time(self) -> None:
         """End the order if the robot has to turn home to be there in time."""
-        if not self.time_limit.is_due(self._now):
+        is_due = self.time_limit.is_due(self._now)
+        may_work_s = self.time_limit.may_work_s(self._now)
+        self.orders.worth.allow(min(may_work_s, self.charging.may_work_s))
+        if not is_due:
             return
         if not self.orders.order_state.errand:
             self.route.abandon()
@@ -210,6 +213,8 @@ class Executive:
             self._checks.check_deviation(cell, now)
         if self._state is State.COVERING and self.company.has_members:
             self._checks.check_worth(now)
+        if self._state is State.COVERING:
+            self._checks.check_time(now)
         if reason := self.orders.begin(cell, now):
             self.route.want(reason)
         if reason := self._work.share(cell, now):

@@ -316,6 +316,11 @@ class Mission:
             else self._map.coverage(self._ledger, self._orders.known(lattice))
         )
 
+    @property
+    def first_from(self) -> int:
+        """The priority from which on floor is planned now; 0 while all is."""
+        return self._orders.worth.least
+
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return the areas of floor to sweep; None if cells are counted."""
         return self._line.to_sweep

@@ -27,6 +27,8 @@ from fasaco_edge.mission.orders.keep_outs import (
 )
 from fasaco_edge.mission.orders.passes import Passes, PassWord, passes_document, passes_of
 from fasaco_edge.mission.orders.room_requests import (
+    USUAL_PRIORITY,
+    Priority,
     RoomDocument,
     RoomNumber,
     RoomRequest,
@@ -39,12 +41,13 @@ MOST_ZONES = 100
 Minutes = Annotated[float, Meta(ge=0, le=1440)]
 
 
-class LeftOut(NamedTuple):
-    """A room that an order for everything leaves out: its title, its outline, holes in that."""
+class RoomArea(NamedTuple):
+    """A room in an order for everything: its title, its outline, holes in that, its priority."""
 
     title: str
     outline: Polygon
     holes: tuple[Polygon, ...] = ()
+    priority: int = USUAL_PRIORITY
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +64,9 @@ class Zone:
         room: number of the room that it is, whose outline it follows; 0 for none.
         holes: polygons within ``polygon`` that are not part of it.
         without: of everything: the rooms that are left out.
+        priority: where time or battery do not allow all, zones of higher priority come first; None
+            for that of its room, or the usual one.
+        ranked: of everything: the rooms with a priority of their own.
         is_as_usual: whether the order says nothing about passes, so that a room's settings apply.
     """
 
@@ -70,8 +76,15 @@ class Zone:
     kinds: tuple[Pass, ...] = ()
     room: int = 0
     holes: tuple[Polygon, ...] = ()
-    without: tuple[LeftOut, ...] = ()
+    without: tuple[RoomArea, ...] = ()
+    priority: int | None = None
+    ranked: tuple[RoomArea, ...] = ()
     is_as_usual: bool = field(default=False, compare=False)
+
+    @property
+    def worth(self) -> int:
+        """Its priority."""
+        return USUAL_PRIORITY if self.priority is None else self.priority
 
     def kind(self, number: int) -> Pass:
         """Return what is special about a pass, from 1."""
@@ -175,12 +188,15 @@ class ZoneDocument(_Document, frozen=True):
 
     Attributes:
         room: number of the room that it is: it follows the room's outline.
+        priority: where time or battery do not allow all, zones of higher priority come first; by
+            default that of its room, or 50.
     """
 
     name: PlaceName
     polygon: Corners | None = None
     passes: Passes | None = None
     room: RoomNumber | None = None
+    priority: Priority | None = None
 
 
 class OrderDocument(_Document, frozen=True):
@@ -294,7 +310,9 @@ def _zone_document(zone: Zone) -> dict[str, object]:
     says_none = zone.is_as_usual and zone.polygon == ()
     passes = {} if says_none else {"passes": passes_document(zone.passes, zone.kinds)}
     polygon = {"polygon": zone.polygon} if zone.polygon else {}
-    return {"name": zone.name, **passes, **polygon, **({"room": zone.room} if zone.room else {})}
+    room = {"room": zone.room} if zone.room else {}
+    priority = {} if zone.priority is None else {"priority": zone.priority}
+    return {"name": zone.name, **passes, **polygon, **room, **priority}
 
 
 def command_document(command: Command) -> dict[str, object]:
@@ -324,6 +342,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
             tuple(zone.polygon or ()),
             *(passes_of(zone.passes, f"zones[{index}].passes") if zone.passes else usual),
             room=zone.room or 0,
+            priority=zone.priority,
             is_as_usual=is_usual and zone.passes is None,
         )
         for index, zone in enumerate(document.zones)

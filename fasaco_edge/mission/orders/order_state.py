@@ -190,6 +190,21 @@ class OrderState:
         is_first = self.zone == 0 and self.pass_number == 1 and self.stage is Stage.COVERING
         return self.order is not None and (self.begun or not is_first)
 
+    def most_worthwhile_next(self) -> OrderState:
+        """Return the state with the zones from the present one on by priority, the highest first;
+        those that wait for a room stay last."""
+        assert self.order is not None
+        given, zones = self.order.as_given, self.order.zones
+        to_come = sorted(
+            range(self.zone, len(zones)), key=lambda at: (zones[at].polygon == (), -zones[at].worth)
+        )
+        sequence = [*range(self.zone), *to_come]
+        order = replace(self.order, zones=tuple(zones[at] for at in sequence))
+        if given is not self.order:
+            given = replace(given, zones=tuple(given.zones[at] for at in sequence))
+            order = replace(order, given=given)
+        return replace(self, order=order)
+
     def out_of_time(self, minutes: float) -> OrderState:
         """Return the state in which it ends, as its time of so many minutes is up."""
         late = f"time is up after {minutes:g} min"

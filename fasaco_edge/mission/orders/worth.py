@@ -1,0 +1,132 @@
+"""Worth: which floor is planned first where time or battery do not allow all, by its priority.
+
+Floor of the priorities that fit is one plan, so that its way is short; the rest comes after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.orders.order import RoomArea, Zone
+from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
+from fasaco_edge.mission.orders.zones import cells_of
+
+MOST_PRIORITY = 100
+# Share of the time left that floor planned first may take, as lines are longer than estimated.
+SHARE = 0.8
+
+
+@lru_cache(maxsize=2)
+def room_priorities(
+    ranked: tuple[RoomArea, ...], window: Window, cell_m: float
+) -> NDArray[np.uint8]:
+    """Return the priority of each cell of a window by its room, uint8 (rows, cols), read-only."""
+    found = np.full((window.rows, window.cols), USUAL_PRIORITY, np.uint8)
+    for room in ranked:
+        found[cells_of(room.outline, room.holes, window, cell_m)] = room.priority
+    found.flags.writeable = False
+    return found
+
+
+def least_priority(counts: NDArray[np.int64], cell_s: float, may_work_s: float) -> int:
+    """Return the priority from which on floor is planned first; 0 for all of it.
+
+    Args:
+        counts: int64 (101,), number of cells of each priority.
+        cell_s: time that a cell takes [s].
+        may_work_s: time left [s].
+    """
+    above = np.cumsum(counts[::-1])[::-1]
+    levels = np.flatnonzero(counts)[1:]
+    if above[0] * cell_s <= may_work_s or not levels.size:
+        return 0
+    fitting = levels[above[levels] * cell_s <= SHARE * may_work_s]
+    return int(fitting[0] if fitting.size else levels[-1])
+
+
+class WorthFirst:
+    """Decides which cells of the present zone are planned first; owns that decision.
+
+    Attributes:
+        least: priority from which on cells are planned now; 0 for all.
+        may_work_s: time left until the robot has to turn back [s].
+    """
+
+    def __init__(self, cell_m: float, step_s: float, zone: Callable[[], Zone | None]) -> None:
+        """Start without a limit; ``zone`` returns the zone being covered."""
+        self.least = 0
+        self.may_work_s = float("inf")
+        self._cell_m, self._zone = cell_m, zone
+        # Time that a cell takes; at first the least, by which too much is never put off [s].
+        self._cell_s = step_s
+        self._is_given_up = False
+
+    def begin(self) -> None:
+        """Note that a pass begins."""
+        self.least, self._is_given_up = 0, False
+
+    def allow(self, seconds: float) -> None:
+        """Note the time left until the robot has to turn back [s]."""
+        self.may_work_s = seconds
+
+    def give_up(self) -> None:
+        """Plan all floor of this pass from now on: cells of those planned first are not reached."""
+        self.least, self._is_given_up = 0, True
+
+    def are_too_many(self, cells: int) -> bool:
+        """Return whether there is no time for so many cells."""
+        return cells * self._cell_s > self.may_work_s
+
+    def first(self, cells: NDArray[np.bool_], window: Window) -> NDArray[np.bool_]:
+        """Return which of some cells, bool (rows, cols) of a window, are planned now."""
+        priorities = self._priorities(window) if self.least else None
+        return cells if priorities is None else cells & (priorities >= self.least)
+
+    def choose(self, cells: NDArray[np.bool_], window: Window) -> None:
+        """Choose what the next plan covers of the cells that can be, bool (rows, cols)."""
+        is_done = not self.first(cells, window).any() or self._priorities(window) is None
+        if self.least and is_done:
+            self.least = 0
+        if not self.least and self.may_work_s < float("inf"):
+            self.least = self._least_of(cells, window)
+
+    def is_other_first(self, cells: NDArray[np.bool_], window: Window, ahead_s: float) -> bool:
+        """Return whether other floor is planned first from now on.
+
+        Args:
+            cells: the cells that can be covered, bool (rows, cols) of the window.
+            window: of the lattice.
+            ahead_s: time that the path ahead takes, which covers what was planned [s].
+        """
+        cells = self.first(cells, window)
+        planned = int(np.count_nonzero(cells))
+        if not planned or ahead_s <= self.may_work_s:
+            return False
+        if not self.least:
+            self._cell_s = ahead_s / planned
+        least = self._least_of(cells, window, ahead_s / planned)
+        if not least:
+            return False
+        self.least = least
+        return True
+
+    def _least_of(
+        self, cells: NDArray[np.bool_], window: Window, cell_s: float | None = None
+    ) -> int:
+        priorities = None if self._is_given_up else self._priorities(window)
+        if priorities is None:
+            return 0
+        counts = np.bincount(priorities[cells], minlength=MOST_PRIORITY + 1)
+        return least_priority(counts, cell_s or self._cell_s, self.may_work_s)
+
+    def _priorities(self, window: Window) -> NDArray[np.uint8] | None:
+        """Return the priority of each cell, uint8 (rows, cols); None if all are alike."""
+        zone = self._zone()
+        if zone is None or not zone.ranked:
+            return None
+        return room_priorities(zone.ranked, window, self._cell_m)
