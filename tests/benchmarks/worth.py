@@ -1,7 +1,8 @@
 """Missions with half of the time they need: how much of the floor that matters is swept.
 
 ``python -m tests.benchmarks.worth flat office``: a robot drives lines over known maps, with every
-third room of a priority above the others, and without; judged by where it has been.
+third room of a priority above the others, or with a map of dirt, and without; judged by where it
+has been.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from fasaco_edge.mission.core.events import (
     MapReceived,
     PlanReady,
     PlanRequest,
+    PriorityReceived,
     State,
 )
 from fasaco_edge.mission.map.room_book import Room
@@ -36,6 +38,8 @@ from tests.mission.line_robot import CONFIG, SPEED_M_S, TOOL_M, LineRobot
 QUARTER_TURN_S, STEERED_RAD = 1.5, 0.02
 PROPOSALS = 500_000
 GROUPS, HIGH = 3, 90
+# Spots of dirt have this radius [m], and in all this share of the floor.
+SPOT_M, DIRTY = 0.7, 0.25
 # After so long all rooms are known; a mission that takes longer than this hangs [s].
 SETTLED_S, LONGEST_S = 60.0, 30_000.0
 
@@ -97,9 +101,18 @@ class Run(NamedTuple):
     reason: str
 
 
-def run(name: str, high: tuple[int, ...] = (), until_s: float = 0.0) -> tuple[Run, TurningRobot]:
-    """Sweep everything."""
+def run(
+    name: str,
+    high: tuple[int, ...] = (),
+    until_s: float = 0.0,
+    dirt: NDArray[np.bool_] | None = None,
+) -> tuple[Run, TurningRobot]:
+    """Sweep everything; ``high``: numbers of the rooms, ``dirt``: pixels, that matter."""
     robot = TurningRobot(name)
+    if dirt is not None:
+        robot.step(
+            PriorityReceived(replace(robot.grid, cells=np.where(dirt, HIGH, -1).astype(np.int8)))
+        )
     for number in high:
         robot.ask("room_set", room=RoomRequest(number, priority=HIGH))
     robot.ask("start", {"return_home": True, "until_min": until_s / 60.0})
@@ -144,20 +157,38 @@ def judged(name: str) -> Iterator[str]:
     plain, _ = run(name, until_s=until_s)
     half = f"in half of it {_share(plain, whole):.1%}"
     yield f"{name}: {len(rooms)} rooms, {whole.seconds:.0f} s; {half}"
-    for group in range(GROUPS):
+    for group in range(GROUPS if len(rooms) > 1 else 0):
         chosen = [room for room in rooms if room.id % GROUPS == group]
         wanted = np.zeros_like(whole.swept)
         for room in chosen:
             wanted |= inside(room, robot)
         first, _ = run(name, tuple(room.id for room in chosen), until_s)
-        floor = np.count_nonzero(whole.swept & wanted) / np.count_nonzero(whole.swept)
-        yield (
-            f"  {len(chosen)} rooms, {floor:.0%} of the floor: swept of these "
-            f"{_share(plain, whole, wanted):.1%} without, {_share(first, whole, wanted):.1%} with; "
-            f"of all {_share(plain, whole):.1%}, {_share(first, whole):.1%}; home after "
-            f"{first.seconds / until_s:.1%} of the time"
-        )
-        yield f"    {first.reason}"
+        yield f"  {len(chosen)} rooms, " + _compared(whole, plain, first, wanted, until_s)
+    for seed in range(GROUPS):
+        spots = spots_of(whole.swept, robot.grid.geometry.resolution, seed)
+        first, _ = run(name, until_s=until_s, dirt=spots)
+        yield "  spots of dirt, " + _compared(whole, plain, first, spots, until_s)
+
+
+def spots_of(floor: NDArray[np.bool_], pixel_m: float, seed: int) -> NDArray[np.bool_]:
+    """Return spots with a share of some floor, bool (rows, cols)."""
+    rng, found = np.random.Generator(np.random.PCG64(seed)), np.zeros_like(floor)
+    rows, cols = np.mgrid[: floor.shape[0], : floor.shape[1]]
+    places = np.argwhere(floor)
+    while (found & floor).sum() < DIRTY * floor.sum():
+        row, col = places[rng.integers(len(places))]
+        found |= (rows - row) ** 2 + (cols - col) ** 2 <= (SPOT_M / pixel_m) ** 2
+    return found
+
+
+def _compared(whole: Run, plain: Run, first: Run, wanted: NDArray[np.bool_], until_s: float) -> str:
+    floor = float((whole.swept & wanted).sum()) / float(whole.swept.sum())
+    return (
+        f"{floor:.0%} of the floor: swept of these "
+        f"{_share(plain, whole, wanted):.1%} without, {_share(first, whole, wanted):.1%} with; "
+        f"of all {_share(plain, whole):.1%}, {_share(first, whole):.1%}; home after "
+        f"{first.seconds / until_s:.1%} of the time"
+    )
 
 
 def _share(one: Run, whole: Run, where: NDArray[np.bool_] | None = None) -> float:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.core.events import State
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import CommandReceived, PriorityReceived, State
+from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import order_document, read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.placing import are_same
@@ -136,7 +139,58 @@ def test_what_comes_first_and_cannot_be_reached_does_not_keep_the_rest():
         assert drive.mission.first_from == 80
     assert not orders.note_path_end("")
     assert drive.mission.first_from == 0
-    assert finish(drive)[0] == 90, "as without priorities"
+    problem = drive.command("replan").plan.problem
+    assert np.count_nonzero(problem.to_cover) > 150, "the other room, too"
+
+
+def dirt(value, frame="map", columns=EAST_COLUMNS):
+    """A dirt map of cells as wide as the lattice's: a value in some columns, else none."""
+    cells = np.full((10, 21), -1, np.int8)
+    cells[:, list(columns)] = value
+    return PriorityReceived(OccupancyGrid(GridGeometry(10, 21, 0.25, Pose2D(0, 0)), cells, frame))
+
+
+def test_a_map_of_dirt_says_what_comes_first():
+    drive = settled(*BOTH)
+    drive.tell(dirt(90))
+    drive.command("start", {"until_min": TIGHT_MIN})
+    drive.plan()
+    assert drive.mission.first_from == 90
+    west, east = finish(drive)
+    assert east == 90
+    assert west < 60
+    # It also holds in a mission that succeeds this one, and within zones.
+    after = Mission(drive.config)
+    after.restore_order(WAITS)
+    after.step(drive.mission.held(), 0.0)
+    order = {"zones": [{"name": "all", "polygon": rectangle(0, 0, 10, 21)}], "until_min": 2.5}
+    decision = after.step([CommandReceived(1, "start", read_order(order), discard=True)], 1.0)
+    assert after.first_from == 90
+    assert np.count_nonzero(decision.plan.problem.to_cover) == 90
+
+
+def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
+    drive = ranked(80, until_min=TIGHT_MIN)
+    drive.plan()
+    assert drive.mission.first_from == 80
+    for _ in range(5):
+        tick(drive)
+    drive.tell(dirt(95, columns=WEST_COLUMNS))
+    assert (drive.request.reason, drive.mission.first_from) == ("priorities have changed", 95)
+    assert finish(drive)[0] == 90
+    drive = ranked(None, until_min=60.0)
+    drive.plan()
+    drive.tell(dirt(95))
+    assert (drive.request, drive.mission.first_from) == (None, 0)
+
+
+def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
+    drive = settled(*BOTH)
+    (fault,) = drive.tell(dirt(90, frame="odom")).faults
+    assert (fault.code, str(fault)) == ("wrong_frame", "priorities in frame 'odom', map in 'map'")
+    drive.command("start", {"until_min": TIGHT_MIN})
+    drive.plan()
+    assert drive.mission.first_from == 0
 
 
 WEST, EAST = rectangle(0, 0, 10, 10), rectangle(0, 11, 10, 21)

@@ -29,6 +29,7 @@ from fasaco_edge.mission.core.events import (
     MapReceived,
     PathUpdate,
     PoseReceived,
+    PriorityReceived,
     State,
 )
 from fasaco_edge.mission.core.executive import Executive
@@ -186,11 +187,13 @@ class Mission:
             self._map.watch_on(before._map.building)
 
     def held(self) -> list[Event]:
-        """Return the newest map and pose as events for a succeeding mission."""
+        """Return the newest map, pose and priorities as events for a succeeding mission."""
         monitor = self._executive.monitor
+        priorities = self._rotation.grid(self._orders.worth.given)
         return [
             *([MapReceived(self.grid, monitor.map_at)] if self.grid is not None else []),
             *([PoseReceived(self.pose, monitor.pose_at)] if self.pose is not None else []),
+            *([PriorityReceived(priorities)] if priorities is not None else []),
         ]
 
     @property

@@ -95,6 +95,7 @@ class Sequencer:
         self.worth = WorthFirst(
             *(config.footprint.cell_m, config.cost.step_s),
             lambda: self.order_state.current_zone,
+            lambda: map_state.grid.frame if map_state.grid is not None else "",
         )
         self._unreached = UnreachedFinder(map_state, ledger)
         # Cached result: whether a retry is worthwhile, for a given map and ledger.

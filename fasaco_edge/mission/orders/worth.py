@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.order import RoomArea, Zone
-from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
 from fasaco_edge.mission.orders.zones import cells_of
 
 MOST_PRIORITY = 100
@@ -23,10 +23,11 @@ SHARE = 0.8
 
 @lru_cache(maxsize=2)
 def room_priorities(
-    ranked: tuple[RoomArea, ...], window: Window, cell_m: float
+    ranked: tuple[RoomArea, ...], others: int, window: Window, cell_m: float
 ) -> NDArray[np.uint8]:
-    """Return the priority of each cell of a window by its room, uint8 (rows, cols), read-only."""
-    found = np.full((window.rows, window.cols), USUAL_PRIORITY, np.uint8)
+    """Return the priority of each cell of a window by its room, uint8 (rows, cols), read-only;
+    ``others`` is that of other rooms."""
+    found = np.full((window.rows, window.cols), others, np.uint8)
     for room in ranked:
         found[cells_of(room.outline, room.holes, window, cell_m)] = room.priority
     found.flags.writeable = False
@@ -55,13 +56,24 @@ class WorthFirst:
     Attributes:
         least: priority from which on cells are planned now; 0 for all.
         may_work_s: time left until the robot has to turn back [s].
+        given: the priorities that came as a message; None for none.
     """
 
-    def __init__(self, cell_m: float, step_s: float, zone: Callable[[], Zone | None]) -> None:
-        """Start without a limit; ``zone`` returns the zone being covered."""
+    def __init__(
+        self,
+        cell_m: float,
+        step_s: float,
+        zone: Callable[[], Zone | None],
+        frame: Callable[[], str],
+    ) -> None:
+        """Start without a limit; ``zone`` and ``frame`` return the zone being covered, and the
+        frame of the map."""
         self.least = 0
         self.may_work_s = float("inf")
-        self._cell_m, self._zone = cell_m, zone
+        self.given: OccupancyGrid | None = None
+        self._cell_m, self._zone, self._frame = cell_m, zone, frame
+        # The priorities given by a message on the cells of a window, int16; -1 for none.
+        self._told: tuple[Window, NDArray[np.int16]] | None = None
         # Time that a cell takes; at first the least, by which too much is never put off [s].
         self._cell_s = step_s
         self._is_given_up = False
@@ -69,6 +81,16 @@ class WorthFirst:
     def begin(self) -> None:
         """Note that a pass begins."""
         self.least, self._is_given_up = 0, False
+
+    def take(self, given: OccupancyGrid | None) -> bool:
+        """Take priorities from a message; return whether a new plan has to follow them."""
+        self.given, self._told = given, None
+        return self.choose_anew()
+
+    def choose_anew(self) -> bool:
+        """Choose with the next plan what comes first; return whether a plan is wanted for that."""
+        was_chosen, self.least = self.least > 0, 0
+        return was_chosen
 
     def allow(self, seconds: float) -> None:
         """Note the time left until the robot has to turn back [s]."""
@@ -126,7 +148,20 @@ class WorthFirst:
 
     def _priorities(self, window: Window) -> NDArray[np.uint8] | None:
         """Return the priority of each cell, uint8 (rows, cols); None if all are alike."""
-        zone = self._zone()
-        if zone is None or not zone.ranked:
+        zone, told = self._zone(), None
+        if zone is not None and self.given is not None and self.given.frame == self._frame():
+            told = self._told_on(window, self.given)
+        if zone is None or not (zone.ranked or told is not None):
             return None
-        return room_priorities(zone.ranked, window, self._cell_m)
+        rooms = room_priorities(zone.ranked, zone.worth, window, self._cell_m)
+        return rooms if told is None else np.where(told < 0, rooms, told).astype(np.uint8)
+
+    def _told_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int16]:
+        if self._told is None or self._told[0] != window:
+            rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
+            centres = np.column_stack((cols.ravel(), rows.ravel())) * self._cell_m
+            # Beyond the grid the value is 0.
+            one_more = given.cells.astype(np.int16) + np.int16(1)
+            told = given.geometry.values_at(one_more, centres + 0.5 * self._cell_m) - np.int16(1)
+            self._told = window, told.reshape(window.rows, window.cols)
+        return self._told[1]
