@@ -292,7 +292,7 @@ class Sequencer:
         ends_home = home is not None and state.returns_home_next and area.contains(home)
         ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
         to_cover = self.cells.open_to_me(area)
-        if not attempt:
+        if not attempt and self.worth.is_limited:
             self.worth.choose(to_cover & reachable, lattice.window)
         ends_home = ends_home and not self.worth.least
         problem = CoverageProblem.of(

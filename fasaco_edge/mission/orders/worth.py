@@ -109,12 +109,17 @@ class WorthFirst:
         priorities = self._priorities(window) if self.least else None
         return cells if priorities is None else cells & (priorities >= self.least)
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether there may be something to choose."""
+        return self.least > 0 or self.may_work_s < float("inf")
+
     def choose(self, cells: NDArray[np.bool_], window: Window) -> None:
         """Choose what the next plan covers of the cells that can be, bool (rows, cols)."""
-        is_done = not self.first(cells, window).any() or self._priorities(window) is None
-        if self.least and is_done:
+        is_alike = self._priorities(window) is None
+        if is_alike or not self.first(cells, window).any():
             self.least = 0
-        if not self.least and self.may_work_s < float("inf"):
+        if not (is_alike or self.least):
             self.least = self._least_of(cells, window)
 
     def is_other_first(self, cells: NDArray[np.bool_], window: Window, ahead_s: float) -> bool:
