@@ -72,8 +72,8 @@ class WorthFirst:
         self.may_work_s = float("inf")
         self.given: OccupancyGrid | None = None
         self._cell_m, self._zone, self._frame = cell_m, zone, frame
-        # The priorities given by a message on the cells of a window, int16; -1 for none.
-        self._told: tuple[Window, NDArray[np.int16]] | None = None
+        # The priorities given by a message on the cells of a window, int8; -1 for none.
+        self._told: tuple[Window, NDArray[np.int8]] | None = None
         # Time that a cell takes; at first the least, by which too much is never put off [s].
         self._cell_s = step_s
         self._is_given_up = False
@@ -159,14 +159,20 @@ class WorthFirst:
         if zone is None or not (zone.ranked or told is not None):
             return None
         rooms = room_priorities(zone.ranked, zone.worth, window, self._cell_m)
-        return rooms if told is None else np.where(told < 0, rooms, told).astype(np.uint8)
+        return rooms if told is None else np.where(told < 0, rooms, told.view(np.uint8))
 
-    def _told_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int16]:
+    def _told_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
         if self._told is None or self._told[0] != window:
-            rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
-            centres = np.column_stack((cols.ravel(), rows.ravel())) * self._cell_m
-            # Beyond the grid the value is 0.
-            one_more = given.cells.astype(np.int16) + np.int16(1)
-            told = given.geometry.values_at(one_more, centres + 0.5 * self._cell_m) - np.int16(1)
-            self._told = window, told.reshape(window.rows, window.cols)
+            x: NDArray[np.float64] = np.arange(window.col0, window.col1)[None] + np.float64(0.5)
+            y: NDArray[np.float64] = np.arange(window.row0, window.row1)[:, None] + np.float64(0.5)
+            # As many numbers as cells, not more: a large building has half a million.
+            col, row = (
+                np.floor(at).astype(np.int32)
+                for at in given.geometry.to_pixels(self._cell_m * x, self._cell_m * y)
+            )
+            rows, cols = given.cells.shape
+            told = np.full((window.rows, window.cols), -1, np.int8)
+            inside = (row >= 0) & (col >= 0) & (row < rows) & (col < cols)
+            told[inside] = given.cells[row[inside], col[inside]]
+            self._told = window, told
         return self._told[1]
