@@ -386,6 +386,7 @@ _ROS_ROWS = (
     RosRow("map", "map", "in", MAP.schemas, latched=True, depth=1),
     RosRow("map_updates", "map_update", "in", MAP_UPDATE.schemas, latched=False, depth=256),
     RosRow("battery", "battery", "in", BATTERY.schemas, latched=False, depth=16),
+    RosRow("priority", "priority", "in", PRIORITY.schemas, latched=True, depth=1),
     RosRow("keep_out_mask", "keep_out_mask", "in", MAP.schemas, latched=True, depth=1),
     RosRow("scan", "scan", "in", SCAN.schemas, latched=False, depth=5),
     RosRow("pose", "pose", "in", POSE.schemas, latched=False, depth=POSE_DEPTH),
