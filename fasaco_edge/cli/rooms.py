@@ -26,6 +26,7 @@ examples:
   fasaco-edge rooms merge kitchen 5 --name "living room"
   fasaco-edge rooms set kitchen --passes auto,cross  a cross pass, wherever an order says nothing
   fasaco-edge rooms set bath --skip                  left out of orders for everything
+  fasaco-edge rooms set kitchen --priority 90        first, if there is no time for all
   fasaco-edge mission start --zone kitchen --zone "room 5"
 
 The daemon finds rooms on its map by itself, also without an order. Each has a number that no other
@@ -81,6 +82,12 @@ def _add_set(action: argparse.ArgumentParser) -> None:
         "--skip",
         action=argparse.BooleanOptionalAction,
         help="leave it out of orders for everything, or not any more",
+    )
+    action.add_argument(
+        "--priority",
+        type=int,
+        metavar="0..100",
+        help="higher ones come first where time or battery do not allow all (default: 50)",
     )
 
 
@@ -140,6 +147,8 @@ def _asked(args: argparse.Namespace) -> dict[str, object]:
                 room["passes"] = passes_document(len(args.passes), args.passes)
             if args.skip is not None:
                 room["skip"] = args.skip
+            if args.priority is not None:
+                room["priority"] = args.priority
     return {"command": f"room_{args.rooms_action}", "room": room}
 
 

@@ -37,6 +37,7 @@ class RosTopicNames(Section, frozen=True):
     map: str = "/map"
     map_updates: str = "/map_updates"
     battery: str = "/battery_state"
+    priority: str = "/floor_priority"
     keep_out_mask: str = "/keepout_filter_mask"
     scan: str = "/scan"
     pose: str = "/pose"
@@ -113,7 +114,7 @@ class RosConfig(Section, frozen=True):
     def inputs(self) -> dict[str, RosTopic]:
         """What daemon and recorder subscribe to, by the topic's name in the daemon."""
         poses = ("tf_static", "tf") if self.pose == "tf" else ("pose",)
-        names = ("map", "map_updates", "battery", *poses)
+        names = ("map", "map_updates", "battery", "priority", *poses)
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
     @property

@@ -46,7 +46,7 @@ from msgspec import structs
 from fasaco_edge.bus.access import HEADER_BYTES
 from fasaco_edge.bus.mailbox import Queue
 from fasaco_edge.config.config import DaemonConfig, MapConfig
-from fasaco_edge.wire.limits import MAX_BLOCKED_BYTES, MAX_POSE_BYTES
+from fasaco_edge.wire.limits import MAX_BLOCKED_BYTES, MAX_POSE_BYTES, MAX_PRIORITY_BYTES
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 
 MB = 1_000_000
@@ -88,14 +88,15 @@ def map_bytes(max_pixels: int) -> int:
 
 def most_bytes(kind: str, max_pixels: int) -> int:
     """Return the largest size of a sample of a kind [bytes]."""
-    if kind == "blocked":
-        return MAX_BLOCKED_BYTES
+    if kind in ("blocked", "priority"):
+        return MAX_BLOCKED_BYTES if kind == "blocked" else MAX_PRIORITY_BYTES
     return map_bytes(max_pixels) if kind in ("map", "map_update") else MAX_POSE_BYTES
 
 
 def queues(max_pixels: int) -> dict[str, Queue]:
     """Return the queue of each kind."""
     sizes = dict.fromkeys(("map", "map_update"), map_bytes(max_pixels))
+    sizes["priority"] = MAX_PRIORITY_BYTES
     sizes["blocked"] = QUEUE_LENGTHS["blocked"] * MAX_BLOCKED_BYTES
     return {
         kind: Queue(length, sizes.get(kind, QUEUED_BYTES)) for kind, length in QUEUE_LENGTHS.items()

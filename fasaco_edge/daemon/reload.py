@@ -40,6 +40,7 @@ CHANGEABLE = frozenset(
         "robot.steered_deg",
         "mission.retries",
         "mission.retry_s",
+        "mission.until_min",
         "mission.lost_pose_s",
         "mission.stale_map_s",
         "mission.zones",

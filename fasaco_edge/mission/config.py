@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from fasaco_edge.grid.geometry import FARTHEST_M, MAX_LATTICE_CELLS, Polygon, Pose2D
 from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT
-from fasaco_edge.mission.orders.order import MOST_ZONES, Errand, StandingZone
+from fasaco_edge.mission.orders.order import MOST_ZONES, Errand, Minutes, StandingZone
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 
@@ -62,6 +62,8 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         retry_s: pause before each retry [s].
         lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
+        until_min: time after which an order ends, with the robot at home, unless it says itself
+            [min]; 0 for no limit.
         zones: named zones that orders refer to.
         keep_out: polygons (x, y) [m] in the map frame that the robot never touches.
         keep_out_mask: file of a mask with further keep-out areas, see ``orders.mask``; "" for none.
@@ -79,6 +81,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     retry_s: Period = 30.0
     lost_pose_s: Period = 3.0
     stale_map_s: Period = 0.0
+    until_min: Minutes = 0.0
     zones: Annotated[tuple[StandingZone, ...], Meta(max_length=MOST_ZONES)] = ()
     keep_out: Annotated[tuple[Polygon, ...], Meta(max_length=MOST_KEEP_OUT)] = ()
     keep_out_mask: str = ""

@@ -71,6 +71,7 @@ def order_words(order: OrderDocument) -> str:
         )
         asked.append(f"keep out of {corners}")
     asked += ["return home"] * order.return_home + ["keep what is covered"] * order.keep_covered
+    asked += [f"at most {order.until_min:g} min"] if order.until_min else []
     return ", ".join(asked)
 
 

@@ -145,6 +145,7 @@ def _mission(mission: MissionReport) -> Digest:
             for zone in mission.zones[:MOST_AREAS]
         ],
         "left_out": list(mission.left_out),
+        "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
 

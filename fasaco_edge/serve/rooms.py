@@ -46,6 +46,7 @@ def _room(room: RoomReport, tint: int) -> Digest:
         "m2": round(room.area_m2, 1),
         "passes": room.passes,
         "skip": room.skip,
+        "priority": room.priority,
         "tint": tint,
         "label": label and [round(value, 2) for value in label],
     }

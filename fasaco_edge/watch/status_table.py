@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.client import phrases
-from fasaco_edge.text import one_line
+from fasaco_edge.text import duration, one_line
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
@@ -129,6 +129,13 @@ def _mission(mission: MissionReport) -> list[Row]:
         more.append(f"leaves out {', '.join(mission.left_out)}")
     if more:
         rows.append(("", _text(", ".join(more))))
+    limit = []
+    if mission.time_left_s is not None:
+        limit.append(f"home in {duration(mission.time_left_s)}")
+    if mission.first_from is not None:
+        limit.append(f"priority {mission.first_from}+ first")
+    if limit:
+        rows.append(("limit", _text(", ".join(limit))))
     if mission.unreached.cells:
         left = f"{_cells(mission.unreached.cells)}, {mission.unreached.m2:.1f} m2"
         rows.append(("unreached", _text(left)))

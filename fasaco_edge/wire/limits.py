@@ -62,3 +62,5 @@ MAX_BLOCKED_BYTES: Final = 16_384
 """Longest report of a robot that is blocked."""
 MAX_BLOCKED_POINTS: Final = 64
 """Limit on the points ahead of a robot in its report that it is blocked."""
+MAX_PRIORITY_BYTES: Final = 1_048_576
+"""Longest grid of priorities, of a byte a pixel: 250 m by 250 m of floor at 0.25 m."""

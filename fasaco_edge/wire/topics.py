@@ -85,6 +85,22 @@ KEEP_OUT_MASK = Topic(
     limits=("max_grid_cells", "max_grid_tilt"),
     one_publisher_s=10.0,
 )
+PRIORITY = Topic(
+    name="priority",
+    direction="in",
+    when="it has become known which floor matters how much, as by a map of dirt",
+    speaker="mapper",
+    listeners=("robot", "recorder"),
+    schemas=(schemas.OCCUPANCY_GRID,),
+    qos=Qos("data_low", cache=1),
+    queues=Queues(daemon=2, recorder=NEWEST),
+    is_input=True,
+    limits=(
+        *("max_priority_bytes", "min_resolution_m", "max_resolution_m", "max_grid_tilt"),
+        "queue_priority",
+    ),
+    one_publisher_s=60.0,
+)
 SCAN = Topic(
     name="scan",
     direction="in",
@@ -370,6 +386,7 @@ _ROS_ROWS = (
     RosRow("map", "map", "in", MAP.schemas, latched=True, depth=1),
     RosRow("map_updates", "map_update", "in", MAP_UPDATE.schemas, latched=False, depth=256),
     RosRow("battery", "battery", "in", BATTERY.schemas, latched=False, depth=16),
+    RosRow("priority", "priority", "in", PRIORITY.schemas, latched=True, depth=1),
     RosRow("keep_out_mask", "keep_out_mask", "in", MAP.schemas, latched=True, depth=1),
     RosRow("scan", "scan", "in", SCAN.schemas, latched=False, depth=5),
     RosRow("pose", "pose", "in", POSE.schemas, latched=False, depth=POSE_DEPTH),

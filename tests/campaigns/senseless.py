@@ -329,6 +329,7 @@ class Senseless:
             "zones": [
                 {"name": f"zone {number}", "polygon": self._polygon()}
                 | ({"passes": self._rng.choice([1, 2, MOST_PASSES])} if number % 2 else {})
+                | ({"priority": self._rng.choice([0, 50, 100, 101])} if number % 3 else {})
                 for number in range(zones + limit * self._rng.randint(0, 1))
             ]
             + ([{"name": str(self._room())}] if self._rng.random() < 0.3 else []),
@@ -337,6 +338,7 @@ class Senseless:
             "passes": self._rng.choice([1] * 6 + [2, MOST_PASSES, MOST_PASSES + 1]),
             "return_home": self._rng.random() < 0.5,
             "keep_covered": self._rng.random() < 0.5,
+            "until_min": self._rng.choice([None, None, 0.0, 0.05, 5.0, 1440.0, 1441.0]),
         }
 
     def _room(self) -> int | str:
@@ -353,7 +355,8 @@ class Senseless:
             return {"others": [self._room() for _ in range(self._rng.randint(1, 3))]}
         if command == "room_set":
             passes = self._rng.choice([1, 2, ["edge", "rest"], ["auto", "cross"]])
-            return {"passes": passes, "skip": self._rng.random() < 0.3}
+            priority = self._rng.choice([None, 0, 60, 100, 101])
+            return {"passes": passes, "skip": self._rng.random() < 0.3, "priority": priority}
         return {"name": f"r{self._rng.randint(1, 6)}"}
 
     def _polygon(self) -> list[list[float]]:
@@ -462,6 +465,7 @@ class Senseless:
                 "retry_s": self._rng.choice([0.2, 30.0]),
                 "lost_pose_s": self._rng.choice([0.0, 1.0, 3.0]),
                 "stale_map_s": self._rng.choice([0.0, 0.0, 2.0]),
+                "until_min": self._rng.choice([0.0, 0.0, 0.1, 60.0]),
                 "keep_out": self._near_polygons(),
             },
         }

@@ -9,13 +9,24 @@ import signal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fasaco_edge.cli import main
 from tests.daemon.test_mission import about, planned
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process, fasaco_edge
-from tests.support.rooms import TOOL_M, begin, cells_of, drive, lanes, map_bytes, pose_bytes, room
+from tests.support.rooms import (
+    HALL,
+    TOOL_M,
+    begin,
+    cells_of,
+    drive,
+    lanes,
+    map_bytes,
+    pose_bytes,
+    room,
+)
 
 # Lanes 3 and 4 of the hall, columns 1 to 4.
 KITCHEN = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}
@@ -179,6 +190,34 @@ def test_a_keep_out_zone_is_kept_out_of_and_named(tmp_path):
         assert error["code"] == "bad_order"
         assert "zone 'moon' lies outside of the map" in error["message"]
         assert outsider.ask_status()["state"] == "covering"
+
+
+def test_an_order_ends_at_its_time_limit(tmp_path):
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        begin(outsider)
+        answer = told(running, "start", "--until-min", "0.03", "--yes")
+        assert 0.0 < answer["mission"]["time_left_s"] <= 1.8
+        status = outsider.wait_status(lambda status: status["state"] == "done")
+        assert status["reason"].startswith("time is up after 0.03 min: ")
+        assert status["mission"]["time_left_s"] is None
+        assert status["mission"]["unreached"]["areas"][0]["reason"] == "no time left"
+
+
+def test_a_map_of_dirt_says_what_comes_first_where_time_is_short(tmp_path):
+    dirt = np.full(HALL.shape, -1, np.int8)
+    dirt[:, HALL.shape[1] // 2 :] = 90
+    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
+        outsider.put("priority", map_bytes(dirt))
+        begin(outsider)
+        told(running, "start", "--until-min", "0.7", "--yes")
+        outsider.wait_status(lambda status: status["mission"]["first_from"] == 90)
+        outsider.put("priority", map_bytes(dirt, frame="odom"))
+        outsider.put("priority", b"no grid")
+        counted = {"wrong_frame": 1, "malformed_message": 1}
+        status = outsider.wait_status(lambda status: status["errors"]["by_code"] == counted)
+        assert status["mission"]["first_from"] == 90
+        told(running, "start", "--until-min", "60", "--yes")
+        outsider.wait_status(lambda status: status["mission"]["first_from"] is None)
 
 
 def test_cancelled_it_stays_so_after_a_kill(tmp_path):

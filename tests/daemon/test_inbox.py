@@ -20,6 +20,7 @@ from fasaco_edge.daemon.loop.inbox import (
     Inbox,
     Received,
     make_mailbox,
+    poster,
     take_batch,
 )
 from fasaco_edge.errors import MalformedMessage, PatchWithoutBase, PlanFailed
@@ -34,6 +35,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_PRIORITY_BYTES
 from fasaco_edge.wire.messages.battery import BatteryState, encode_battery
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
@@ -105,6 +107,30 @@ def test_a_battery_is_heard_and_held_until_there_is_a_mission(arrivals):
     held = HeldEvents()
     assert held.take([*events, *events]) == []
     assert held.events == events[-1:]
+
+
+def test_priorities_are_heard_and_held_until_there_is_a_mission(arrivals):
+    for stamp_ns in (7, 8):
+        arrivals.post("priority", map_bytes(pillared_room(), stamp_ns))
+    arrivals.post("priority", b"no grid")
+    events, faults = arrivals.events()
+    # Of two that wait the queue holds one: its memory is that of the longest.
+    assert [event.grid.stamp_ns for event in events] == [8]
+    assert [type(fault) for fault in faults] == [MalformedMessage]
+    held = HeldEvents()
+    assert held.take([*events, *events]) == []
+    assert held.events == events
+
+
+def test_priorities_of_more_bytes_than_allowed_are_dropped_by_their_size(arrivals):
+    post = poster(arrivals.mailbox, "priority", MAX_PIXELS)
+    post(Sample("fasaco/@v1/robot/priority", bytes(MAX_PRIORITY_BYTES + 1)))
+    assert arrivals.decode()[0] == []
+    post(Sample("fasaco/@v1/robot/priority", bytes(MAX_PRIORITY_BYTES + 1)))
+    (fault,) = arrivals.decode()[1]
+    assert "a priority message of 1048577 bytes was dropped: it may have at most 1048576" in str(
+        fault
+    )
 
 
 def test_a_command_follows_its_poses_in_cycles_of_usual_size(arrivals):

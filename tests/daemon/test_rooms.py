@@ -65,7 +65,7 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         assert west["area_m2"] == pytest.approx(8.5, abs=1.0)
 
         assert "done" in cli(running, "rooms", "name", str(east["id"]), "kitchen")
-        cli(running, "rooms", "set", "kitchen", "--passes", "2")
+        cli(running, "rooms", "set", "kitchen", "--passes", "2", "--priority", "80")
         heard.wait(lambda sample: any(room["name"] == "kitchen" for room in sample.json()["rooms"]))
         assert room_command(outsider, "name", id=west["id"], name="kitchen")["code"] == "bad_order"
         table = cli(running, "rooms", "list")
@@ -73,7 +73,7 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         names = {feature["properties"]["name"] for feature in drawn["features"]}
         assert names == {"kitchen", f"room {west['id']}"}
         assert "kitchen" in table
-        assert "passes: 2" in table
+        assert "passes: 2; priority: 80" in table
 
         # What is not known yet is refused with what there is, or waited for.
         attic = {"zones": [{"name": "attic"}]}

@@ -54,7 +54,7 @@ def full():
     numbers = [room.id for room in book.rooms]
     book.name(numbers[0], "küche")
     kinds = Pass("edge"), Pass(angle_deg=30.0, speed_m_s=0.2), Pass(lanes="cross")
-    book.set(numbers[1], RoomSettings(3, kinds, skip=True))
+    book.set(numbers[1], RoomSettings(3, kinds, skip=True, priority=80))
     split(book, "küche", ((0.0, 0.0), (0.0, 5.0)))
     return book
 

@@ -194,6 +194,7 @@ def test_the_graph_shows_node_publishers_and_subscribers(tmp_path):
             "/robot1/map": ("MS", GRID, True),
             "/robot1/map_updates": ("MS", UPDATE, False),
             "/robot1/battery_state": ("MS", "sensor_msgs/msg/BatteryState", False),
+            "/robot1/floor_priority": ("MS", GRID, True),
             "/robot1/tf": ("MS", TF, False),
             "/robot1/tf_static": ("MS", TF, True),
             "/robot1/coverage_path": ("MP", PATH, True),

@@ -41,6 +41,7 @@ def test_a_robot_with_a_third_party_library_gets_its_path(tmp_path):
             "/map": [GRID],
             "/map_updates": ["map_msgs/msg/OccupancyGridUpdate"],
             "/battery_state": ["sensor_msgs/msg/BatteryState"],
+            "/floor_priority": [GRID],
             "/tf": ["tf2_msgs/msg/TFMessage"],
             "/tf_static": ["tf2_msgs/msg/TFMessage"],
             "/coverage_path": [PATH],

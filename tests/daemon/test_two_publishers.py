@@ -104,9 +104,11 @@ def test_poses_and_masks_of_a_second_publisher_do_not_count(tmp_path):
         paths = outsider.listen("path")
         paths.wait(lambda heard: len(planned(heard)[0]) > 0)
         in_turn(one, other, "pose", (pose_bytes(*lanes(1)[0]), pose_bytes(3.4, 2.4)))
+        in_turn(one, other, "priority", (map_bytes(MASK), map_bytes(BLANK)))
         in_turn(one, other, "keep_out_mask", (map_bytes(MASK), map_bytes(BLANK)))
         status = outsider.wait_status(lambda status: has_two(status) and "masks" in text_of(status))
         assert f"poses come from two publishers: {counting(one, other)}" in text_of(status)
+        assert f"priorities come from two publishers: {counting(one, other)}" in text_of(status)
         assert f"keep-out masks come from two publishers: {counting(one, other)}" in text_of(status)
         assert status["pose"]["x"] < 1.0
         assert not any(driven(heard) & AROUND for heard in paths.heard)

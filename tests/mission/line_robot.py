@@ -13,7 +13,14 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig, Sweeping
-from fasaco_edge.mission.core.events import CommandReceived, Event, MapReceived, PoseReceived
+from fasaco_edge.mission.core.events import (
+    CommandReceived,
+    Event,
+    MapReceived,
+    PlanReady,
+    PlanRequest,
+    PoseReceived,
+)
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.path_exit import PathExit
 from fasaco_edge.mission.orders.keep_outs import KeepOut
@@ -78,7 +85,7 @@ class LineRobot:
         self.track.append((self.x, self.y))
         stamp_ns = round(self.now * 1e9)
         pose = PoseReceived(StampedPose(self.reported, "map", stamp_ns))
-        plans = [] if self._plan is None else [answer(self._plan)]
+        plans = [] if self._plan is None else [self.planned(self._plan)]
         decision = self.mission.step(self.arrived([*events, pose, *plans]), self.now)
         self._plan = decision.plan
         self.exit.follow(self.mission, decision.path)
@@ -86,6 +93,10 @@ class LineRobot:
         if sent is not None:
             self.paths.append((self.now, sent.xy, sent.reason))
             self.path = [(x, y) for x, y in sent.xy.tolist()]
+
+    def planned(self, request: PlanRequest) -> PlanReady:
+        """Answer a request for a plan."""
+        return answer(request)
 
     @property
     def reported(self) -> Pose2D:

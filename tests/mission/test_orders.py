@@ -50,6 +50,7 @@ def test_an_order_with_all_there_is():
             "passes": 2,
             "return_home": True,
             "keep_covered": True,
+            "until_min": 0.0,
         }
     )
     square = ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0))
@@ -57,6 +58,7 @@ def test_an_order_with_all_there_is():
     assert order.keep_out == (((0.5, 0.5), (1.0, 0.5), (1.0, 1.0)),)
     assert order.return_home
     assert order.keep_covered
+    assert order.until_min == 0.0
     assert read_order(json.loads(json.dumps(order_document(order)))) == order
 
 
@@ -105,6 +107,8 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
         ({"passes": 1.5}, "passes: expected int | array | null, got 1.5"),
         ({"passes": []}, "passes: expected array of length >= 1, got []"),
         ({"passes": ["auto"] * 101}, "passes: expected array of length <= 100"),
+        ({"until_min": -1}, "until_min: expected float >= 0.0, got -1"),
+        ({"until_min": 1441}, "until_min: expected float <= 1440.0, got 1441"),
         ({"passes": ["x"]}, "passes[0]: expected auto, cross, edge, rest, got 'x'"),
         ({"passes": [30]}, "passes[0]: expected str | object, got 30"),
         ({"passes": [{"lanes": "x"}]}, "passes[0].lanes: expected auto, cross, got 'x'"),

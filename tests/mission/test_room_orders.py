@@ -344,7 +344,7 @@ def test_documents_are_read_as_they_were_written():
         RoomRequest(3, name="kitchen"),
         RoomRequest("kitchen", cut=((0.0, 1.0), (2.0, 1.0))),
         RoomRequest(3, others=(4, "bath"), name="wet"),
-        RoomRequest(3, passes=2, kinds=(), skip=True),
+        RoomRequest(3, passes=2, kinds=(), skip=True, priority=80),
         RoomRequest(3, passes=2, kinds=(Pass("edge"), Pass(angle_deg=30.0))),
     ):
         kind = (
@@ -385,7 +385,7 @@ def test_documents_are_read_as_they_were_written():
             "room.cut: must be finite",
         ),
         ({"command": "room_merge", "room": {"id": 3, "name": "a"}}, "room.others: missing"),
-        ({"command": "room_set", "room": {"id": 3}}, "room.passes or skip: missing"),
+        ({"command": "room_set", "room": {"id": 3}}, "room.passes or priority or skip: missing"),
         ({"command": "room_set", "room": {"id": 3, "passes": 0}}, "room.passes: expected"),
         ({"command": "room_set", "room": {"id": 3, "passes": ["rest"]}}, "rest goes after an edge"),
         ({"command": "start", "order": {"unknown": "ask"}}, "order.unknown: expected refuse, wait"),

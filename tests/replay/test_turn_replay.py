@@ -16,7 +16,9 @@ from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, encode_rooms
 from fasaco_edge.daemon.ledger.rooms_file import RoomsFile
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms
+from fasaco_edge.mission.core.events import PriorityReceived
 from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_matching import HOLD_NEW
 from fasaco_edge.mission.map.room_update import update
@@ -46,8 +48,10 @@ def half(folder):
 
 @pytest.fixture(scope="module")
 def recording(folder, half):
-    """The mission after it, in the same room and with the same ledger."""
-    return record_mission(folder, "whole")
+    """The mission after it, in the same room and with the same ledger; some floor matters more."""
+    dirt = np.full((9, 12), 80, np.int8)
+    priorities = OccupancyGrid(GridGeometry(*dirt.shape, 0.3, Pose2D(0.0, 0.0)), dirt)
+    return record_mission(folder, "whole", priorities=priorities)
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +95,8 @@ def test_every_decision_is_as_it_was(which, request):
     assert replay.plans > 2
     assert replay.mission.state == recording.status["state"]
     assert bool(record.beginning.ledger) == (which == "recording")
+    told = [event for event in replay.mission.held() if isinstance(event, PriorityReceived)]
+    assert len(told) == (which == "recording")
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 

@@ -119,6 +119,9 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
         tab.click("roomcross")
         until(lambda: tab.js("JSON.stringify(roomOf(pickedRoom).passes)") == '["auto","cross"]')
         assert tab.js("find('roompasses').value") == "2"
+        field = "find('roompriority')"
+        tab.js(f"{field}.value = 80; {field}.dispatchEvent(new Event('change'))")
+        until(lambda: tab.js("roomOf(pickedRoom).priority") == 80)
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         photograph(tab, "room")
 
@@ -139,8 +142,8 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
         tap(tab, 4.65, 2.5)
         tab.click("roomskip")
         until(lambda: tab.js("roomOf(pickedRoom).skip"))
-        tab.js("start({}, true)")
-        until(lambda: "left out" in tab.js("find('zones').innerText"))
+        tab.js("start({ until_min: 40 }, true)")
+        until(lambda: {"left out", "home in"} <= set(tab.js("find('zones').innerText").split("\n")))
 
         tab.js("document.querySelector('#room details').open = true")
         tap(tab, 1.05, 2.5)

@@ -26,7 +26,7 @@ MAP_UPDATE = "map_msgs/msg/OccupancyGridUpdate"
 POSE = "geometry_msgs/msg/PoseStamped"
 # In the attachment of the empty path with which a daemon begins to plan.
 BEGINS = b'"revision":0,"map_stamp_ns"'
-SCHEMAS = {"map": MAP, "map_update": MAP_UPDATE, "pose": POSE}
+SCHEMAS = {"map": MAP, "map_update": MAP_UPDATE, "pose": POSE, "priority": MAP}
 
 
 @dataclass(frozen=True)

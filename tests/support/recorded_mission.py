@@ -86,11 +86,13 @@ def record_mission(
     yaw_deg: float = 0.0,
     commands=COMMANDS,
     blocked_s: tuple[float, ...] = (),
+    priorities: OccupancyGrid | None = None,
 ) -> Recording:
     """Record a mission from its first map until a status ends it; some poses may be none.
 
     ``line`` is the daemon's ``planner.line``; the room lies at ``yaw_deg`` in the map frame. At
-    ``blocked_s`` [simulated s] a follower says that something is ahead.
+    ``blocked_s`` [simulated s] a follower says that something is ahead. ``priorities`` are there
+    from the beginning.
     """
     runs = folder / name
     planner = {"budget_s": 0.05, "line": line}
@@ -99,6 +101,8 @@ def record_mission(
         with until(lambda: _joined(daemon.endpoint), TIMEOUT_S, why=daemon.log_text) as bus:
             robot = MappingRobot(bus, broken_poses, yaw_deg, commands, blocked_s)
             robot.wait(lambda status: (status["recorder"] or {}).get("state") == "recording")
+            if priorities is not None:
+                Sender(bus, topics.PRIORITY).put(encode_occupancy_grid(priorities))
             robot.drive(ends)
         # With the recorder's last words it may take a while on a busy machine.
         daemon.process.terminate()

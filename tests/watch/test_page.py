@@ -150,11 +150,16 @@ def test_it_shows_rooms_with_their_swept_shares():
     many = tuple(RoomReport(number, swept=1.0) for number in range(3, 20))
     far = RoomReport(40, "far", ((0, 0), (1e14, 0), (0, 1e14)), swept=1.0)
     tell(view, "rooms", encode_json(Rooms("map", 1, (hall, nook, *many, far))))
-    tell(view, "status", status(mission={"left_out": ["nook"]}))
+    tell(
+        view,
+        "status",
+        status(mission={"left_out": ["nook"], "time_left_s": 750.0, "first_from": 60}),
+    )
     page = page_of(view, 140, 60)
+    assert "leaves out nook" in page
+    assert "limit     home in 12 min 30 s, priority 60+ first" in page
     assert " hall 45% " in page
     assert " 2 " in page  # a name that would control the terminal is none
-    assert "leaves out nook" in page
     assert "hall 45.9 %" in page
     assert ", 8 more" in page
     # In a narrow picture names give way.

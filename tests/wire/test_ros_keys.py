@@ -55,9 +55,9 @@ def test_topics_are_those_of_the_table() -> None:
     """What the daemon has by default, what keys.yaml says, and what the contract shows."""
     config = RosConfig(kind="rmw_zenoh")
     by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
-    maps_and_battery, poses = list(by_pose.inputs.values())[:3], list(by_pose.inputs.values())[3:]
+    inputs = list(by_pose.inputs.values())
     ours = [
-        *(*maps_and_battery, config.keep_out_mask, config.scan, *poses),
+        *(*inputs[:4], config.keep_out_mask, config.scan, *inputs[4:]),
         *(config.inputs["pose"], config.inputs["tf_static"]),
         *config.outputs.values(),
         config.velocities(schemas.TWIST),

@@ -6,6 +6,7 @@ from rich.table import Table
 
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.client.phrases import percent
+from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
 from fasaco_edge.text import duration
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 
@@ -38,6 +39,7 @@ def _settings(room: RoomReport) -> str:
         each = (item if isinstance(item, str) else _pass(item) for item in room.passes)
         words.append(f"passes: {', '.join(each)}")
     words += ["skip"] * room.skip
+    words += [] if room.priority == USUAL_PRIORITY else [f"priority: {room.priority}"]
     return "; ".join(words) or "-"
 
 

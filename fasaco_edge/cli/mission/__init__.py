@@ -42,6 +42,7 @@ examples:
   fasaco-edge mission start --passes edge,auto,cross@0.15   a lap along walls, lanes, lanes across
   fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
   fasaco-edge mission start --zone kitchen          a zone of the configuration, or a room
+  fasaco-edge mission start --until-min 40          home after 40 minutes, whatever is left
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
   fasaco-edge mission start --order evening.yaml
   fasaco-edge mission start --fleet building_7      to each of its robots: they share the floor
@@ -62,6 +63,7 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
   return_home: true           # at the end: mission.home, mission.dock, or where the mission began
   keep_covered: false         # true: skip what is already covered in the first pass
   unknown: refuse             # wait: for a room of a zone's name, if there is none yet
+  until_min: 40               # the robot is home after so many minutes, whatever is left
 
 evening.geojson, as a drawing program writes it: each polygon is a zone with the properties name and
 passes; one with "keep_out": true is not touched. Coordinates are metres in the frame of the map.
@@ -161,6 +163,13 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep-covered", action="store_true", help="skip what is already covered in the first pass"
     )
+    parser.add_argument(
+        "--until-min",
+        type=float,
+        metavar="MIN",
+        help="be home after so many minutes, whatever is left; 0 for no limit (default: "
+        "mission.until_min of the daemon's configuration)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -215,6 +224,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         "passes": None if args.passes is None else passes_document(len(args.passes), args.passes),
         "return_home": args.return_home,
         "keep_covered": args.keep_covered,
+        "until_min": args.until_min,
     }
     # Options are compared with None and False, not by truth: 0 passes are a mistake to report.
     given = {

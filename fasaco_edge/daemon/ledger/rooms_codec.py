@@ -38,6 +38,7 @@ from fasaco_edge.mission.map.room_book import (
 from fasaco_edge.mission.map.room_raster import MOST_SQUARES, Cut, RoomRaster
 from fasaco_edge.mission.orders.keep_outs import PlaceName, check_name
 from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_of
+from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY, Priority
 
 MOST_BYTES = 16_000_000
 """Limit on the bytes of a file; longer ones are not read."""
@@ -72,6 +73,7 @@ class RoomNote(_Note, frozen=True, omit_defaults=True):
     by_hand: bool = False
     passes: Passes | None = None
     skip: bool = False
+    priority: Priority = USUAL_PRIORITY
     outline: Annotated[list[_Corner], Meta(max_length=MOST_OUTLINE)] = []
     area_m2: Annotated[float, Meta(ge=0)] = 0.0
     neighbours: Annotated[list[_Number], Meta(max_length=MOST_ROOMS)] = []
@@ -161,6 +163,7 @@ def _room_note(room: Room) -> RoomNote:
         by_hand=room.is_by_hand,
         passes=msgspec.convert(document, Passes | None),
         skip=settings.skip,
+        priority=settings.priority,
         outline=list(room.outline),
         area_m2=room.area_m2,
         neighbours=list(room.neighbours),
@@ -218,9 +221,10 @@ def _room(note: RoomNote) -> Room:
         raise ValueError("an outline has three corners or more")
     _check_finite([note.area_m2])
     passes, kinds = (None, ()) if note.passes is None else passes_of(note.passes, "passes")
+    settings = RoomSettings(passes, kinds, note.skip, note.priority)
     outline: Sequence[Point] = note.outline
     return Room(
-        *(note.id, note.name or "", note.by_hand, RoomSettings(passes, kinds, note.skip)),
+        *(note.id, note.name or "", note.by_hand, settings),
         *(tuple(outline), note.area_m2, tuple(note.neighbours), tuple(note.encloses)),
     )
 

@@ -13,6 +13,7 @@ from fasaco_edge.mission.core.events import (
     PatchesLost,
     PatchRun,
     PoseReceived,
+    PriorityReceived,
     in_runs,
 )
 
@@ -51,7 +52,7 @@ class HeldEvents:
                 case MapReceived():
                     self._held.pop(_LOST, None)
                     self._hold(event)
-                case PoseReceived() | BatteryReceived():
+                case PoseReceived() | BatteryReceived() | PriorityReceived():
                     self._hold(event)
                 case PatchRun(patches):
                     faults += self._apply(patches)

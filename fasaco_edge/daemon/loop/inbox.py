@@ -27,11 +27,13 @@ from fasaco_edge.mission.core.events import (
     PlanBroken,
     PlanReady,
     PoseReceived,
+    PriorityReceived,
 )
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.blocked import decode_blocked
 from fasaco_edge.wire.documents.replies import encode_error
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_PRIORITY_BYTES
 from fasaco_edge.wire.messages.battery import decode_battery
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.poses import PoseDecoder
@@ -42,7 +44,12 @@ if TYPE_CHECKING:
 
 MAPS = ("map", "map_update")
 # Inputs that only one publisher may send, and their plurals in reports.
-PLURALS = {topics.MAP: "maps", topics.POSE: "poses", topics.BATTERY: "charges of the battery"}
+PLURALS = {
+    topics.MAP: "maps",
+    topics.POSE: "poses",
+    topics.BATTERY: "charges of the battery",
+    topics.PRIORITY: "priorities",
+}
 # Least period of queries for the map: updates without their map come in bursts [s].
 ASK_FOR_MAP_S = 2.0
 # Rate limit of maps [s]: a flood of maps must not take a core. No mapper is that fast.
@@ -184,7 +191,8 @@ class Inbox:
             bus.listen(keys, topics.MAP, poster(mailbox, "map", max_pixels)),
             *maps,
         ]
-        for topic in (topics.MAP_UPDATE, topics.POSE, topics.BATTERY, topics.BLOCKED):
+        others = topics.MAP_UPDATE, topics.POSE, topics.BATTERY, topics.PRIORITY, topics.BLOCKED
+        for topic in others:
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))
         if fleet is not None:
             fleet.listen(bus, poster(mailbox, topics.FLEET.name, max_pixels))
@@ -292,6 +300,8 @@ class Inbox:
             return PatchReceived(decode_map_update(sample.payload, self._max_pixels))
         if kind == topics.BLOCKED.name:
             return blocked_of(sample.payload)
+        if kind == topics.PRIORITY.name:
+            return PriorityReceived(decode_occupancy_grid(sample.payload, MAX_PRIORITY_BYTES))
         if kind == "battery":
             state = decode_battery(sample.payload)
             return BatteryReceived(state.level, state.power, state.stamp_ns)

@@ -123,7 +123,8 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     order, is_planned = mission.order_state, mission.route.revision > 0
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
-    beside = to_come if is_aside and order.is_open else BESIDE
+    comes_later = (is_aside and order.is_open) or mission.first_from
+    beside = to_come if comes_later else BESIDE
     beside = beside if is_planned else unplanned
     left = _largest_first(
         (to_sweep.ahead_m2, ON_PATH),
@@ -189,6 +190,8 @@ def mission_report(
         keep_outs=keep_outs,
         waits_for_room=order_state.waits_for or None,
         left_out=() if order is None else left_out(order.zones),
+        time_left_s=rounded(mission.time_limit.left_s) if mission else None,
+        first_from=mission.first_from or None if mission else None,
     )
 
 

@@ -60,4 +60,5 @@ def _report(room: Room, progress: RoomProgress | None) -> RoomReport:
         to_go_s=None if progress is None else progress.to_go_s,
         passes=tuple(passes) if isinstance(passes, list) else passes,  # type: ignore[arg-type]
         skip=settings.skip,
+        priority=settings.priority,
     )

@@ -16,7 +16,7 @@ import numpy as np
 from fasaco_edge.mission.config import BatteryPolicy, MissionConfig
 from fasaco_edge.mission.core.events import BatteryReceived
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.line.way import way_s
+from fasaco_edge.mission.core.way_back import LOOK_EVERY_S, SPARE, Lapse, seconds_back
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -29,11 +29,8 @@ COARSE = 0.2
 STEP, LEAST_S = 0.01, 10.0
 # The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
-# Period of updating the path back to the dock [s].
-DOCK_EVERY_S = 5.0
-# Least difference between the levels of turning back and of resuming; factor on the time planned
-# for the rest, as lines are longer than walks over cells.
-BETWEEN, SPARE = 0.1, 1.2
+# Least difference between the levels of turning back and of resuming.
+BETWEEN = 0.1
 # Number of unknown cells assumed per cell at the border of the map, in the estimate of the rest.
 BEYOND_CELLS = 20
 # A robot near its dock may go to charge this much above the level of turning back; number of places
@@ -132,12 +129,10 @@ class Charging:
     orders: Sequencer
     route: Route
     gauge: BatteryGauge = field(default_factory=BatteryGauge)
-    # Time to the dock, time for the rest of the order where known [s], and when both were computed.
+    # Time to the dock, time for the rest of the order where known [s], and how old both are.
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
-    _looked_at: float | None = field(default=None, init=False)
-    # Stamp of the pose at that time [ns].
-    _looked_at_ns: int = field(default=0, init=False)
+    _looked: Lapse = field(init=False)
     # Whether this is the best place on the path to leave for the dock.
     _is_best_here: bool = field(default=False, init=False)
     # The highest level since the robot entered its dock, and its time; None outside the dock.
@@ -146,6 +141,9 @@ class Charging:
     # stopped charging, if below the level at which to resume; None for none.
     _turned_at: float = field(default=0.0, init=False)
     _most: float | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        self._looked = Lapse(self.map)
 
     def succeed(self, before: Charging) -> None:
         """Take over a predecessor's gauge, and its state of this battery."""
@@ -161,27 +159,17 @@ class Charging:
         """Update the time to the dock at intervals; to be called with each decision."""
         if self.policy is None:
             return
-        if self._looked_at is None:
+        if not self._looked.has_begun:
             self.gauge.begin(now)
-        elif self.gauge.drain_per_s is None or self._since_look_s(now) < DOCK_EVERY_S:
+        elif self.gauge.drain_per_s is None or self._looked.seconds(now) < LOOK_EVERY_S:
             return
-        self._looked_at, self._looked_at_ns = now, self._stamp_ns
+        self._looked.begin(now)
         is_charging = self.orders.order_state.errand == "charge"
         self._rest_s = self._seconds_left() if is_charging else None
-        self._to_dock_s = 0.0 if is_charging else self._seconds_to_dock()
+        self._to_dock_s = (
+            0.0 if is_charging else seconds_back("charge", self.config, self.map, self.orders)
+        )
         self._is_best_here = not is_charging and self._finds_nothing_better()
-
-    @property
-    def _stamp_ns(self) -> int:
-        return self.map.pose.stamp_ns if self.map.pose is not None else 0
-
-    def _since_look_s(self, now: float) -> float:
-        """Return the age of the computed time to the dock [s].
-
-        This is the longer age by our clock and the robot's, as simulated time may run faster.
-        """
-        assert self._looked_at is not None
-        return max(now - self._looked_at, 1e-9 * (self._stamp_ns - self._looked_at_ns))
 
     def silence(self, now: float) -> str:
         """Return why the battery level is unknown; "" if it is known or not needed."""
@@ -246,6 +234,14 @@ class Charging:
         needed = max(policy.low, policy.reserve) + drain * SPARE * self._rest_s
         return min(policy.enough, max(needed, policy.low + BETWEEN))
 
+    @property
+    def may_work_s(self) -> float:
+        """How long the robot may go on from here until it has to go and charge [s]."""
+        level, drain = self.gauge.level, self.gauge.drain_per_s
+        if self.policy is None or level is None or not drain:
+            return float("inf")
+        return max(level - self.turns_back_at, 0.0) / drain
+
     def is_enough(self, now: float, *, docked: bool) -> bool:
         """Return whether the battery of a robot in its dock, or on its way there, suffices."""
         level = self.gauge.level
@@ -309,17 +305,6 @@ class Charging:
             rates.append(cost.of_walk(way) / used if len(way) else float("inf"))
         return rates[0] <= min(rates)
 
-    def _seconds_to_dock(self) -> float:
-        """Return the driving time of the way to the dock [s]."""
-        cell, goal, area = self.map.cell_at_pose(), self.orders.goal("charge"), self.map.area
-        if cell is None or goal is None or area is None:
-            return 0.0
-        walk, sweeping, floor = area.shortest_path(cell, goal), self.config.sweeping, self.map.floor
-        if sweeping is None or floor is None or not len(walk):
-            return self.config.cost.of_walk(walk)
-        assert self.map.pose is not None
-        return way_s(walk, self.map.pose.pose, floor, sweeping)
-
     def _seconds_left(self) -> float | None:
         """Return the time for the rest of the order, from the dock and back; None if unknown."""
         state, cells, area = self.orders.order_state, self.route.aside, self.map.area
@@ -327,6 +312,7 @@ class Charging:
         is_last = (
             state.is_open and state.next_pass() is state and not self.orders.cells.is_exploring
         )
+        is_last = is_last and not self.orders.worth.least
         if not is_last or area is None or goal is None or cells is None or not len(cells):
             return None
         ends = [(int(row), int(col)) for row, col in (cells[0], cells[-1])]

@@ -8,6 +8,7 @@ from functools import partial
 
 from fasaco_edge.errors import FasacoError, LedgerMismatchError, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge
@@ -26,9 +27,10 @@ from fasaco_edge.mission.core.events import (
     PlanBroken,
     PlanReady,
     PoseReceived,
+    PriorityReceived,
     in_runs,
 )
-from fasaco_edge.mission.core.order_changes import OrderChanges
+from fasaco_edge.mission.core.order_changes import OTHERS_FIRST, OrderChanges
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.way_out import WayOut
@@ -113,11 +115,10 @@ class EventHandler:
             case BatteryReceived():
                 drives = len(self.route.path.ahead) > 1
                 self.battery.note(event, self._now, drives=drives)
-            case PlanReady():
+            case PriorityReceived(grid):
+                self._take_priorities(grid)
+            case PlanReady() | PlanBroken():
                 self._take_plan(event)
-            case PlanBroken():
-                self.route.fail(event, self._now)
-                raise event.why
             case CommandReceived():
                 self._obey(event)
             case FollowerBlocked():
@@ -128,6 +129,21 @@ class EventHandler:
     def _receive_member(self, event: MemberReceived) -> None:
         if reason := self.company.receive(event, self._now):
             self.route.want(reason)
+
+    def _take_priorities(self, grid: OccupancyGrid) -> None:
+        """Take a map of priorities; what comes before the first map counts if it is in its frame.
+
+        Raises:
+            WrongFrame: they are in another frame than the map.
+        """
+        used = self.map.grid
+        if used is not None and grid.frame != used.frame:
+            raise WrongFrame(
+                f"priorities in frame {grid.frame!r}, map in {used.frame!r}",
+                hint="publish them in the frame of the map",
+            )
+        if self.orders.worth.take(grid):
+            self.route.want(OTHERS_FIRST)
 
     def _close_floor(self, event: FollowerBlocked) -> None:
         """Close floor for a while on which a follower has reported an obstacle.
@@ -226,6 +242,7 @@ class EventHandler:
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
         """Update the reachable area; start over if the ledger belongs to another place."""
         if misfit is not None:
+            self.orders.worth.take(None)
             self._path = self.route.stop(str(misfit), self._now) or self._path
             self.trail.begin_anew()
             self.changes.begin(self.orders.order_state.in_other_building(str(misfit)))
@@ -325,7 +342,11 @@ class EventHandler:
             if full is not None:
                 self._faults.append(full)
 
-    def _take_plan(self, event: PlanReady) -> None:
+    def _take_plan(self, event: PlanReady | PlanBroken) -> None:
+        """Take a plan; raise why there is none."""
+        if isinstance(event, PlanBroken):
+            self.route.fail(event, self._now)
+            raise event.why
         request = self.route.pending
         if request is not None and request.number == event.number:
             self.trail.take(event.path)

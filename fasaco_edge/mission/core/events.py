@@ -45,6 +45,13 @@ class PatchReceived:
 
 
 @dataclass(frozen=True, slots=True)
+class PriorityReceived:
+    """Priorities of floor in the frame of the map, from 0 to 100; -1 for that of its room."""
+
+    grid: OccupancyGrid
+
+
+@dataclass(frozen=True, slots=True)
 class PatchesLost:
     """Map updates were lost: updates are refused until the next full map."""
 
@@ -209,6 +216,7 @@ Event = (
     | PatchesLost
     | PoseReceived
     | BatteryReceived
+    | PriorityReceived
     | PlanReady
     | PlanBroken
     | CommandReceived

@@ -19,6 +19,7 @@ from fasaco_edge.mission.core.resting import Resting
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.shut_in import ShutIn
 from fasaco_edge.mission.core.standing import Standing
+from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -49,6 +50,7 @@ class Executive:
     line: LineLayer
     company: Company
     charging: Charging
+    time_limit: TimeLimit
     giving_way: Waiting
     dock: InDock
     way_out: WayOut
@@ -126,6 +128,18 @@ class Executive:
         """Begin or end an errand of charging, by the battery."""
         self._errands.consider_charging(self._state, self._now)
 
+    def _end_in_time(self) -> None:
+        """End the order if the robot has to turn home to be there in time."""
+        is_due = self.time_limit.is_due(self._now)
+        may_work_s = self.time_limit.may_work_s(self._now)
+        self.orders.worth.allow(min(may_work_s, self.charging.may_work_s))
+        if not is_due:
+            return
+        if not self.orders.order_state.errand:
+            self.route.abandon()
+            self.route.want("time is up")
+        self.orders.run_out_of_time(self.time_limit.minutes)
+
     def _give_way(self) -> Doing | None:
         """Wait or make way for another robot.
 
@@ -199,6 +213,8 @@ class Executive:
             self._checks.check_deviation(cell, now)
         if self._state is State.COVERING and self.company.has_members:
             self._checks.check_worth(now)
+        if self._state is State.COVERING:
+            self._checks.check_time(now)
         if reason := self.orders.begin(cell, now):
             self.route.want(reason)
         if reason := self._work.share(cell, now):
@@ -247,6 +263,7 @@ class Executive:
 # The policy. A rule returns the mission's activity, or None: then the next rule decides.
 RULES: tuple[Callable[[Executive], Doing | None], ...] = (
     Executive._charge_in_time,
+    Executive._end_in_time,
     Executive._give_way,
     Executive._rest,
     Executive._find_place,

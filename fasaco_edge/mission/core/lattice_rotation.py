@@ -31,6 +31,7 @@ from fasaco_edge.mission.core.events import (
     MemberReceived,
     PathUpdate,
     PoseReceived,
+    PriorityReceived,
 )
 from fasaco_edge.mission.map.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.orders.mask import mask_polygons
@@ -70,8 +71,8 @@ class LatticeRotation:
         if not self.deg:
             return event
         match event:
-            case MapReceived(grid, at):
-                return MapReceived(_rotated_grid(grid, -self.deg), at)
+            case MapReceived(grid=grid) | PriorityReceived(grid=grid):
+                return replace(event, grid=_rotated_grid(grid, -self.deg))
             case PoseReceived(pose, at):
                 return PoseReceived(_rotated_stamped(pose, -self.deg), at)
             case MemberReceived(x=x, y=y):

@@ -29,6 +29,7 @@ from fasaco_edge.mission.core.events import (
     MapReceived,
     PathUpdate,
     PoseReceived,
+    PriorityReceived,
     State,
 )
 from fasaco_edge.mission.core.executive import Executive
@@ -37,6 +38,7 @@ from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import Trouble
 from fasaco_edge.mission.core.way_out import WayOut
@@ -82,6 +84,7 @@ class Mission:
         route: the path and the pending plan, with counts; read-only.
         company: the other robots; read-only.
         charging: the battery, and when to charge; read-only.
+        time_limit: when the order has to end; read-only.
     """
 
     def __init__(
@@ -124,6 +127,7 @@ class Mission:
         self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
         self._trail = TrailLayer(config, self._map, self.route)
         self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
+        self.time_limit = TimeLimit(config, self._map, self._orders)
         ordered = self._map, self._ledger, self._orders, self.route, self._line
         is_alone = self._kind is ALONE
         self._changes = OrderChanges(
@@ -137,7 +141,7 @@ class Mission:
             *owners, self._line, self._trail, *measured, self._changes, self._rooms
         )
         self.giving_way = self._kind.waiting(config, self._map, self.route, self.company)
-        decided_by = self._line, self.company, self.charging, self.giving_way
+        decided_by = self._line, self.company, self.charging, self.time_limit, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
         self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)
@@ -189,11 +193,13 @@ class Mission:
             self._map.watch_on(before._map.building)
 
     def held(self) -> list[Event]:
-        """Return the newest map and pose as events for a succeeding mission."""
+        """Return the newest map, pose and priorities as events for a succeeding mission."""
         monitor = self._executive.monitor
+        priorities = self._rotation.grid(self._orders.worth.given)
         return [
             *([MapReceived(self.grid, monitor.map_at)] if self.grid is not None else []),
             *([PoseReceived(self.pose, monitor.pose_at)] if self.pose is not None else []),
+            *([PriorityReceived(priorities)] if priorities is not None else []),
         ]
 
     @property
@@ -318,6 +324,11 @@ class Mission:
             if lattice is None
             else self._map.coverage(self._ledger, self._orders.known(lattice))
         )
+
+    @property
+    def first_from(self) -> int:
+        """The priority from which on floor is planned now; 0 while all is."""
+        return self._orders.worth.least
 
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return the areas of floor to sweep; None if cells are counted."""

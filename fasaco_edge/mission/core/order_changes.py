@@ -23,6 +23,8 @@ from fasaco_edge.mission.orders.room_commands import carry_out
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.mission.orders.zones import in_zones
 
+OTHERS_FIRST = "priorities have changed"
+
 
 @dataclass(slots=True, eq=False)
 class OrderChanges:
@@ -148,6 +150,9 @@ class OrderChanges:
                 if (then != now).any():
                     what = f"the outline of {zone.name!r} has changed"
                     self.route.want(what if zone.polygon else "other rooms are left out")
+                is_other = zone.ranked != (state.current_zone or zone).ranked
+                if is_other and self.orders.worth.choose_anew():
+                    self.route.want(OTHERS_FIRST)
         self._followed = book.version, order
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:

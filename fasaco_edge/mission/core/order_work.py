@@ -136,5 +136,6 @@ class OrderWork:
         if not len(path):
             return self.shut_in.lead_out(NO_WAY.format("home"), update, now, home)
         if not np.array_equal(path, route.path.ahead):
-            update = self.errands.lead(path, "returning home", "home", now)
+            why = ": time is up" if self.orders.order_state.late else ""
+            update = self.errands.lead(path, f"returning home{why}", "home", now)
         return Doing(State.RETURNING, "on the way home", update)

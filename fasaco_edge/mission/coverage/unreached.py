@@ -46,7 +46,7 @@ REASONS = {
     Cause.CLOSED: "no longer free on the map",
     Cause.UNKNOWN: "unknown to the map",
 }
-LEFT_OVER = "left over after"
+LEFT_OVER, NO_TIME = "left over after", "no time left"
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +208,7 @@ class UnreachedFinder:
             return Unreached()
         key = (area, self._ledger.version, state)
         if area is not None and key != self._found[0]:
-            self._found = key, self._list_areas(state.order, area, state.stage)
+            self._found = key, self._list_areas(state.order, area, state)
         return self._found[1]
 
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
@@ -246,7 +246,7 @@ class UnreachedFinder:
         counts = np.bincount(causes[left], minlength=len(Cause) + 1)[1:]
         order_of = np.argsort(-counts, kind="stable")
         why = [
-            f"{self._reason(Cause(n + 1))} ({counts[n] * cell_m2:.1f} m2)"
+            f"{self._reason(Cause(n + 1), state)} ({counts[n] * cell_m2:.1f} m2)"
             for n in order_of.tolist()
             if counts[n]
         ]
@@ -272,7 +272,9 @@ class UnreachedFinder:
         asked &= in_zones(order.zones, whole, lattice.cell_m)
         return asked
 
-    def _reason(self, cause: Cause) -> str:
+    def _reason(self, cause: Cause, state: OrderState) -> str:
+        if state.late and cause is Cause.LEFT_OVER:
+            return NO_TIME
         tries = "1 try" if self._failures == 1 else f"{self._failures} tries"
         why = f", {self._why_left}" if self._why_left else ""
         return REASONS.get(cause, f"{LEFT_OVER} {tries}{why}")
@@ -286,16 +288,16 @@ class UnreachedFinder:
         found = viewpoints(closed, area.reachable)
         return {(row + window.row0, col + window.col0) for row, col in found}
 
-    def _list_areas(self, order: MissionOrder, area: ReachableArea, stage: Stage) -> Unreached:
+    def _list_areas(self, order: MissionOrder, area: ReachableArea, state: OrderState) -> Unreached:
         window = area.lattice.window
-        areas = find_areas(self._causes(order, area, stage))
+        areas = find_areas(self._causes(order, area, state.stage))
         largest = np.argsort(-areas.cells, kind="stable")[:MOST_AREAS]
         listed = []
         for index in largest.tolist():
             row, col = areas.inner[index].tolist()
             cause = Cause(int(areas.kinds[index]))
             cell = row + window.row0, col + window.col0
-            listed.append(UnreachedArea(int(areas.cells[index]), cell, self._reason(cause)))
+            listed.append(UnreachedArea(int(areas.cells[index]), cell, self._reason(cause, state)))
         cells = int(areas.cells.sum(dtype=np.int64))
         return Unreached(tuple(listed), cells, len(areas.cells) - len(listed))
 

@@ -192,8 +192,12 @@ class LineLayer:
 
     @property
     def _is_way(self) -> bool:
-        """Whether the path is only a way: home, to the dock or to a refuge."""
-        return bool(self._orders.order_state.errand) or self._route.aside is not None
+        """Whether the path is only a way: home, to the dock or to a refuge.
+
+        At the usual end of an order the line home sweeps what floor is left beside it.
+        """
+        state = self._orders.order_state
+        return bool(state.errand or state.late) or self._route.aside is not None
 
     def _lay(
         self, ahead: LineAhead, cells: NDArray[np.int32], pose: Pose2D, *, is_cut: bool = False
@@ -408,6 +412,7 @@ class LineLayer:
             return None
         window = area.lattice.window
         asked = area.reachable & self._orders.cells.asked_of_me(area)
+        asked = self._orders.worth.first(asked, window)
         before, self._asked = self._asked, (window, asked, area.reachable)
         if before is None:
             return Window(0, 0, floor.geometry.rows, floor.geometry.cols)

@@ -17,6 +17,7 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.mission.map.room_raster import Cut, RoomRaster
 from fasaco_edge.mission.orders.keep_outs import check_name
+from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
 from fasaco_edge.planners.passes import Pass
 
 if TYPE_CHECKING:
@@ -42,11 +43,13 @@ class RoomSettings:
         passes: number of passes; None for as many as other zones have.
         kinds: what is special about each; () if nothing is.
         skip: whether orders for everything leave the room out.
+        priority: where time or battery do not allow all, higher ones come first; 0 to 100.
     """
 
     passes: int | None = None
     kinds: tuple[Pass, ...] = ()
     skip: bool = False
+    priority: int = USUAL_PRIORITY
 
 
 USUAL = RoomSettings()

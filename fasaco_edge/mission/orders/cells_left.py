@@ -181,6 +181,16 @@ class LeftBehind:
         self._area, self.times = None, self.times + 1
 
 
+def cells_in(zone: Zone, area: ReachableArea) -> int:
+    """Return how many cells a zone has: the reachable ones, or where none is known its area's."""
+    lattice = area.lattice
+    inside = in_zones((zone,), lattice.window, lattice.cell_m) & area.reachable
+    found = int(np.count_nonzero(inside))
+    if found or not zone.polygon:
+        return found
+    return int(area_m2(zone.polygon) / lattice.cell_m**2)
+
+
 def zones_beyond(
     order: MissionOrder, area: ReachableArea, free: CoverageLattice, visits: NDArray[np.uint16]
 ) -> str:

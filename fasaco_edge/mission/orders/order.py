@@ -27,6 +27,8 @@ from fasaco_edge.mission.orders.keep_outs import (
 )
 from fasaco_edge.mission.orders.passes import Passes, PassWord, passes_document, passes_of
 from fasaco_edge.mission.orders.room_requests import (
+    USUAL_PRIORITY,
+    Priority,
     RoomDocument,
     RoomNumber,
     RoomRequest,
@@ -36,14 +38,16 @@ from fasaco_edge.mission.orders.room_requests import (
 from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
 
 MOST_ZONES = 100
+Minutes = Annotated[float, Meta(ge=0, le=1440)]
 
 
-class LeftOut(NamedTuple):
-    """A room that an order for everything leaves out: its title, its outline, holes in that."""
+class RoomArea(NamedTuple):
+    """A room in an order for everything: its title, its outline, holes in that, its priority."""
 
     title: str
     outline: Polygon
     holes: tuple[Polygon, ...] = ()
+    priority: int = USUAL_PRIORITY
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +64,9 @@ class Zone:
         room: number of the room that it is, whose outline it follows; 0 for none.
         holes: polygons within ``polygon`` that are not part of it.
         without: of everything: the rooms that are left out.
+        priority: where time or battery do not allow all, zones of higher priority come first; None
+            for that of its room, or the usual one.
+        ranked: of everything: the rooms with a priority of their own.
         is_as_usual: whether the order says nothing about passes, so that a room's settings apply.
     """
 
@@ -69,8 +76,15 @@ class Zone:
     kinds: tuple[Pass, ...] = ()
     room: int = 0
     holes: tuple[Polygon, ...] = ()
-    without: tuple[LeftOut, ...] = ()
+    without: tuple[RoomArea, ...] = ()
+    priority: int | None = None
+    ranked: tuple[RoomArea, ...] = ()
     is_as_usual: bool = field(default=False, compare=False)
+
+    @property
+    def worth(self) -> int:
+        """Its priority."""
+        return USUAL_PRIORITY if self.priority is None else self.priority
 
     def kind(self, number: int) -> Pass:
         """Return what is special about a pass, from 1."""
@@ -96,6 +110,8 @@ class MissionOrder:
         keep_covered: whether the first pass skips cells that were covered before.
         unknown: what becomes of a zone whose name is not known yet: the order is refused, or waits
             for a room of that name.
+        until_min: time after which it ends, with the robot at home [min]; 0 for no limit, None for
+            the one of the configuration.
         given: the order as given, in the map frame, if the polygons are rotated, see
             ``rotated_order``.
     """
@@ -105,6 +121,7 @@ class MissionOrder:
     return_home: bool = False
     keep_covered: bool = False
     unknown: Unknown = "refuse"
+    until_min: float | None = None
     given: MissionOrder | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -171,12 +188,15 @@ class ZoneDocument(_Document, frozen=True):
 
     Attributes:
         room: number of the room that it is: it follows the room's outline.
+        priority: where time or battery do not allow all, zones of higher priority come first; by
+            default that of its room, or 50.
     """
 
     name: PlaceName
     polygon: Corners | None = None
     passes: Passes | None = None
     room: RoomNumber | None = None
+    priority: Priority | None = None
 
 
 class OrderDocument(_Document, frozen=True):
@@ -187,6 +207,8 @@ class OrderDocument(_Document, frozen=True):
             settings say.
         unknown: what becomes of a zone whose name is not known: the order is refused, or the zone
             waits, after all others, for a room of that name.
+        until_min: time after which the order ends, with the robot at home [min]; 0 for no limit,
+            null for `mission.until_min` of the configuration.
     """
 
     zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
@@ -195,6 +217,7 @@ class OrderDocument(_Document, frozen=True):
     return_home: bool = False
     keep_covered: bool = False
     unknown: Unknown = "refuse"
+    until_min: Minutes | None = None
 
 
 class CommandDocument(_Document, frozen=True):
@@ -275,6 +298,7 @@ def order_document(order: MissionOrder) -> dict[str, object]:
         "return_home": order.return_home,
         "keep_covered": order.keep_covered,
     } | ({} if order.unknown == "refuse" else {"unknown": order.unknown})
+    rest |= {} if order.until_min is None else {"until_min": order.until_min}
     first = order.zones[0]
     if first.polygon is None:
         return {"passes": passes_document(first.passes, first.kinds), **rest}
@@ -286,7 +310,9 @@ def _zone_document(zone: Zone) -> dict[str, object]:
     says_none = zone.is_as_usual and zone.polygon == ()
     passes = {} if says_none else {"passes": passes_document(zone.passes, zone.kinds)}
     polygon = {"polygon": zone.polygon} if zone.polygon else {}
-    return {"name": zone.name, **passes, **polygon, **({"room": zone.room} if zone.room else {})}
+    room = {"room": zone.room} if zone.room else {}
+    priority = {} if zone.priority is None else {"priority": zone.priority}
+    return {"name": zone.name, **passes, **polygon, **room, **priority}
 
 
 def command_document(command: Command) -> dict[str, object]:
@@ -316,6 +342,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
             tuple(zone.polygon or ()),
             *(passes_of(zone.passes, f"zones[{index}].passes") if zone.passes else usual),
             room=zone.room or 0,
+            priority=zone.priority,
             is_as_usual=is_usual and zone.passes is None,
         )
         for index, zone in enumerate(document.zones)
@@ -326,6 +353,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
         document.return_home,
         document.keep_covered,
         document.unknown,
+        document.until_min,
     )
     # Checks beyond types that need no map.
     names = [zone.name for zone in order.zones]

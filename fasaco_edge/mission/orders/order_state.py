@@ -5,7 +5,7 @@ It is kept with the ledger. Nothing here needs a map, so commands are accepted b
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Annotated, Literal
 
@@ -13,6 +13,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import CommandError, OrderError
+from fasaco_edge.mission.map.room_book import MOST_LISTED
 from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     KeepOutDocument,
@@ -95,6 +96,8 @@ class OrderState:
         keep_out: keep-outs of the operator, under any order.
         reached: cells that have been reachable since the order began; only as kept with the ledger,
             None in a mission.
+        spent_s: the robot's time since the order began, if it has a limit [s].
+        late: why it ends before all is covered; "" if it does not.
     """
 
     order: MissionOrder | None = None
@@ -112,6 +115,8 @@ class OrderState:
     places: PlacesNote = NO_PLACES
     keep_out: KeepOuts = ()
     reached: ReachedCells | None = None
+    spent_s: float = field(default=0.0, compare=False)
+    late: str = ""
 
     @classmethod
     def autostart(cls) -> OrderState:
@@ -176,7 +181,39 @@ class OrderState:
     @property
     def is_open(self) -> bool:
         """Whether there is an order with work left."""
-        return self.order is not None and (self.stage is not Stage.OVER or self.automatic)
+        goes_on = self.automatic and not self.late
+        return self.order is not None and (self.stage is not Stage.OVER or goes_on)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the robot has begun with the order."""
+        is_first = self.zone == 0 and self.pass_number == 1 and self.stage is Stage.COVERING
+        return self.order is not None and (self.begun or not is_first)
+
+    def most_worthwhile_next(self) -> OrderState:
+        """Return the state with the zones from the present one on by priority, the highest first;
+        those that wait for a room stay last."""
+        assert self.order is not None
+        given, zones = self.order.as_given, self.order.zones
+        to_come = sorted(
+            range(self.zone, len(zones)), key=lambda at: (zones[at].polygon == (), -zones[at].worth)
+        )
+        sequence = [*range(self.zone), *to_come]
+        order = replace(self.order, zones=tuple(zones[at] for at in sequence))
+        if given is not self.order:
+            given = replace(given, zones=tuple(given.zones[at] for at in sequence))
+            order = replace(order, given=given)
+        return replace(self, order=order)
+
+    def out_of_time(self, minutes: float) -> OrderState:
+        """Return the state in which it ends, as its time of so many minutes is up."""
+        late = f"time is up after {minutes:g} min"
+        if self.order is not None and self.stage is Stage.COVERING:
+            zone, to_come = self.order.zones[self.zone], self.order.zones[self.zone + 1 :]
+            late += f" in {self.title}" if zone.polygon or zone.passes > 1 else ""
+            names = ", ".join(repr(each.name) for each in to_come)
+            late += f", before {names:.{MOST_LISTED}}" if names else ""
+        return replace(self, stage=Stage.RETURNING, begun=False, late=late)
 
     @property
     def why_paused(self) -> str:
@@ -296,7 +333,7 @@ class OrderState:
 
     def to_json(self) -> str:
         """Return it as JSON, to be kept with the ledger."""
-        state = {field.name: getattr(self, field.name) for field in fields(self)}
+        state = {each.name: getattr(self, each.name) for each in fields(self)}
         order = None if self.order is None else order_document(self.order)
         keep_out = msgspec.convert(list(map(keep_out_document, self.keep_out)), _KeepOuts)
         note = _Note(**state | {"version": 1, "order": order, "keep_out": keep_out})
@@ -337,8 +374,8 @@ class _Note(
 ):
     """An order state as kept on disk; member names are those of the files.
 
-    Without errand, keep-outs, frame, places and reached cells the form is the one that older
-    daemons read.
+    Without errand, keep-outs, frame, places, reached cells and time limit the form is the one that
+    older daemons read.
     """
 
     version: Literal[1]
@@ -357,3 +394,5 @@ class _Note(
     places: PlacesNote = NO_PLACES
     keep_out: _KeepOuts = []
     reached: ReachedCells | None = None
+    spent_s: Annotated[float, Meta(ge=0)] = 0.0
+    late: str = ""

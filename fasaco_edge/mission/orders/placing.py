@@ -12,7 +12,8 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.mission.map.room_book import LIKE_NUMBER, Room, RoomBook
-from fasaco_edge.mission.orders.order import LeftOut, MissionOrder, StandingZone, Zone
+from fasaco_edge.mission.orders.order import MissionOrder, RoomArea, StandingZone, Zone
+from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
 
 
 def is_named(order: MissionOrder) -> bool:
@@ -87,27 +88,35 @@ def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder
         book: the rooms.
         begun: index of the zone that is being covered: up to it zones keep their places.
     """
-    skipped = tuple(
-        LeftOut(room.title, room.outline, book.holes(room))
-        for room in book.rooms
-        if room.settings.skip and room.outline
-    )
-    zones = [_placed(zone, book, skipped) for zone in order.zones]
+    rooms = [room for room in book.rooms if room.outline]
+    skipped = tuple(_area(room, book) for room in rooms if room.settings.skip)
+    ranked = tuple(_area(room, book) for room in rooms if room.settings.priority != USUAL_PRIORITY)
+    zones = [_placed(zone, book, skipped, ranked) for zone in order.zones]
     zones[begun + 1 :] = sorted(zones[begun + 1 :], key=lambda zone: zone.polygon == ())
     is_same = all(here is there for here, there in zip(zones, order.zones, strict=True))
     return order if is_same else replace(order, zones=tuple(zones))
 
 
-def _placed(zone: Zone, book: RoomBook, skipped: tuple[LeftOut, ...]) -> Zone:
+def _area(room: Room, book: RoomBook) -> RoomArea:
+    return RoomArea(room.title, room.outline, book.holes(room), room.settings.priority)
+
+
+def _placed(
+    zone: Zone, book: RoomBook, skipped: tuple[RoomArea, ...], ranked: tuple[RoomArea, ...]
+) -> Zone:
     if zone.polygon is None:
-        return zone if zone.without == skipped else replace(zone, without=skipped)
+        is_same = (zone.without, zone.ranked) == (skipped, ranked)
+        return zone if is_same else replace(zone, without=skipped, ranked=ranked)
     room = _room_of(zone, book) if zone.room or zone.polygon == () else None
     if room is None:
         return zone
     holes = book.holes(room)
     if (zone.room, zone.polygon, zone.holes) == (room.id, room.outline, holes):
         return zone
-    zone = replace(zone, room=room.id, polygon=room.outline, holes=holes)
+    priority = zone.priority
+    if priority is None and room.settings.priority != USUAL_PRIORITY:
+        priority = room.settings.priority
+    zone = replace(zone, room=room.id, polygon=room.outline, holes=holes, priority=priority)
     if zone.is_as_usual and room.settings.passes is not None:
         return replace(
             zone, passes=room.settings.passes, kinds=room.settings.kinds, is_as_usual=False
@@ -127,10 +136,13 @@ def are_same(one: MissionOrder, other: MissionOrder) -> bool:
 
 
 def _unplaced(order: MissionOrder) -> MissionOrder:
-    zones = (
-        replace(zone, polygon=(), holes=()) if zone.room else replace(zone, without=())
+    zones = [
+        replace(zone, polygon=(), holes=()) if zone.room else replace(zone, without=(), ranked=())
         for zone in order.zones
-    )
+    ]
+    # Zones of several priorities may have changed their order since.
+    if len({zone.worth for zone in zones}) > 1:
+        zones.sort(key=lambda zone: zone.name)
     return replace(order, zones=tuple(zones), keep_covered=False)
 
 
@@ -150,15 +162,19 @@ def rotated_order(order: MissionOrder, by_deg: float) -> MissionOrder:
 
 
 def _rotated(zone: Zone, by_deg: float) -> Zone:
-    if not zone.polygon and not zone.without:
+    if not zone.polygon and not zone.without and not zone.ranked:
         return zone
 
     def rotated(polygons: Iterable[Polygon]) -> tuple[Polygon, ...]:
         return tuple(rotated_polygon(polygon, by_deg) for polygon in polygons)
 
-    without = tuple(
-        LeftOut(room.title, rotated_polygon(room.outline, by_deg), rotated(room.holes))
-        for room in zone.without
+    without, ranked = (
+        tuple(
+            room._replace(outline=rotated_polygon(room.outline, by_deg), holes=rotated(room.holes))
+            for room in rooms
+        )
+        for rooms in (zone.without, zone.ranked)
     )
     polygon = rotated_polygon(zone.polygon, by_deg) if zone.polygon else zone.polygon
-    return replace(zone, polygon=polygon, holes=rotated(zone.holes), without=without)
+    holes = rotated(zone.holes)
+    return replace(zone, polygon=polygon, holes=holes, without=without, ranked=ranked)

@@ -39,7 +39,8 @@ def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
                 else (asked.passes, asked.kinds)
             )
             skip = before.skip if asked.skip is None else asked.skip
-            book.set(asked.id, RoomSettings(passes, kinds, skip))
+            priority = before.priority if asked.priority is None else asked.priority
+            book.set(asked.id, RoomSettings(passes, kinds, skip, priority))
         case _:
             # With kernels, which a daemon without a map has not loaded.
             from fasaco_edge.mission.map.room_edits import merge, split  # noqa: PLC0415

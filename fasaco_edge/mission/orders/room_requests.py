@@ -18,6 +18,9 @@ from fasaco_edge.planners.passes import Pass
 # A merge joins at most this many rooms with one.
 MOST_MERGED = 50
 
+# Priority of floor of which nothing is said.
+USUAL_PRIORITY = 50
+Priority = Annotated[int, Meta(ge=0, le=100)]
 RoomNumber = Annotated[int, Meta(ge=1, le=65_000)]
 Corner = Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]
 
@@ -32,6 +35,8 @@ class RoomDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
         others: for `room_merge`: numbers or names of the rooms to merge with it.
         passes: for `room_set`: passes of an order by its name that gives none itself.
         skip: for `room_set`: whether orders for everything leave the room out.
+        priority: for `room_set`: where time or battery do not allow all, floor of higher priority
+            comes first.
     """
 
     id: RoomNumber | PlaceName
@@ -44,6 +49,7 @@ class RoomDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     ) = None
     passes: Passes | None = None
     skip: bool | None = None
+    priority: Priority | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +67,7 @@ class RoomRequest:
     passes: int | None = None
     kinds: tuple[Pass, ...] = ()
     skip: bool | None = None
+    priority: int | None = None
 
 
 # Members that each command takes beside the room itself, and those of them that it must have.
@@ -68,7 +75,7 @@ _TAKES: dict[str, tuple[set[str], set[str]]] = {
     "room_name": ({"name"}, {"name"}),
     "room_split": ({"cut"}, {"cut"}),
     "room_merge": ({"others", "name"}, {"others"}),
-    "room_set": ({"passes", "skip"}, set()),
+    "room_set": ({"passes", "skip", "priority"}, set()),
 }
 
 
@@ -101,7 +108,8 @@ def room_of(command: str, document: RoomDocument | None) -> RoomRequest | None:
     )
     cut = None if document.cut is None else (document.cut[0], document.cut[1])
     others = tuple(document.others or ())
-    return RoomRequest(document.id, document.name or "", cut, others, passes, kinds, document.skip)
+    settings = passes, kinds, document.skip, document.priority
+    return RoomRequest(document.id, document.name or "", cut, others, *settings)
 
 
 def room_document(request: RoomRequest) -> dict[str, object]:
@@ -114,6 +122,7 @@ def room_document(request: RoomRequest) -> dict[str, object]:
         if request.passes is None
         else passes_document(request.passes, request.kinds),
         "skip": request.skip,
+        "priority": request.priority,
     }
     given = {name: value for name, value in members.items() if value is not None}
     return {"id": request.id, **given}

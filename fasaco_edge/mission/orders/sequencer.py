@@ -19,12 +19,18 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.map.room_book import MOST_LISTED
 from fasaco_edge.mission.orders.by_room import RoomPrice
-from fasaco_edge.mission.orders.cells_left import CellsLeft, LeftBehind, zones_beyond
+from fasaco_edge.mission.orders.cells_left import (
+    CellsLeft,
+    LeftBehind,
+    cells_in,
+    zones_beyond,
+)
 from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.mission.orders.worth import WorthFirst
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
@@ -68,6 +74,7 @@ class Sequencer:
     Attributes:
         order_state: the order and its progress.
         cells: the cells left of it.
+        worth: which of these are planned first.
     """
 
     def __init__(
@@ -91,6 +98,11 @@ class Sequencer:
             *(config, map_state, ledger, company, self._zones),
             covers=lambda: self.order_state.current_pass.covers,
             exploration=lambda: self._run.exploration,
+        )
+        self.worth = WorthFirst(
+            *(config.footprint.cell_m, config.cost.step_s),
+            lambda: self.order_state.current_zone,
+            lambda: map_state.grid.frame if map_state.grid is not None else "",
         )
         self._unreached = UnreachedFinder(map_state, ledger)
         # Cached result: whether a retry is worthwhile, for a given map and ledger.
@@ -146,6 +158,7 @@ class Sequencer:
         if state.stage is Stage.OVER and state.why:
             self._run.ending = state.why
         self._retry_check = (None, False)
+        self.worth.begin()
         # Floor that obstacles close for a while stays reachable for another order on the same map.
         is_crowded = state.home is not None and self._map.obstacles.closed > 0
         self._unreached.restart(self._unreached.reached if is_crowded else state.reached)
@@ -225,10 +238,11 @@ class Sequencer:
             self.advance(now)
         if run.retry_at is not None:
             return self._begin_retry(cell) if now >= run.retry_at else ""
-        state = self.order_state
+        state = self.order_state = self._most_worthwhile_next()
         if state.begun or state.order is None or state.stage is Stage.OVER or state.waits_for:
             return ""
         zone = state.current_zone
+        self.worth.begin()
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             self._forget(zone, state)
         run.is_laid_anew = zone is not None and bool(zone.kinds)
@@ -238,6 +252,18 @@ class Sequencer:
         if state.pass_number == 1:
             run.exploration.begin()
         return "" if state.automatic else state.title
+
+    def _most_worthwhile_next(self) -> OrderState:
+        """Return the order with the zones to come by priority, if there is no time for all."""
+        state, area = self.order_state, self._map.area
+        zone = state.current_zone
+        if zone is None or state.order is None or state.begun or state.pass_number > 1:
+            return state
+        to_come = state.order.zones[state.zone :]
+        if area is None or len({each.worth for each in to_come}) < 2:
+            return state
+        cells = sum(each.passes * cells_in(each, area) for each in to_come)
+        return state.most_worthwhile_next() if self.worth.are_too_many(cells) else state
 
     def _forget(self, zone: Zone, state: OrderState) -> None:
         """Forget what the pass that begins is to cover again."""
@@ -272,10 +298,14 @@ class Sequencer:
         self._run.exploration.end_if_reached(state.current_zone, area)
         ends_home = home is not None and state.returns_home_next and area.contains(home)
         ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
+        to_cover = self.cells.open_to_me(area)
+        if not attempt and self.worth.is_limited:
+            self.worth.choose(to_cover & reachable, lattice.window)
+        ends_home = ends_home and not self.worth.least
         problem = CoverageProblem.of(
             lattice,
             cell,
-            covered=~self.cells.open_to_me(area),
+            covered=~self.worth.first(to_cover, lattice.window),
             end=home if ends_home else None,
             cost=self._cost(state),
             before=before,
@@ -293,6 +323,28 @@ class Sequencer:
         if state.speed_m_s and usual_m_s:
             cost = replace(cost, step_s=cost.step_s * usual_m_s / state.speed_m_s)
         return cost.along(state.current_pass.lanes)
+
+    def walk_s(self, cells: NDArray[np.int32]) -> float:
+        """Return how long a walk takes in the present pass [s]."""
+        return self._cost(self.order_state).of_walk(cells)
+
+    def puts_other_first(self, ahead_s: float) -> bool:
+        """Put other floor first if the path ahead, of ``ahead_s`` [s], takes too long."""
+        area = self._map.area
+        if area is None:
+            return False
+        open_cells = self.cells.open_to_me(area) & area.reachable
+        return self.worth.is_other_first(open_cells, area.lattice.window, ahead_s)
+
+    @property
+    def is_first_done(self) -> bool:
+        """Whether the cells planned first are covered, and others are left."""
+        area = self._map.area
+        if area is None or not self.worth.least:
+            return False
+        open_cells = self.cells.open_to_me(area) & area.reachable
+        first = self.worth.first(open_cells, area.lattice.window)
+        return bool(open_cells.any()) and not first.any()
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
@@ -345,6 +397,9 @@ class Sequencer:
         run.done = done
         is_given_up = cells > 0 and run.in_vain > MAX_IN_VAIN
         if is_given_up and run.exploration.skip_viewpoint():
+            return False
+        if is_given_up and self.worth.least:
+            self.worth.give_up()
             return False
         if is_given_up and self._company.has_company:
             # Other robots may leave before they have swept their parts: those come first.
@@ -412,6 +467,8 @@ class Sequencer:
         """Continue an order after a change of the map: an automatic one that was over; and one on
         its way home if floor has opened, at most once more than there are retries."""
         state, run, area = self.order_state, self._run, self._map.area
+        if state.late:
+            return
         if state.automatic and state.stage is Stage.OVER:
             self.order_state = replace(state, stage=Stage.COVERING, why="")
         if state.stage is not Stage.RETURNING or area is None:
@@ -422,6 +479,18 @@ class Sequencer:
             self.order_state = replace(state, stage=Stage.RETRYING, begun=True)
             run.done, run.in_vain = -1, 0
             self._company.try_again()
+
+    def spend(self, seconds: float) -> None:
+        """Count the robot's time [s] since the last call."""
+        state = self.order_state
+        self.order_state = replace(state, spent_s=state.spent_s + seconds)
+
+    def run_out_of_time(self, minutes: float) -> None:
+        """End the order, as its time of so many minutes is up: at home, or on an errand at once."""
+        self._run.retry_at = None
+        self.order_state = self.order_state.out_of_time(minutes)
+        if self.order_state.errand:
+            self._end()
 
     def waiting_reason(self) -> str:
         """Return the reason of a wait before a retry as text."""
@@ -448,7 +517,8 @@ class Sequencer:
         run, order = self._run, self.order_state.order
         run.retry_at = None
         state = self.order_state = replace(self.order_state, stage=Stage.OVER)
-        run.ending = self._unreached.ending(state) + self._sum_up()
+        late = f"{state.late}: " if state.late else ""
+        run.ending = late + self._unreached.ending(state) + self._sum_up()
         area, free = self._map.area, self._map.free
         if order is not None and area is not None and free is not None:
             run.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))

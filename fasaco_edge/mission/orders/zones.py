@@ -32,21 +32,24 @@ def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[
 def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
     """Return the same as ``in_zones`` for zones some of which have holes or leave out rooms."""
     cells = np.zeros((window.rows, window.cols), bool)
-
-    def inside(outline: Polygon, holes: tuple[Polygon, ...]) -> NDArray[np.bool_]:
-        found = _inside_any((outline,), window, cell_m)
-        return found & ~_inside_any(holes, window, cell_m) if holes else found
-
     for zone in zones:
         if zone.polygon:
-            cells |= inside(zone.polygon, zone.holes)
+            cells |= cells_of(zone.polygon, zone.holes, window, cell_m)
         elif zone.polygon is None:
             own = np.ones_like(cells)
             for room in zone.without:
-                own &= ~inside(room.outline, room.holes)
+                own &= ~cells_of(room.outline, room.holes, window, cell_m)
             cells |= own
     cells.flags.writeable = False
     return cells
+
+
+def cells_of(
+    outline: Polygon, holes: tuple[Polygon, ...], window: Window, cell_m: float
+) -> NDArray[np.bool_]:
+    """Return which cells of ``window`` lie in an outline, and in no hole, bool (rows, cols)."""
+    found = _inside_any((outline,), window, cell_m)
+    return found & ~_inside_any(holes, window, cell_m) if holes else found
 
 
 def counts_in(

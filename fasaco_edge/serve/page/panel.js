@@ -124,6 +124,7 @@ function showProgress(state) {
   });
   if (!lines.length && state.mission.passes > 1) lines.push(item(["span", "", "everything"], ["span", "quiet", `pass ${state.mission.pass} of ${state.mission.passes}`]));
   for (const name of state.mission.left_out) lines.push(item(["span", "", name], ["span", "quiet", "left out"]));
+  if (state.mission.time_left_s !== null) lines.push(item(["span", "", "home in"], ["span", "quiet", duration(state.mission.time_left_s)]));
   find("zones").replaceChildren(...lines);
 }
 

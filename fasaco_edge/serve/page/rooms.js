@@ -101,6 +101,7 @@ function showRoom(room) {
   find("roomname").placeholder = room.title;
   showPasses(room.passes);
   find("roomskip").checked = room.skip;
+  if (document.activeElement !== find("roompriority")) find("roompriority").value = room.priority;
   find("roomnow").textContent = `Sweep ${room.title} now`;
   find("turns").textContent = chosen.size ? "" : "Several rooms? Add them below the map, one after the other.";
   find("roomnow").classList.toggle("primary", !chosen.size);
@@ -186,6 +187,7 @@ find("roompasses").addEventListener("change", setPasses);
 find("roomcross").addEventListener("change", () => { twiceAtLeast("roompasses", "roomcross"); setPasses(); });
 find("cross").addEventListener("change", () => { twiceAtLeast("passes", "cross"); keepDrafts(); });
 find("roomskip").addEventListener("change", () => change("room_set", { skip: find("roomskip").checked }));
+find("roompriority").addEventListener("change", ({ target }) => change("room_set", { priority: Math.round(target.value) }));
 find("merge").addEventListener("click", (event) => {
   const both = [pickedRoom, Number(find("mergewith").value)];
   if (!isSure(event.target)) return;

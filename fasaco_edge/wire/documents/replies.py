@@ -167,6 +167,9 @@ class MissionReport(Document, frozen=True):
         unreached: part of the order that stays uncovered as things are.
         waits_for_room: name of the room that the order waits for; null for none.
         left_out: rooms that the order for everything leaves out, by their settings.
+        time_left_s: time until the order ends with the robot at home [s]; null without a limit.
+        first_from: priority from which on floor is planned now, as time or battery do not allow
+            all; null while all is.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None
@@ -187,6 +190,8 @@ class MissionReport(Document, frozen=True):
     keep_outs: Annotated[tuple[KeepOutReport, ...], allowed(maxItems=200)] = ()
     waits_for_room: str | None = None
     left_out: Annotated[tuple[str, ...], allowed(maxItems=250)] = ()
+    time_left_s: Amount | None = None
+    first_from: Annotated[int, Meta(ge=1, le=100)] | None = None
 
 
 class Reply(Document, frozen=True):

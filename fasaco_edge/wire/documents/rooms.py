@@ -29,6 +29,7 @@ class RoomReport(Document, frozen=True):
         passes: passes of an order by its name that gives none itself, as in `mission.json`; null
             for as many as other zones.
         skip: whether orders for everything leave it out.
+        priority: where time or battery do not allow all, rooms of higher priority come first.
     """
 
     id: Ordinal = 1
@@ -41,6 +42,7 @@ class RoomReport(Document, frozen=True):
     to_go_s: Amount | None = None
     passes: int | tuple[str | dict[str, object], ...] | None = None
     skip: bool = False
+    priority: Annotated[int, Meta(ge=0, le=100)] = 50
 
     @property
     def title(self) -> str:

@@ -1,0 +1,262 @@
+"""Floor by its priority: what comes first where time or battery do not allow all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import CommandReceived, PriorityReceived, State
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.orders.order import order_document, read_order
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.placing import are_same
+from fasaco_edge.mission.orders.room_requests import RoomRequest
+from fasaco_edge.mission.orders.sequencer import MAX_IN_VAIN
+from fasaco_edge.mission.orders.worth import least_priority
+from tests.mission.battery import Battery
+from tests.mission.test_room_orders import (
+    BOTH,
+    EAST_COLUMNS,
+    IN_EAST,
+    IN_WEST,
+    WAITS,
+    WEST_COLUMNS,
+    name,
+    room_at,
+    settle,
+    settled,
+    visited,
+)
+from tests.mission.world import rectangle
+
+# Both rooms have 90 cells, a second each; the passage between them 8.
+TIGHT_MIN = 2.5
+
+
+def tick(drive):
+    if drive.request is not None:
+        drive.plan()
+    drive.go()
+    drive.tell(after=0.9)
+
+
+def finish(drive):
+    """Drive a cell a second until the mission is done; return how many cells of each room."""
+    for _ in range(400):
+        if drive.mission.state is State.DONE:
+            return len(visited(drive, WEST_COLUMNS)), len(visited(drive, EAST_COLUMNS))
+        tick(drive)
+    raise AssertionError(drive.mission.reason)
+
+
+def ranked(priority, **settings):
+    """A robot in the west of two rooms, the eastern one with a priority."""
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "bath")
+    if priority is not None:
+        drive.command("room_set", room=RoomRequest("bath", priority=priority))
+    drive.command("start", settings)
+    assert drive.refused is None
+    return drive
+
+
+def test_the_room_of_higher_priority_comes_first_where_time_is_short():
+    assert finish(ranked(None, until_min=TIGHT_MIN))[1] < 60
+    drive = ranked(80, until_min=TIGHT_MIN)
+    drive.plan()
+    assert drive.mission.first_from == 80
+    west, east = finish(drive)
+    assert east == 90
+    assert west < 60
+    assert drive.mission.first_from == 0
+    # A room of lower priority comes last.
+    assert finish(ranked(20, until_min=TIGHT_MIN))[1] < 60
+
+
+@pytest.mark.parametrize("settings", [{}, {"until_min": 60.0}, {"until_min": 0.0}])
+def test_where_all_can_be_done_the_path_is_the_same_bit_for_bit(settings):
+    driven = []
+    for priority in None, 80:
+        drive = ranked(priority, **settings)
+        assert min(finish(drive)) == 90
+        driven.append(drive.driven)
+        assert "the most worthwhile" not in " ".join(each.reason for each in drive.updates)
+    assert driven[0] == driven[1]
+
+
+def test_a_robot_that_turns_out_too_slow_turns_to_what_matters():
+    drive = ranked(80, until_min=5.0)
+    for _ in range(20):
+        tick(drive)
+        assert drive.mission.first_from == 0
+    for _ in range(30):
+        tick(drive)
+        drive.tell(after=3.0)
+    assert drive.mission.first_from == 80
+    tick(drive)
+    reasons = [each.reason for each in drive.updates]
+    assert "not all can be done in time: the most worthwhile floor first" in reasons
+    assert finish(drive)[1] == 90
+    assert "what comes first is done: the rest" in [each.reason for each in drive.updates]
+
+
+def test_the_rest_follows_where_time_is_left_after_all():
+    drive = ranked(80, until_min=TIGHT_MIN)
+    drive.plan()
+    assert drive.mission.first_from == 80
+    drive.command("room_set", room=RoomRequest("bath", priority=50))
+    drive.command("start", {"until_min": 60.0})
+    assert min(finish(drive)) == 90
+
+
+def test_the_battery_is_a_limit_too():
+    shares = []
+    for priority in None, 80:
+        drive = Battery(0.9, cell=IN_WEST, rows=BOTH, order_state=WAITS, dock=None)
+        settle(drive)
+        drive.level = 0.9
+        drive.mission.charging.gauge._drains.extend([0.005] * 5)
+        number = room_at(drive, *IN_EAST).id
+        if priority:
+            drive.command("room_set", room=RoomRequest(number, priority=priority))
+        drive.command("start")
+        for _ in range(130):
+            tick(drive)
+        cells, covered = drive.mission.room_progress()[number]
+        shares.append(covered / cells)
+    assert shares[0] < 0.6
+    assert shares[1] == 1.0
+
+
+def test_what_comes_first_and_cannot_be_reached_does_not_keep_the_rest():
+    drive = ranked(80, until_min=TIGHT_MIN)
+    drive.plan()
+    orders = drive.mission._orders
+    for _ in range(MAX_IN_VAIN):
+        assert not orders.note_path_end("")
+        assert drive.mission.first_from == 80
+    assert not orders.note_path_end("")
+    assert drive.mission.first_from == 0
+    problem = drive.command("replan").plan.problem
+    assert np.count_nonzero(problem.to_cover) > 150, "the other room, too"
+
+
+def dirt(value, frame="map", columns=EAST_COLUMNS):
+    """A dirt map of cells as wide as the lattice's: a value in some columns, else none."""
+    cells = np.full((10, 21), -1, np.int8)
+    cells[:, list(columns)] = value
+    return PriorityReceived(OccupancyGrid(GridGeometry(10, 21, 0.25, Pose2D(0, 0)), cells, frame))
+
+
+def test_a_map_of_dirt_says_what_comes_first():
+    drive = settled(*BOTH)
+    drive.tell(dirt(90))
+    drive.command("start", {"until_min": TIGHT_MIN})
+    drive.plan()
+    assert drive.mission.first_from == 90
+    west, east = finish(drive)
+    assert east == 90
+    assert west < 60
+    # It also holds in a mission that succeeds this one, and within zones.
+    after = Mission(drive.config)
+    after.restore_order(WAITS)
+    after.step(drive.mission.held(), 0.0)
+    order = {"zones": [{"name": "all", "polygon": rectangle(0, 0, 10, 21)}], "until_min": 2.5}
+    decision = after.step([CommandReceived(1, "start", read_order(order), discard=True)], 1.0)
+    assert after.first_from == 90
+    assert np.count_nonzero(decision.plan.problem.to_cover) == 90
+
+
+def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
+    drive = ranked(80, until_min=TIGHT_MIN)
+    drive.plan()
+    assert drive.mission.first_from == 80
+    for _ in range(5):
+        tick(drive)
+    drive.tell(dirt(95, columns=WEST_COLUMNS))
+    assert (drive.request.reason, drive.mission.first_from) == ("priorities have changed", 95)
+    assert finish(drive)[0] == 90
+    drive = ranked(None, until_min=60.0)
+    drive.plan()
+    drive.tell(dirt(95))
+    assert (drive.request, drive.mission.first_from) == (None, 0)
+
+
+def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
+    drive = settled(*BOTH)
+    (fault,) = drive.tell(dirt(90, frame="odom")).faults
+    assert (fault.code, str(fault)) == ("wrong_frame", "priorities in frame 'odom', map in 'map'")
+    drive.command("start", {"until_min": TIGHT_MIN})
+    drive.plan()
+    assert drive.mission.first_from == 0
+
+
+WEST, EAST = rectangle(0, 0, 10, 10), rectangle(0, 11, 10, 21)
+
+
+def zones(west=None, east=None):
+    given = (("west", WEST, west), ("east", EAST, east))
+    return [
+        {"name": name, "polygon": polygon} | ({} if priority is None else {"priority": priority})
+        for name, polygon, priority in given
+    ]
+
+
+@pytest.mark.parametrize(
+    ("priorities", "until_min", "first"),
+    [
+        ({"east": 51}, 1.5, "east"),
+        ({"west": 49}, 1.5, "east"),
+        ({"west": 51}, 1.5, "west"),
+        ({}, 1.5, "west"),
+        ({"east": 51}, 60.0, "west"),
+        ({"east": 51}, 0.0, "west"),
+    ],
+)
+def test_zones_of_higher_priority_come_first_where_time_is_short(priorities, until_min, first):
+    drive = settled(*BOTH)
+    order = {"zones": zones(**priorities), "until_min": until_min}
+    drive.command("start", order)
+    assert drive.mission.order_state.order.zones[0].name == first
+    assert drive.mission.zone_progress()[0].name == first
+    # The same order goes on, and so does one that is kept over a restart.
+    assert are_same(drive.mission.order_state.order, read_order(order))
+    kept = OrderState.from_json(drive.mission.order_state.to_json())
+    assert kept.order.zones == drive.mission.order_state.order.zones
+
+
+def test_a_room_gives_its_priority_to_the_zone_of_its_name():
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "bath")
+    name(drive, room_at(drive, *IN_WEST).id, "hall")
+    drive.command("room_set", room=RoomRequest("bath", priority=70))
+    named = [{"name": "hall"}, {"name": "bath"}]
+    drive.command("start", {"zones": named, "until_min": 1.5})
+    first, second = drive.mission.order_state.order.zones
+    assert (first.name, first.worth, second.worth) == ("bath", 70, 50)
+    named[1]["priority"] = 10
+    drive.command("start", {"zones": named, "until_min": 1.5})
+    assert [zone.worth for zone in drive.mission.order_state.order.zones] == [50, 10]
+    document = order_document(drive.mission.order_state.order)
+    assert document["zones"][1]["priority"] == 10
+
+
+@pytest.mark.parametrize(
+    ("cells", "may_work_s", "least"),
+    [
+        ({50: 10}, 1.0, 0),
+        ({50: 10, 60: 10}, 20.0, 0),
+        ({50: 10, 60: 10}, 19.0, 60),
+        # Some that fit together are one plan; what does not fit is still first.
+        ({50: 10, 60: 5, 70: 5}, 15.0, 60),
+        ({50: 10, 60: 5, 70: 5}, 10.0, 70),
+        ({50: 10, 60: 5, 70: 5}, 1.0, 70),
+        ({0: 5, 100: 5}, 0.0, 100),
+    ],
+)
+def test_which_priorities_fit(cells, may_work_s, least):
+    counts = np.zeros(101, np.int64)
+    counts[list(cells)] = list(cells.values())
+    assert least_priority(counts, 1.0, may_work_s) == least
