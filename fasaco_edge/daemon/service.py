@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
@@ -26,7 +27,6 @@ from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.mask_topic import MaskTopic
 from fasaco_edge.daemon.memory import afforded, has_default_sizes, needed_bytes
-from fasaco_edge.daemon.metrics import serve_metrics
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
@@ -40,6 +40,9 @@ from fasaco_edge.host.processes import (
     return_soon,
 )
 from fasaco_edge.wire import topics
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.metrics import MetricsServer
 
 LOG = logging.getLogger(__name__)
 
@@ -149,6 +152,15 @@ def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManage
             return None
 
 
+def _metrics_of(config: DaemonConfig) -> MetricsServer | None:
+    """Return the server of metrics, if one is configured: a daemon without is smaller."""
+    if (address := config.metrics.address()) is None:
+        return None
+    from fasaco_edge.daemon.metrics import serve_metrics  # noqa: PLC0415
+
+    return serve_metrics(address)
+
+
 def _afforded(config: DaemonConfig) -> DaemonConfig:
     """Return the configuration, with smaller maps if memory is limited; log that."""
     limit = memory_limit()
@@ -205,7 +217,7 @@ def _serve(
         claim=NameClaim(bus, keys),
     )
     keeper = LedgerKeeper(ledger, config.cell_m, autostart=config.mission.autostart)
-    metrics = serve_metrics(config.metrics.address())
+    metrics = _metrics_of(config)
     loop = Loop(config, ports, keeper, rooms, Host(Watchdog(manager), reload, recorder, metrics))
     serve_about(bus, keys, lambda: loop.config)
     try:
