@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.arrival import Sample
     from fasaco_edge.bus.session import Bus
     from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.daemon.loop.periodic import PeriodicMessage
     from fasaco_edge.errors import FasacoError
     from fasaco_edge.mission.core.events import MemberReceived
     from fasaco_edge.mission.core.mission import Mission
@@ -35,13 +36,6 @@ class MessagesOfOthers(Protocol):
         """Return the faults since the last call that ``event`` did not raise."""
 
 
-class MessageToOthers(Protocol):
-    """Publisher of this robot's message to the other robots of its fleet."""
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish a message if due; the caller catches failures."""
-
-
 def company_of(config: DaemonConfig) -> CompanyKind:
     """Return the mission's kind of interface to other robots."""
     if not config.fleet:
@@ -60,7 +54,7 @@ def receiver_of(config: DaemonConfig) -> MessagesOfOthers | None:
     return FleetReceiver(config)
 
 
-def sender_of(config: DaemonConfig, bus: Bus) -> MessageToOthers | None:
+def sender_of(config: DaemonConfig, bus: Bus) -> PeriodicMessage | None:
     """Return the publisher of this robot's message to the others; None without a fleet."""
     if not config.fleet:
         return None

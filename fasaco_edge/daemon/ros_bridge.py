@@ -23,7 +23,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.diagnostics import encode_diagnostics
 from fasaco_edge.wire.ros_keys import Endpoint, RosNode, RosTopic, gid_of
-from fasaco_edge.wire.topic_types import VOLATILE, Topic
+from fasaco_edge.wire.topic_types import Qos
 
 # The request of a Trigger has five bytes.
 MOST_REQUEST_BYTES = 1024
@@ -34,7 +34,7 @@ class RosBridge:
 
     Attributes:
         map: the map's subscription, to query a missing map.
-        path, coverage, diagnostics: where to publish them.
+        publishers: by the native topic that is like each.
         commands: command of each service, by the service's key.
     """
 
@@ -51,41 +51,37 @@ class RosBridge:
             bus.token(self._node.token)
         inputs = {name: self._subscribe(name, topic) for name, topic in config.inputs.items()}
         self.map = inputs["map"]
-        likes = (topics.PATH, topics.COVERAGE, topics.COMMAND)
-        self.path, self.coverage, self.diagnostics = (
-            self._publisher(topic, like)
-            for topic, like in zip(config.outputs.values(), likes, strict=True)
-        )
+        self.publishers = {
+            name: self._publisher(topic, topics.QOS.get(name, topics.QOS[topics.COMMAND.name]))
+            for name, topic in config.outputs.items()
+        }
         self.commands = {
             self._serve(service): command for command, service in config.commands.items()
         }
 
     def _subscribe(self, kind: str, topic: RosTopic) -> Subscription:
         take = poster(self._mailbox, kind, self._max_pixels)
+        return self._listen(topic, take, in_order=kind in topics.IN_ORDER)
 
+    def subscribe_mask(self, take: Callable[[Sample], None]) -> Subscription:
+        """Subscribe to the keep-out mask; ``take`` is called on a Zenoh thread."""
+        return self._listen(self._config.keep_out_mask, take)
+
+    def _listen(
+        self, topic: RosTopic, take: Callable[[Sample], None], *, in_order: bool = False
+    ) -> Subscription:
         def post(sample: Sample) -> None:
             take(sample.as_type(topic.schema))  # ROS sends no type with a sample
 
         key = self._config.input_key(topic)
-        in_order = kind in topics.IN_ORDER
         subscription = self._bus.subscribe(key, post, topic.latched, topic.depth, in_order=in_order)
-        self._announce("MS", topic)
-        return subscription
-
-    def subscribe_mask(self, take: Callable[[Sample], None]) -> Subscription:
-        """Subscribe to the keep-out mask; ``take`` is called on a Zenoh thread."""
-        topic = self._config.keep_out_mask
-        key = self._config.input_key(topic)
-        subscription = self._bus.subscribe(
-            key, lambda sample: take(sample.as_type(topic.schema)), topic.latched, topic.depth
-        )
         self._announce("MS", topic)
         return subscription
 
     def diagnose(self, status: Status) -> None:
         """Publish a status as diagnostics."""
         payload = encode_diagnostics(status, self._node.name, time.time_ns())
-        self.diagnostics.put(payload)
+        self.publishers["diagnostics"].put(payload)
 
     def _serve(self, service: RosTopic) -> str:
         """Take the requests of a service; return its key expression, which allows any type hash."""
@@ -96,10 +92,8 @@ class RosBridge:
         self._announce("SS", service)
         return key
 
-    def _publisher(self, topic: RosTopic, like: Topic) -> RosPublisher:
-        """Publish ``topic`` with the quality of service of the native key ``like``."""
-        key = self._config.output_key(topic)
-        publisher = self._bus.publisher(key, topic.schema, like.qos or VOLATILE)
+    def _publisher(self, topic: RosTopic, qos: Qos) -> RosPublisher:
+        publisher = self._bus.publisher(self._config.output_key(topic), topic.schema, qos)
         token = self._announce("MP", topic)
         return RosPublisher(publisher, gid_of(token) if token else b"")
 

@@ -23,10 +23,10 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, encode_rooms
-from fasaco_edge.daemon.loop.last_samples import ShownTrail
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.mission_reports import mission_report
-from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
+from fasaco_edge.daemon.loop.outbox import headings
+from fasaco_edge.daemon.loop.periodic import MOST_SQUARES, ShownTrail
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry

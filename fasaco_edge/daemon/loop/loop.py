@@ -20,14 +20,15 @@ from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.daemon.loop.outbox import (
+from fasaco_edge.daemon.loop.outbox import Outbox
+from fasaco_edge.daemon.loop.periodic import (
     CoveragePublisher,
     FloorPublisher,
-    Outbox,
+    PeriodicMessage,
+    RoomsPublisher,
     TrailPublisher,
     UnsweptPublisher,
 )
-from fasaco_edge.daemon.loop.rooms_publisher import RoomsPublisher
 from fasaco_edge.daemon.loop.status import StatusBoard
 from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
 from fasaco_edge.daemon.notify import Watchdog
@@ -43,7 +44,6 @@ from fasaco_edge.mission.core.events import (
 )
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.fleet_wing import MessageToOthers
     from fasaco_edge.daemon.metrics import MetricsServer
 
 LOG = logging.getLogger(__name__)
@@ -66,7 +66,7 @@ class BusPorts:
     outbox: Outbox
     turns: TurnLog
     claim: NameClaim
-    fleet: MessageToOthers | None = None
+    fleet: PeriodicMessage | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,9 +97,15 @@ class Loop:
         self._status = StatusBoard(config)
         self._latency = MapLatency()
         self._coverage = CoveragePublisher(bus.outbox)
-        self._floor = FloorPublisher(bus.outbox)
-        self._unswept = UnsweptPublisher(bus.outbox)
-        self._trail = TrailPublisher(bus.outbox)
+        # Messages of a mission, published when each is due.
+        self._periodic: dict[str, PeriodicMessage] = {
+            "coverage": self._coverage,
+            "floor": FloorPublisher(bus.outbox),
+            "unswept": UnsweptPublisher(bus.outbox),
+            "pheromone": TrailPublisher(bus.outbox),
+        }
+        if bus.fleet is not None:
+            self._periodic["fleet"] = bus.fleet
         self._rooms_out = RoomsPublisher(bus.outbox, rooms.book)
         self._guard = bus.outbox.guard
         self._failed_at = float("-inf")
@@ -288,12 +294,8 @@ class Loop:
         if mission.route.wanted and mission.route.is_improving:
             self._runner.interrupt()  # a needed plan comes before an improvement
         self._perform(decision)
-        self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
-        self._guard.attempt("floor", partial(self._floor.publish, mission, now))
-        self._guard.attempt("unswept", partial(self._unswept.publish, mission, now))
-        self._guard.attempt("pheromone", partial(self._trail.publish, mission, now))
-        if self._bus.fleet is not None:
-            self._guard.attempt("fleet", partial(self._bus.fleet.publish, mission, now))
+        for name, message in self._periodic.items():
+            self._guard.attempt(name, partial(message.publish, mission, now))
         return decision
 
     def _perform(self, decision: Decision) -> None:

@@ -19,7 +19,8 @@ from fasaco_edge.daemon.loop.inbox import blocked_of, make_mailbox
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.loop import TICK_S as LOOP_S
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
+from fasaco_edge.daemon.loop.outbox import headings
+from fasaco_edge.daemon.loop.periodic import MOST_SQUARES
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
 from fasaco_edge.follow.estimate import Command, Limits
 from fasaco_edge.follow.follower import Follower
