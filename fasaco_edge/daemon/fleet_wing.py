@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.arrival import Sample
     from fasaco_edge.bus.session import Bus
     from fasaco_edge.config.config import DaemonConfig
-    from fasaco_edge.daemon.loop.periodic import PeriodicMessage
     from fasaco_edge.errors import FasacoError
     from fasaco_edge.mission.core.events import MemberReceived
     from fasaco_edge.mission.core.mission import Mission
@@ -34,6 +33,13 @@ class MessagesOfOthers(Protocol):
 
     def take_faults(self) -> list[FasacoError]:
         """Return the faults since the last call that ``event`` did not raise."""
+
+
+class PeriodicMessage(Protocol):
+    """A message that is published when it is due."""
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish it if due at ``now`` [s, monotonic]; the caller catches failures."""
 
 
 def company_of(config: DaemonConfig) -> CompanyKind:

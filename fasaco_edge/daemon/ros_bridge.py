@@ -23,7 +23,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.diagnostics import encode_diagnostics
 from fasaco_edge.wire.ros_keys import Endpoint, RosNode, RosTopic, gid_of
-from fasaco_edge.wire.topic_types import Qos
+from fasaco_edge.wire.topic_types import VOLATILE, Topic
 
 # The request of a Trigger has five bytes.
 MOST_REQUEST_BYTES = 1024
@@ -51,8 +51,9 @@ class RosBridge:
             bus.token(self._node.token)
         inputs = {name: self._subscribe(name, topic) for name, topic in config.inputs.items()}
         self.map = inputs["map"]
+        likes = {topic.name: topic for topic in (topics.PATH, topics.COVERAGE)}
         self.publishers = {
-            name: self._publisher(topic, topics.QOS.get(name, topics.QOS[topics.COMMAND.name]))
+            name: self._publisher(topic, likes.get(name, topics.COMMAND))
             for name, topic in config.outputs.items()
         }
         self.commands = {
@@ -92,8 +93,10 @@ class RosBridge:
         self._announce("SS", service)
         return key
 
-    def _publisher(self, topic: RosTopic, qos: Qos) -> RosPublisher:
-        publisher = self._bus.publisher(self._config.output_key(topic), topic.schema, qos)
+    def _publisher(self, topic: RosTopic, like: Topic) -> RosPublisher:
+        """Publish ``topic`` with the quality of service of the native key ``like``."""
+        key = self._config.output_key(topic)
+        publisher = self._bus.publisher(key, topic.schema, like.qos or VOLATILE)
         token = self._announce("MP", topic)
         return RosPublisher(publisher, gid_of(token) if token else b"")
 

@@ -28,7 +28,7 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
+from fasaco_edge.wire.messages.grids import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
 
 # Limit on the points shown of a path; reading a path takes some 4 us a point.

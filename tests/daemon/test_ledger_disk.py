@@ -8,7 +8,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from fasaco_edge.daemon.ledger.writer import RETRY_S
+from fasaco_edge.daemon.ledger.disk_writer import RETRY_S
 from tests.support.disks import disk_fixture
 from tests.support.outsider import Outsider
 from tests.support.processes import STOP_S, Daemon, daemon_process

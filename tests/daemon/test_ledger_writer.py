@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 from msgspec.structs import asdict
 
-from fasaco_edge.daemon.ledger import writer as ledger_writer
+from fasaco_edge.daemon.ledger import disk_writer
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
+from fasaco_edge.daemon.ledger.disk_writer import HANGS_S
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.daemon.ledger.writer import (
     FLOOR_PERIOD_S,
-    HANGS_S,
     PERIOD_S,
     LedgerKeeper,
     LedgerWriter,
@@ -47,7 +47,7 @@ def document(writer: LedgerWriter) -> dict[str, Any]:
 
 @pytest.fixture
 def retry_soon(monkeypatch):
-    monkeypatch.setattr(ledger_writer, "RETRY_S", 0.05)
+    monkeypatch.setattr(disk_writer, "RETRY_S", 0.05)
 
 
 def test_what_is_put_is_written(tmp_path):
@@ -179,7 +179,7 @@ def test_new_ledgers_do_not_make_a_failing_disk_busy(tmp_path, monkeypatch):
         tries.append(descriptor)
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr(ledger_writer, "RETRY_S", 600.0)
+    monkeypatch.setattr(disk_writer, "RETRY_S", 600.0)
     writer = open_ledger(tmp_path, "robot", CELL_M)
     monkeypatch.setattr(os, "fsync", failing)
     for length in range(1, 60):

@@ -15,7 +15,7 @@ import pytest
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger import rooms_file
-from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, encode_rooms
+from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms, encode_rooms
 from fasaco_edge.daemon.ledger.rooms_file import PERIOD_S, RoomsFile, RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
 from fasaco_edge.daemon.loop.inbox import make_mailbox
@@ -60,7 +60,7 @@ def full():
 
 
 def written(book):
-    return encode_rooms(BookSnapshot.of(book))
+    return encode_rooms(book)
 
 
 def test_a_book_is_read_as_it_was_written():

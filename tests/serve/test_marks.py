@@ -19,7 +19,7 @@ from fasaco_edge.serve.messages import message_text
 from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.settings import MapSettings, RobotSettings
 from fasaco_edge.wire.documents.status import DriveReport
-from fasaco_edge.wire.messages.grid_octets import GridOctets
+from fasaco_edge.wire.messages.grids import GridOctets
 from fasaco_edge.wire.messages.maps import CoverageValue
 
 

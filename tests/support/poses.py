@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.wire.messages.cdr import CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import write_header, write_pose
+from fasaco_edge.wire.messages.cdr import CdrWriter, refuse, write_header, write_pose
 from fasaco_edge.wire.schemas import ODOMETRY, POSE_WITH_COVARIANCE_STAMPED
 
 COVARIANCE_FLOATS = 36

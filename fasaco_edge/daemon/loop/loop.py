@@ -24,7 +24,6 @@ from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.periodic import (
     CoveragePublisher,
     FloorPublisher,
-    PeriodicMessage,
     RoomsPublisher,
     TrailPublisher,
     UnsweptPublisher,
@@ -44,6 +43,7 @@ from fasaco_edge.mission.core.events import (
 )
 
 if TYPE_CHECKING:
+    from fasaco_edge.daemon.fleet_wing import PeriodicMessage
     from fasaco_edge.daemon.metrics import MetricsServer
 
 LOG = logging.getLogger(__name__)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,13 +48,6 @@ TRAIL_PERIOD_S = 0.5
 CELLS_PER_S = 200_000
 # Least period of changed rooms, and of swept shares alone while the robot drives [s].
 ROOMS_PERIOD_S, SWEPT_PERIOD_S = 1.0, 5.0
-
-
-class PeriodicMessage(Protocol):
-    """A message that is published when it is due."""
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish it if due at ``now`` [s, monotonic]; the caller catches failures."""
 
 
 class Due:

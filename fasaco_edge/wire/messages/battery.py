@@ -7,8 +7,7 @@ import struct
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
 from fasaco_edge.wire.schemas import BATTERY_STATE
 
 Power = Literal["unknown", "charging", "discharging", "not charging", "full"]

@@ -13,8 +13,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.messages.cdr import HEADER_SIZE, CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import write_header, write_pose
+from fasaco_edge.wire.messages.cdr import (
+    HEADER_SIZE,
+    CdrReader,
+    CdrWriter,
+    refuse,
+    write_header,
+    write_pose,
+)
 from fasaco_edge.wire.messages.follow_path import (
     ABORTED,
     CANCELED,

@@ -14,8 +14,14 @@ from typing import Final
 
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.limits import MAX_PATH_POSES
-from fasaco_edge.wire.messages.cdr import HEADER_SIZE, CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import write_header, write_pose
+from fasaco_edge.wire.messages.cdr import (
+    HEADER_SIZE,
+    CdrReader,
+    CdrWriter,
+    refuse,
+    write_header,
+    write_pose,
+)
 
 SEND_GOAL: Final = "nav2_msgs/action/FollowPath_SendGoal"
 GET_RESULT: Final = "nav2_msgs/action/FollowPath_GetResult"

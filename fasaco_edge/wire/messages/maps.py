@@ -6,27 +6,30 @@ The coverage is also an occupancy grid, on the lattice: any map viewer shows it.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge import kernels as cell
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
-from fasaco_edge.wire.messages.grid_fields import read_cells, write_cells
-from fasaco_edge.wire.messages.grid_info import (
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
+from fasaco_edge.wire.messages.grids import (
     PLACE,
     PLACE_NAMES,
     read_grid_geometry,
+    read_octets,
     write_grid_geometry,
 )
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE
 
 PATCH_CELLS = 4096
 """Up to this many cells are checked by calls that start quickly, but copy the cells."""
+
+
+_Cell = TypeVar("_Cell", np.int8, np.uint8)
 
 
 class CoverageValue(IntEnum):
@@ -103,6 +106,30 @@ def encode_map_update(patch: MapPatch) -> bytes:
     writer.words(PLACE, PLACE_NAMES, *place)
     write_cells(writer, patch.cells)
     return writer.payload()
+
+
+def read_cells(
+    reader: CdrReader,
+    geometry: GridGeometry | Window,
+    dtype: type[_Cell],
+    max_cells: int,
+    field: str = "data",
+) -> NDArray[_Cell]:
+    """Read the last field, a byte for each of the cells of ``geometry``.
+
+    Returns a read-only view, (rows, cols), of type ``dtype``.
+    """
+    octets = read_octets(reader, geometry, max_cells, field)
+    cells: NDArray[_Cell] = np.ndarray((geometry.rows, geometry.cols), dtype, octets)
+    return cells
+
+
+def write_cells(writer: CdrWriter, cells: NDArray[np.generic], field: str = "data") -> None:
+    """Write cells of one byte each, (rows, cols), as the last field."""
+    if not cells.size:
+        refuse(writer.message, f"length of {field}", "at least 1", 0)
+    writer.uint32(cells.size, f"length of {field}")
+    writer.view(np.ascontiguousarray(cells).data)
 
 
 def _check_occupancy(cells: NDArray[np.int8], message: str) -> None:

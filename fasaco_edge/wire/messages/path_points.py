@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.limits import MAX_PATH_POSES
-from fasaco_edge.wire.messages.cdr import CdrReader, refuse
-from fasaco_edge.wire.messages.fields import POSE, check_pose, read_header, yaw_of
+from fasaco_edge.wire.messages.cdr import POSE, CdrReader, check_pose, read_header, refuse, yaw_of
 from fasaco_edge.wire.schemas import PATH
 
 LEAST_POSE_BYTES = 72

@@ -14,12 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_PATH_POSES, QUATERNION_TOLERANCE
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, encoded_string, refuse
-from fasaco_edge.wire.messages.fields import (
+from fasaco_edge.wire.messages.cdr import (
     POSE,
     SECOND_NS,
+    CdrReader,
+    CdrWriter,
     check_pose,
+    encoded_string,
     read_header,
+    refuse,
     write_header,
 )
 from fasaco_edge.wire.messages.path_points import read_path_pose, read_pose_count

@@ -17,15 +17,14 @@ from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
-from fasaco_edge.wire.messages.grid_fields import read_cells, write_cells
-from fasaco_edge.wire.messages.grid_info import (
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
+from fasaco_edge.wire.messages.grids import (
     COLONY,
     COLONY_NAMES,
     read_grid_geometry,
     write_grid_geometry,
 )
+from fasaco_edge.wire.messages.maps import read_cells, write_cells
 from fasaco_edge.wire.schemas import PHEROMONE_GRID
 
 TOP_STEP = 254

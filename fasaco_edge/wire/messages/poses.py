@@ -18,13 +18,15 @@ from fasaco_edge.wire.limits import (
     MAX_TRANSFORMS,
     QUATERNION_TOLERANCE,
 )
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import (
+from fasaco_edge.wire.messages.cdr import (
     IN_METRES,
     IN_QUATERNIONS,
     POSE,
+    CdrReader,
+    CdrWriter,
     read_header,
     read_pose,
+    refuse,
     write_header,
     write_pose,
     yaw_of,

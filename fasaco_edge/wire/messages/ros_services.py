@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter
-from fasaco_edge.wire.messages.fields import clipped
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, clipped
 from fasaco_edge.wire.ros_keys import TRIGGER, attachment, attachment_of
 
 Triggered = Literal["start", "pause", "resume", "home", "cancel"]

@@ -7,8 +7,7 @@ import struct
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
 from fasaco_edge.wire.schemas import TWIST, TWIST_SCHEMAS, TWIST_STAMPED
 
 _TWIST = struct.Struct("<6d")
