@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.cautions import log_cautions
@@ -31,7 +32,6 @@ from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.host.processes import (
     call_on,
     end_within,
@@ -59,8 +59,6 @@ END_S = 9.0
 # Thread switch interval of the interpreter [s]. Zenoh's threads call back with each sample; at
 # Python's default of 5 ms the loop waits for them several times a cycle.
 SWITCH_S = 0.0005
-# Period of a client's retries to reach its router [s].
-ROUTER_RETRY_S = 1.0
 
 
 def run_daemon(
@@ -131,25 +129,19 @@ def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManage
     Raises:
         BusUnavailable: no session can be opened, and waiting does not help.
     """
-    is_waiting = False
-    while True:
-        try:
-            return open_bus(settings)
-        except BusUnavailable as error:
-            # Wrong addresses or credentials of its own cannot be fixed by waiting.
-            if settings.mode != "client" or settings.secured:
-                raise
-            if not is_waiting:
-                there = ", ".join(settings.connect)
-                LOG.warning("waiting for a router at %s: %s", there, error, extra={"event": "bus"})
-                # A service that is never ready is ended after a while; this one is as ready as it
-                # can be.
-                manager.ready()
-                manager.status(f"waiting for a router at {there}")
-                is_waiting = True
+    # Wrong addresses or credentials of its own cannot be fixed by waiting.
+    if settings.mode != "client" or settings.secured:
+        return open_bus(settings)
+
+    def tell(is_first: bool) -> None:
+        if is_first:
+            # A service that is never ready is ended after a while; this one is as ready as it
+            # can be.
+            manager.ready()
+            manager.status(f"waiting for the bus at {', '.join(settings.connect)}")
         manager.alive()
-        if stop.wait(ROUTER_RETRY_S):
-            return None
+
+    return join(settings, stop, tell)
 
 
 def _metrics_of(config: DaemonConfig) -> MetricsServer | None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import PathProgress, RobotState
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.serve.digest import areas, lately, state
+from fasaco_edge.serve.digest import Way, areas, lately, state
 from fasaco_edge.serve.marks import (
     COVERAGE_MARKS,
     FIELD_MARKS,
@@ -20,7 +20,6 @@ from fasaco_edge.serve.marks import (
     map_marks,
 )
 from fasaco_edge.serve.messages import framed, message_text
-from fasaco_edge.serve.pace import Way
 from fasaco_edge.serve.rooms import rooms, shares
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
@@ -66,8 +65,6 @@ class ServedView(RobotState):
         super().__init__(keys.robot)
         self._keys = keys
         self._grids: dict[str, GridOctets] = {}
-        # The order as received: the status of an older daemon only names its zones.
-        self._order: dict[str, object] = {}
         self._others: dict[str, tuple[float, float, float]] = {}
         self._path: Sample | None = None
         # The newest path that leads anywhere: a paused robot goes on with it.
@@ -93,9 +90,7 @@ class ServedView(RobotState):
             "state": lambda now: message_text(
                 "state", **state(self, self._way, now, self._ordered)
             ),
-            "areas": lambda _: message_text(
-                "areas", **areas(self.settings, self._order, self._mission)
-            ),
+            "areas": lambda _: message_text("areas", **areas(self.settings, self._mission)),
             "rooms": lambda _: message_text("rooms", **rooms(self.rooms)),
             "shares": lambda _: message_text("shares", **shares(self.rooms)),
             "events": lambda _: message_text("events", entries=lately(self.events)),
@@ -137,7 +132,7 @@ class ServedView(RobotState):
             "pose": (self.pose, self.walk, self.walk.at),
             "path": self._shown_path,
             "events": self.events.count,
-            "areas": (self.settings, self._order, self._mission.zones, self._mission.keep_outs),
+            "areas": (self.settings, self._mission.zones, self._mission.keep_outs),
             "rooms": (self.rooms,),
             "shares": (self.rooms,),
             "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
@@ -215,14 +210,6 @@ class ServedView(RobotState):
         member = decode_member(sample.payload, fleet.name)
         if member is not None and (robot in self._others or len(self._others) < MOST_OTHERS):
             self._others[robot] = (now, member.x, member.y)
-
-    def _follow(self, document: dict[str, object], now: float) -> None:
-        super()._follow(document, now)
-        order = document.get("order")
-        if document.get("command") == "start":
-            self._order = order if isinstance(order, dict) else {}
-        elif document.get("command") in ("cancel", "reset"):
-            self._order = {}
 
     def _near(self, now: float) -> Iterator[dict[str, object]]:
         for robot, (at_s, x, y) in list(self._others.items()):

@@ -14,7 +14,6 @@ from fasaco_edge.bus.queries import Question, Reply
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.daemon.loop.answers import Commands
-from fasaco_edge.daemon.loop.held_events import HeldEvents
 from fasaco_edge.daemon.loop.inbox import (
     MOST_POSES,
     Inbox,
@@ -22,6 +21,7 @@ from fasaco_edge.daemon.loop.inbox import (
     make_mailbox,
     take_batch,
 )
+from fasaco_edge.daemon.loop.mission_runner import HeldEvents
 from fasaco_edge.errors import MalformedMessage, PatchWithoutBase, PlanFailed
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import (

@@ -14,9 +14,8 @@ from contextlib import ExitStack, contextmanager
 import pytest
 from msgspec import structs
 
-from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.config import DaemonConfig, MetricsConfig
 from fasaco_edge.config.loading import inspect_config
-from fasaco_edge.config.metrics import Address, MetricsConfig
 from fasaco_edge.daemon.metrics import (
     CONTENT_TYPE,
     FIGURES,
@@ -26,6 +25,7 @@ from fasaco_edge.daemon.metrics import (
     serve_metrics,
 )
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.addresses import Address
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import STATES, CoverageReport, FloorReport
 from fasaco_edge.wire.documents.status import (

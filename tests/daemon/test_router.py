@@ -125,7 +125,7 @@ def test_a_client_waits_for_its_router_and_says_so(tmp_path):
     endpoint = free_endpoint()
     bus = {"mode": "client", "listen": [], "connect": [endpoint]}
     with daemon_process(tmp_path, bus=bus) as daemon:
-        until(lambda: f"waiting for a router at {endpoint}" in daemon.log_text())
+        until(lambda: f"waiting for the bus at {endpoint}" in daemon.log_text())
         with router_process(endpoint), Outsider(endpoint) as outsider:
             assert outsider.ask_status()["state"] == "waiting for map"
     assert "ready" in daemon.log_text()
@@ -134,7 +134,7 @@ def test_a_client_waits_for_its_router_and_says_so(tmp_path):
 def test_a_client_waiting_for_its_router_can_be_stopped(tmp_path):
     bus = {"mode": "client", "listen": [], "connect": [free_endpoint()]}
     with daemon_process(tmp_path, bus=bus) as daemon:
-        until(lambda: "waiting for a router" in daemon.log_text())
+        until(lambda: "waiting for the bus" in daemon.log_text())
         assert daemon.stop() < 10.0
 
 

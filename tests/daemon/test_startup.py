@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fasaco_edge.daemon.loop.held_events import HeldEvents
+from fasaco_edge.daemon.loop.mission_runner import HeldEvents
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
