@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import time
 from array import array
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
@@ -17,7 +17,7 @@ from fasaco_edge.wire.documents.replies import (
     FloorReport,
     MissionReport,
 )
-from fasaco_edge.wire.documents.settings import KnownSettings, RobotSettings
+from fasaco_edge.wire.documents.settings import Corners, KnownSettings, RobotSettings
 from fasaco_edge.wire.documents.status import DriveReport, FleetReport, Status
 from fasaco_edge.wire.reasons import plain as plain_words
 
@@ -26,8 +26,6 @@ Digest = dict[str, object]
 # Limits on the shown entries of received lists.
 MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
 MOST_CORNERS = 1_000
-# MOST_AREAS of the configuration, as many from the operator, and as many from the order.
-MOST_KEEP_OUTS = 3 * MOST_AREAS
 # A longer time means a speed of almost 0 [s].
 MOST_TO_GO_S = 1e8
 # Coordinates beyond this are invalid [m].
@@ -214,23 +212,26 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
 def areas(settings: KnownSettings, report: MissionReport) -> Digest:
     """Return standing zones, the zones of the order, and keep-outs in force."""
     mission = settings.mission
-    zones: list[Digest] = [
-        *({"name": zone.name, "polygon": zone.polygon, "is": "standing"} for zone in mission.zones),
-        *({"name": zone.name, "polygon": zone.polygon, "is": "ordered"} for zone in report.zones),
-    ]
-    keep_outs: list[Digest] = [
-        *({"name": each.name, "polygon": each.polygon, "is": each.by} for each in report.keep_outs),
-        *({"polygon": polygon, "is": "standing"} for polygon in mission.keep_out),
-    ]
-    return {"zones": _shown(zones), "keep_out": _shown(keep_outs)}
+    return {
+        "zones": [
+            *_areas((zone.name, zone.polygon, "standing") for zone in mission.zones),
+            *_areas((zone.name, zone.polygon, "ordered") for zone in report.zones),
+        ],
+        "keep_out": [
+            *_areas((each.name, each.polygon, each.by) for each in report.keep_outs),
+            *_areas(("", polygon, "standing") for polygon in mission.keep_out),
+        ],
+    }
 
 
-def _shown(found: list[Digest]) -> list[Digest]:
-    """Return the areas with a polygon that can be drawn, so many of them."""
-    return [area for area in found if _is_polygon(area["polygon"])][:MOST_KEEP_OUTS]
+def _areas(found: Iterable[tuple[str, Corners, str]]) -> Iterator[Digest]:
+    """Yield areas, by name, polygon and kind, that can be drawn: so many at most."""
+    drawn = (area for area in found if _is_polygon(area[1]))
+    for name, polygon, kind in islice(drawn, 2 * MOST_AREAS):
+        yield {"name": name, "polygon": polygon, "is": kind}
 
 
-def _is_polygon(corners: Any) -> bool:  # noqa: ANN401 - as it was received
+def _is_polygon(corners: Corners) -> bool:
     return 3 <= len(corners) <= MOST_CORNERS and all(
         abs(value) < MOST_M for corner in corners for value in corner
     )
