@@ -181,19 +181,6 @@ def test_a_keep_out_zone_is_kept_out_of_and_named(tmp_path):
         assert outsider.ask_status()["state"] == "covering"
 
 
-def test_cancelled_it_stays_so_after_a_kill(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        begin(outsider)
-        drive(outsider, lanes(10))
-        assert command(outsider, "cancel")["state"] == "idle"
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        status = outsider.ask_status()
-        assert (status["state"], status["reason"]) == ("idle", "cancelled")
-        assert status["ledger"]["restored_cells"] == 10
-
-
 def test_reset_keeps_the_ledger_aside(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)
@@ -281,21 +268,6 @@ def test_a_zone_named_before_a_map_applies_to_its_map_alone(tmp_path, frame):
         refused = command(outsider, "start", {"zones": [{"name": "kitchen"}]})
         assert refused["code"] == "bad_order"
         assert "given for the map in frame 'floor_1'" in refused["message"]
-
-
-def test_poses_that_stop_are_a_state(tmp_path):
-    patience = {"lost_pose_s": 0.5, "stale_map_s": 60.0}
-    with (
-        daemon_process(tmp_path, mission=patience) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        outsider.put("map", map_bytes(room(3.0, 3.0)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
-        status = outsider.wait_status(lambda status: status["state"] == "degraded")
-        assert status["reason"].startswith("no pose for 0.5 s")
-        assert status["path"]["steps"] > 0
-        outsider.put("pose", pose_bytes(0.75, 0.75))
-        outsider.wait_status(lambda status: status["state"] == "covering")
 
 
 def test_the_command_line(tmp_path):

@@ -89,15 +89,6 @@ def test_it_outlives_a_kill_and_comes_before_any_map(tmp_path):
         assert keep_out(outsider, "remove", {"name": "vase"})["mission"]["keep_outs"] == []
 
 
-def test_without_autostart_a_keep_out_starts_nothing(tmp_path):
-    for _ in range(2):
-        with (
-            daemon_process(tmp_path, mission={"autostart": False}) as running,
-            Outsider(running.endpoint) as outsider,
-        ):
-            assert keep_out(outsider, "add", VASE)["state"] == "idle"
-
-
 def test_with_autostart_a_daemon_that_has_one_still_starts(tmp_path):
     """A robot that waits for orders gets one; then its configuration is changed."""
     with (

@@ -20,7 +20,6 @@ from tests.support.ledgers import CELL_M
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import (
-    FREE,
     HALL,
     begin,
     drive,
@@ -94,18 +93,6 @@ def test_it_goes_on_where_it_was_told_to_end(covered):
         assert status["path"]["steps"] < 13 * 18 - COVERED + 30
         status = drive(outsider, lanes(COVERED + 10)[COVERED:])
         assert status["coverage"]["covered"] == COVERED + 10
-
-
-def test_what_is_on_the_disk_outlives_a_kill(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        begin(outsider)
-        drive(outsider, lanes(20))
-        wait_cells(tmp_path, 20)
-        drive(outsider, lanes(23)[20:])
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        assert 20 <= outsider.ask_status()["ledger"]["restored_cells"] <= 23
 
 
 def trail_of(outsider: Outsider) -> tuple[PheromoneMessage, int]:
@@ -182,16 +169,6 @@ def test_a_torn_file_is_told(covered):
         assert status["ledger"]["fault"] in running.log_text()
 
 
-def test_two_torn_files_are_told_and_it_begins_anew(covered):
-    for name in state_files(covered):
-        (covered / "state" / name).write_bytes(b"")
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
-        status = begin(outsider)
-        assert "a new one was started" in status["ledger"]["fault"]
-        assert status["coverage"]["covered"] == 1
-    assert [name for name in state_files(covered) if ".broken-" in name]
-
-
 def test_another_tool_needs_another_ledger(covered):
     robot = {"tool_width_m": 0.5}
     with daemon_process(covered, robot=robot) as running, Outsider(running.endpoint) as outsider:
@@ -262,7 +239,3 @@ def test_the_configured_folder_takes_precedence_over_systemds(tmp_path):
                 tmp_path / folder / "robot.ledger"
             )
         assert (tmp_path / folder / "robot.ledger").exists()
-
-
-def test_the_hall_is_as_the_lanes_say():
-    assert all(HALL[round(y / 0.05), round(x / 0.05)] == FREE for x, y in lanes(13 * 18))

@@ -237,24 +237,6 @@ def test_a_file_that_appears_after_the_start_is_not_overwritten(tmp_path):
     assert decode_rooms((tmp_path / aside).read_bytes()).room("küche")
 
 
-def test_a_disk_that_fails_is_reported_once_and_tried_again(tmp_path):
-    folder = tmp_path / "state"
-    folder.write_text("a file is in the way")
-    keeper = RoomsKeeper(RoomsFile(folder, "robot"))
-    for _ in range(HOLD_CHANGE):
-        update(keeper.book, found(), "map")
-    keeper.keep(0.0)
-    faults = []
-    while not faults:
-        faults = keeper.take_faults()
-    assert "cannot write" in str(faults[0])
-    assert keeper.is_kept(0.0)  # no command waits for it
-    os.unlink(folder)
-    keeper.close(5.0)
-    assert kept(folder) == ["robot.rooms.json"]
-    assert not keeper.take_faults()
-
-
 def test_an_order_by_room_before_any_map_belongs_to_the_frame_of_the_room():
     """Its outline would lie anywhere on the map of another one."""
     config = DaemonConfig()

@@ -54,7 +54,7 @@ def breaking(tmp_path, monkeypatch):
         running.kill()
 
 
-@pytest.mark.parametrize("corner", [(-2e7, 0.0), (2e7, 2e7), (0.0, 2e7 - 1.0)])
+@pytest.mark.parametrize("corner", [(-2e7, 0.0), (0.0, 2e7 - 1.0)])
 def test_a_map_that_nothing_could_be_told_of_is_refused(tmp_path, corner):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         client.put("map", far_map(*corner))
@@ -68,9 +68,7 @@ def test_a_map_that_nothing_could_be_told_of_is_refused(tmp_path, corner):
         stand(client, lambda status: status["state"] == "covering")
 
 
-@pytest.mark.parametrize(
-    "corner", [(-2e7 + 1.2, 0.0), (500_000.0, 9_999_990.0), (2e7 - 6.0, -2e7 + 0.3)]
-)
+@pytest.mark.parametrize("corner", [(-2e7 + 1.2, 0.0), (2e7 - 6.0, -2e7 + 0.3)])
 def test_a_map_at_the_limit_is_covered(tmp_path, corner):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         subscriptions = [client.listen(name) for name in ("path", "coverage", "pheromone")]
