@@ -26,7 +26,6 @@ from fasaco_edge.bus.queries import (
     Request,
     Roll,
     Shared,
-    ask_for_answers,
     reply_of,
     request_of,
     send,
@@ -195,14 +194,9 @@ class Bus:
                 )
 
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
-        """Query ``selector`` (a key, parameters after ``?``) and return all replies.
+        """Query ``selector`` (a key, parameters after ``?``), with JSON or b"" as its payload.
 
-        A reply that is late is missing.
-
-        Args:
-            selector: the selector.
-            timeout_s: how long to wait for replies [s].
-            payload: JSON payload of the query, b"" for none.
+        Returns all replies that come within ``timeout_s`` [s].
         """
         encoding = JSON if payload else None
         replies = self._session.get(
@@ -224,7 +218,23 @@ class Bus:
         ``end`` is called with the replies, on a Zenoh thread: when all have come, or there is no
         queryable, or after ``timeout_s`` (an error is among them then).
         """
-        ask_for_answers(self._session, key, (payload, beside), timeout_s, end)
+        replies = list[Reply]()
+        answered: Any = zenoh.handlers.Callback
+        handler = answered(
+            lambda reply: replies.append(reply_of(reply)), lambda: end(replies), indirect=False
+        )
+        try:
+            self._session.get(
+                key,
+                handler,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                timeout=timeout_s,
+                payload=payload,
+                attachment=beside or None,
+            )
+        except zenoh.ZError:  # the session has ended
+            end(replies)
 
     def token(self, key: str) -> object:
         """Declare a liveliness token and return it; it vanishes with this session."""

@@ -23,7 +23,7 @@ from fasaco_edge.daemon.ledger.rooms_file import RoomsFile, RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop.answers import Commands, serve_about
 from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
-from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
+from fasaco_edge.daemon.loop.loop import Loop, Ports
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.mask_topic import MaskTopic
@@ -191,7 +191,8 @@ def _serve(
     if config.mission.keep_out_topic:
         reload.mask = MaskTopic(bus, config, ros, lambda: mailbox.post("reloaded", None))
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
-    ports = BusPorts(
+    metrics = _metrics_of(config)
+    ports = Ports(
         mailbox=mailbox,
         inbox=Inbox(
             bus,
@@ -207,10 +208,13 @@ def _serve(
         fleet=sender_of(config, bus),
         turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored, rooms.restored),
         claim=NameClaim(bus, keys),
+        watchdog=Watchdog(manager),
+        reload=reload,
+        recorder=recorder,
+        metrics=metrics,
     )
     keeper = LedgerKeeper(ledger, config.cell_m, autostart=config.mission.autostart)
-    metrics = _metrics_of(config)
-    loop = Loop(config, ports, keeper, rooms, Host(Watchdog(manager), reload, recorder, metrics))
+    loop = Loop(config, ports, keeper, rooms)
     serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()

@@ -57,8 +57,8 @@ SOON_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class BusPorts:
-    """The loop's ports on the bus: for incoming and outgoing messages."""
+class Ports:
+    """The loop's ports on the bus, and services on its computer; None for those not requested."""
 
     mailbox: Mailbox[object]
     inbox: Inbox
@@ -66,17 +66,11 @@ class BusPorts:
     outbox: Outbox
     turns: TurnLog
     claim: NameClaim
-    fleet: PeriodicMessage | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Host:
-    """The loop's services on its computer; None for those not requested."""
-
     watchdog: Watchdog
     reload: Reload
-    recorder: RecorderSupervisor | None
-    metrics: MetricsServer | None
+    fleet: PeriodicMessage | None = None
+    recorder: RecorderSupervisor | None = None
+    metrics: MetricsServer | None = None
 
 
 class Loop:
@@ -85,29 +79,27 @@ class Loop:
     def __init__(
         self,
         config: DaemonConfig,
-        bus: BusPorts,
+        ports: Ports,
         keeper: LedgerKeeper,
         rooms: RoomsKeeper,
-        host: Host,
     ) -> None:
-        self._bus = bus
+        self._ports = ports
         self._keeper, self._rooms = keeper, rooms
-        self._host = host
-        self._runner = MissionRunner(config, keeper, bus.mailbox, rooms=rooms.book)
+        self._runner = MissionRunner(config, keeper, ports.mailbox, rooms=rooms.book)
         self._status = StatusBoard(config)
         self._latency = MapLatency()
-        self._coverage = CoveragePublisher(bus.outbox)
+        self._coverage = CoveragePublisher(ports.outbox)
         # Messages of a mission, published when each is due.
         self._periodic: dict[str, PeriodicMessage] = {
             "coverage": self._coverage,
-            "floor": FloorPublisher(bus.outbox),
-            "unswept": UnsweptPublisher(bus.outbox),
-            "pheromone": TrailPublisher(bus.outbox),
+            "floor": FloorPublisher(ports.outbox),
+            "unswept": UnsweptPublisher(ports.outbox),
+            "pheromone": TrailPublisher(ports.outbox),
         }
-        if bus.fleet is not None:
-            self._periodic["fleet"] = bus.fleet
-        self._rooms_out = RoomsPublisher(bus.outbox, rooms.book)
-        self._guard = bus.outbox.guard
+        if ports.fleet is not None:
+            self._periodic["fleet"] = ports.fleet
+        self._rooms_out = RoomsPublisher(ports.outbox, rooms.book)
+        self._guard = ports.outbox.guard
         self._failed_at = float("-inf")
         self._has_begun = self._is_warm = False
 
@@ -121,30 +113,30 @@ class Loop:
         while not stop.is_set():
             if self._follow_claim(time.monotonic()):
                 self._begin_reload()
-                self._cycle(take_batch(self._bus.mailbox, self._tick_s()))
+                self._cycle(take_batch(self._ports.mailbox, self._tick_s()))
             else:
                 stop.wait(TICK_S)
 
     def _tick_s(self) -> float:
         runner = self._runner
-        is_idle = runner.mission is None and not runner.loading and self._bus.claim.is_settled
+        is_idle = runner.mission is None and not runner.loading and self._ports.claim.is_settled
         return IDLE_TICK_S if is_idle else TICK_S
 
     def _cycle(self, batch: Batch) -> None:
         taken = time.monotonic()
-        if self._host.reload.is_read and not self._runner.loading:
+        if self._ports.reload.is_read and not self._runner.loading:
             self._reload_config(batch)
         now = time.monotonic()
         has_mission = self._runner.mission is not None
-        self._bus.inbox.leave_out(batch, now)
+        self._ports.inbox.leave_out(batch, now)
         self._status.conflicts = self._conflicts(now)
-        events, faults = self._bus.inbox.decode(batch, has_mission=has_mission)
+        events, faults = self._ports.inbox.decode(batch, has_mission=has_mission)
         self._count_faults(faults)
         self._note(batch)
-        commands = self._bus.commands.take(batch.questions, now)
+        commands = self._ports.commands.take(batch.questions, now)
         decision = self._step(events, commands, batch, now)
         self._log_cycle(TurnNote(now, batch, commands, decision))
-        self._bus.outbox.commands(commands, decision.answers)
+        self._ports.outbox.commands(commands, decision.answers)
         self._keeper.keep(self._runner.mission, now)
         # An order may hold numbers of rooms, which must not be lost while the ledger has them.
         at_once = any(asked.room is not None or asked.command == "start" for asked in commands)
@@ -155,7 +147,7 @@ class Loop:
             self._guard.attempt("rooms", partial(self._rooms_out.publish, mission, now))
         self._answer(decision.answers, now)
         ended = time.monotonic()
-        self._host.watchdog.beat(self._runner.worker, ended)
+        self._ports.watchdog.beat(self._runner.worker, ended)
         self._status.turns.note(ended - taken)
 
     def announce(self) -> None:
@@ -166,7 +158,7 @@ class Loop:
         """Withdraw the path, flush turn log and ledger, and end the planning thread."""
         self._runner.paths.withdraw("the daemon ends")
         self._send_path()
-        self._guard.attempt("turns", self._bus.turns.publish)
+        self._guard.attempt("turns", self._ports.turns.publish)
         self._keeper.keep(self._runner.mission, float("inf"))
         self._runner.close(timeout_s)
 
@@ -174,14 +166,14 @@ class Loop:
 
     def _follow_claim(self, now: float) -> bool:
         """Wait while another daemon of this name plans; return whether to run a cycle."""
-        claim, mission = self._bus.claim, self._runner.mission
+        claim, mission = self._ports.claim, self._runner.mission
         if claim.update(now):
             self._status.yield_reason = claim.reason if claim.state.is_waiting else ""
             if claim.state.is_waiting:
-                self._bus.turns.end(claim.reason)
+                self._ports.turns.end(claim.reason)
                 if mission is not None:
                     self._restart(claim.reason)
-                    self._bus.outbox.forget()
+                    self._ports.outbox.forget()
                 self._runner.stand_by()
             else:
                 self._void_path("this daemon plans from now on")
@@ -200,7 +192,7 @@ class Loop:
 
         Maps wait meanwhile: reading a keep-out mask uses their share of the memory.
         """
-        reload, mailbox = self._host.reload, self._bus.mailbox
+        reload, mailbox = self._ports.reload, self._ports.mailbox
         if reload.mask is not None:
             reload.mask.map_frame = self._runner.map_frame
             reload.mask.choose(time.monotonic())
@@ -210,8 +202,8 @@ class Loop:
 
     def _reload_config(self, batch: Batch) -> None:
         """Apply the configuration that was read; restart the mission if it has changed."""
-        reload, watchdog = self._host.reload, self._host.watchdog
-        self._bus.mailbox.let_go()
+        reload, watchdog = self._ports.reload, self._ports.watchdog
+        self._ports.mailbox.let_go()
         config, faults = reload.take(self.config)
         self._status.faults.count(faults, is_logged=True)
         watchdog.remark = f"configuration refused: {faults[0]}" if faults else ""
@@ -233,7 +225,7 @@ class Loop:
             config: the new configuration, if it changed.
             held: the first events; None for the present map and pose.
         """
-        self._bus.turns.end(why)
+        self._ports.turns.end(why)
         if config is not None:
             self._status.show(config)
         held = self._runner.held() if held is None else held
@@ -247,12 +239,12 @@ class Loop:
         """Count faults; query the map that updates lack."""
         self._status.faults.count(faults)
         if any(isinstance(fault, PatchWithoutBase) for fault in faults):
-            self._bus.inbox.ask_for_map(time.monotonic())
+            self._ports.inbox.ask_for_map(time.monotonic())
 
     def _conflicts(self, now: float) -> list[str]:
         """Return which inputs come from two publishers."""
-        mask = self._host.reload.mask
-        return self._bus.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
+        mask = self._ports.reload.mask
+        return self._ports.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
     def _note(self, batch: Batch) -> None:
         """Take the times of plans and maps."""
@@ -269,7 +261,7 @@ class Loop:
         self, events: list[Event], commands: list[CommandReceived], batch: Batch, now: float
     ) -> Decision:
         """Step the mission and perform its decision; during startup, only hold events."""
-        mission, events, faults = self._runner.mission_for(events, self._bus.claim.state)
+        mission, events, faults = self._runner.mission_for(events, self._ports.claim.state)
         self._count_faults(faults)
         if mission is None:
             if self.config.mission.waits_for_mask:
@@ -334,7 +326,7 @@ class Loop:
         self._send_path()
 
     def _send_path(self) -> None:
-        path = self._runner.paths.send(self._bus.outbox.path)
+        path = self._runner.paths.send(self._ports.outbox.path)
         if path is None or path.plan is None:
             return
         if (seconds := self._latency.answer()) is not None:
@@ -344,13 +336,13 @@ class Loop:
             self._is_warm = True
 
     def _log_cycle(self, note: TurnNote) -> None:
-        turns = self._bus.turns
+        turns = self._ports.turns
         if not self._guard.attempt("turns", partial(turns.note, note, self._runner.mission)):
             turns.end("a batch could not be published")
 
     def _answer(self, answers: Sequence[Answer], now: float) -> None:
         """Reply to queries; to commands once the ledger has their changes."""
-        commands, runner = self._bus.commands, self._runner
+        commands, runner = self._ports.commands, self._runner
         commands.note(answers, now)
         if commands.are_asked:
             report = self._status.reply(runner)
@@ -360,17 +352,17 @@ class Loop:
 
     def _publish_status(self, now: float) -> None:
         status, runner = self._status, self._runner
-        if self._host.recorder is not None:
-            status.recorder = self._host.recorder.poll(now)
-        status.claim = self._bus.claim.report()
+        if self._ports.recorder is not None:
+            status.recorder = self._ports.recorder.poll(now)
+        status.claim = self._ports.claim.report()
         status.ledger = self._keeper.report(now)
         status.faults.count(self._keeper.take_faults(), is_logged=True)
         status.faults.count(self._rooms.take_faults(), is_logged=True)
         status.faults.count(self._guard.take_faults(), is_logged=True)
         due = status.due(runner, now)
         if due is not None:
-            # First, so that the metrics are never older than the status on the bus.
-            if self._host.metrics is not None:
-                self._host.metrics.show(due)
-            self._bus.outbox.status(due)
-            self._host.watchdog.tell(due)
+            # First, so that the metrics are never older than the status on the ports.
+            if self._ports.metrics is not None:
+                self._ports.metrics.show(due)
+            self._ports.outbox.status(due)
+            self._ports.watchdog.tell(due)

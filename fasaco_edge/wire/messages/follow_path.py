@@ -86,9 +86,6 @@ def encode_goal(
         plugins: as many names as the server's release has, see ``ros_keys.RELEASES``.
         end_yaw: heading of the last pose [rad]; None for that of the one before it.
         is_back: whether poses face away from the next one: the robot drives backward.
-
-        Raises:
-            MalformedMessage: one of them is not allowed in a message.
     """
     writer = CdrWriter(SEND_GOAL)
     writer.octets(goal_id)
@@ -112,11 +109,7 @@ def encode_goal(
 
 
 def decode_accepted(payload: bytes) -> bool:
-    """Return whether a goal was accepted, by the response of ``send_goal``.
-
-    Raises:
-        MalformedMessage: it is no such response.
-    """
+    """Return whether a goal was accepted, by the response of ``send_goal``."""
     reader = CdrReader(payload, SEND_GOAL)
     accepted = _truth(reader.octets(1, "accepted")[0])
     reader.words(_STAMP, ("stamp.sec", "stamp.nanosec"))
@@ -132,11 +125,7 @@ def encode_goal_id(goal_id: bytes) -> bytes:
 
 
 def decode_ending(payload: bytes) -> Ending:
-    """Return how a goal ended, by the response of ``get_result`` of any release.
-
-    Raises:
-        MalformedMessage: it is no such response.
-    """
+    """Return how a goal ended, by the response of ``get_result`` of any release."""
     reader = CdrReader(payload, GET_RESULT)
     status = reader.octets(1, "status")[0]
     reader.octets(1, "result")
@@ -162,11 +151,7 @@ def encode_cancel(goal_id: bytes) -> bytes:
 
 
 def decode_cancel(payload: bytes) -> int:
-    """Return the result of a request to cancel.
-
-    Raises:
-        MalformedMessage: it is no response of ``cancel_goal``.
-    """
+    """Return the result of a request to cancel."""
     reader = CdrReader(payload, CANCEL_GOAL)
     code = reader.octets(1, "return_code")[0]
     for index in range(reader.length("goals_canceling", GOAL_ID_BYTES + _STAMP.size)):

@@ -137,11 +137,7 @@ class GridOctets:
 
 
 def read_grid(payload: bytes) -> GridOctets:
-    """Return the grid in a nav_msgs/OccupancyGrid.
-
-    Raises:
-        MalformedMessage: it is no such message.
-    """
+    """Return the grid in a nav_msgs/OccupancyGrid."""
     reader = CdrReader(payload, OCCUPANCY_GRID)
     frame, _ = read_header(reader)
     geometry = read_grid_geometry(reader)
@@ -149,11 +145,7 @@ def read_grid(payload: bytes) -> GridOctets:
 
 
 def read_field(payload: bytes) -> GridOctets:
-    """Return the levels in a fasaco_msgs/PheromoneGrid, 0 for none.
-
-    Raises:
-        MalformedMessage: it is no such message.
-    """
+    """Return the levels in a fasaco_msgs/PheromoneGrid, 0 for none."""
     reader = CdrReader(payload, PHEROMONE_GRID)
     frame, _ = read_header(reader)
     geometry = read_grid_geometry(reader)
@@ -162,11 +154,7 @@ def read_field(payload: bytes) -> GridOctets:
 
 
 def with_update(grid: GridOctets, payload: bytes) -> GridOctets:
-    """Return a map with a map_msgs/OccupancyGridUpdate applied; the old map is consumed.
-
-    Raises:
-        MalformedMessage: it is no such message, or does not fit the map.
-    """
+    """Return a map with a map_msgs/OccupancyGridUpdate applied; the old map is consumed."""
     reader = CdrReader(payload, OCCUPANCY_GRID_UPDATE)
     frame, _ = read_header(reader)
     col, row, cols, rows = reader.words(PLACE, PLACE_NAMES)

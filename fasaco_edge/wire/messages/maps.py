@@ -43,11 +43,7 @@ class CoverageValue(IntEnum):
 
 
 def decode_occupancy_grid(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> OccupancyGrid:
-    """Return the map in a nav_msgs/OccupancyGrid; its cells are a view of ``payload``.
-
-    Raises:
-        MalformedMessage: it is no such message, or has no cells or over ``max_cells``.
-    """
+    """Return the map in a nav_msgs/OccupancyGrid; its cells are a view of ``payload``."""
     reader = CdrReader(payload, OCCUPANCY_GRID)
     frame, stamp_ns = read_header(reader)
     geometry = read_grid_geometry(reader)
@@ -60,9 +56,6 @@ def encode_occupancy_grid(grid: OccupancyGrid) -> bytes:
     """Return ``grid`` as a nav_msgs/OccupancyGrid.
 
     The resolution becomes a float32; ``map_load_time`` is the map's stamp.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_occupancy_grid`` refuses.
     """
     writer = CdrWriter(OCCUPANCY_GRID)
     write_header(writer, grid.frame, grid.stamp_ns)
@@ -76,9 +69,6 @@ def decode_map_update(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> MapPat
     """Return the patch in a map_msgs/OccupancyGridUpdate; its cells are a view of ``payload``.
 
     ``OccupancyGrid.patched`` checks whether it fits a map.
-
-    Raises:
-        MalformedMessage: it is no such message, or has no cells or over ``max_cells``.
     """
     reader = CdrReader(payload, OCCUPANCY_GRID_UPDATE)
     frame, stamp_ns = read_header(reader)
@@ -90,11 +80,7 @@ def decode_map_update(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> MapPat
 
 
 def encode_map_update(patch: MapPatch) -> bytes:
-    """Return ``patch`` as a map_msgs/OccupancyGridUpdate.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_map_update`` refuses.
-    """
+    """Return ``patch`` as a map_msgs/OccupancyGridUpdate."""
     writer = CdrWriter(OCCUPANCY_GRID_UPDATE)
     window = patch.window
     if patch.cells.shape != (window.rows, window.cols) or patch.cells.dtype != np.int8:

@@ -73,9 +73,6 @@ def encode_pheromone(
     """Return ``snapshot`` as a fasaco_msgs/PheromoneGrid.
 
     ``lattice_deg`` is the angle of its cells' rows to the x axis of the map frame [deg].
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_pheromone`` refuses.
     """
     writer = CdrWriter(PHEROMONE_GRID)
     levels, trail_min, trail_max = _quantised(snapshot.trail, writer.message)
@@ -100,11 +97,7 @@ def encode_pheromone(
 
 
 def decode_pheromone(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> PheromoneMessage:
-    """Return the pheromone field in a fasaco_msgs/PheromoneGrid.
-
-    Raises:
-        MalformedMessage: it is no such message, or has no cells or over ``max_cells``.
-    """
+    """Return the pheromone field in a fasaco_msgs/PheromoneGrid."""
     reader = CdrReader(payload, PHEROMONE_GRID)
     frame, stamp_ns = read_header(reader)
     geometry = read_grid_geometry(reader)

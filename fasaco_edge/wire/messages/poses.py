@@ -72,11 +72,7 @@ def decode_pose(payload: bytes, schema: str) -> StampedPose:
 
 
 def encode_pose_stamped(stamped: StampedPose) -> bytes:
-    """Return ``stamped`` as a geometry_msgs/PoseStamped.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_pose`` refuses.
-    """
+    """Return ``stamped`` as a geometry_msgs/PoseStamped."""
     writer = CdrWriter(POSE_STAMPED)
     write_header(writer, stamped.frame, stamped.stamp_ns)
     write_pose(writer, stamped.pose, "pose")

@@ -17,11 +17,7 @@ TRIGGERED: Final[tuple[Triggered, ...]] = ("start", "pause", "resume", "home", "
 
 
 def check_request(payload: bytes) -> None:
-    """Check the request of a Trigger.
-
-    Raises:
-        MalformedMessage: it is no such request.
-    """
+    """Check the request of a Trigger."""
     reader = CdrReader(payload, TRIGGER)
     reader.octets(1, "request")
     reader.end()

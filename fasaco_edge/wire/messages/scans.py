@@ -48,11 +48,7 @@ class LaserScan:
 
 
 def encode_scan(scan: LaserScan) -> bytes:
-    """Return ``scan`` as a sensor_msgs/LaserScan, without times of beams and intensities.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_scan`` refuses.
-    """
+    """Return ``scan`` as a sensor_msgs/LaserScan, without times of beams and intensities."""
     writer = CdrWriter(LASER_SCAN)
     write_header(writer, scan.frame, scan.stamp_ns)
     count = len(scan.ranges)
