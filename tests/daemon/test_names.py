@@ -169,12 +169,13 @@ def test_a_frozen_daemon_is_replaced_and_then_waits(tmp_path, robot_at):
         robot.wait_claims(1, 1)
         robot.wait_path()
         second, first = sorted(daemons, key=waits, reverse=True)
-        heard = len(robot.paths.heard)
+        heard, since = len(robot.paths.heard), Collector(begins=True)
+        robot.session.declare_subscriber(f"{PREFIX}/path", since)
         first.process.send_signal(signal.SIGSTOP)
         robot.wait_claims(1)
         robot.wait_path(heard)
         # Before any path of its own it withdraws the other's.
-        assert attached(robot.paths.heard[heard])["reason"] == "this daemon plans from now on"
+        assert attached(since.heard[0])["reason"] == "this daemon plans from now on"
         first.process.send_signal(signal.SIGCONT)
         robot.wait_claims(1, 1)
         # Whichever goes on, the robot is left with a path to drive.

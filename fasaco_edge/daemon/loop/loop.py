@@ -21,15 +21,9 @@ from fasaco_edge.daemon.loop.answers import Commands
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.outbox import Outbox
-from fasaco_edge.daemon.loop.periodic import (
-    CoveragePublisher,
-    FloorPublisher,
-    RoomsPublisher,
-    TrailPublisher,
-    UnsweptPublisher,
-)
+from fasaco_edge.daemon.loop.periodic import OF_MISSION, RoomsPublisher
 from fasaco_edge.daemon.loop.status import StatusBoard
-from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
+from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
@@ -88,17 +82,7 @@ class Loop:
         self._runner = MissionRunner(config, keeper, ports.mailbox, rooms=rooms.book)
         self._status = StatusBoard(config)
         self._latency = MapLatency()
-        self._coverage = CoveragePublisher(ports.outbox)
-        # Messages of a mission, published when each is due.
-        self._periodic: dict[str, PeriodicMessage] = {
-            "coverage": self._coverage,
-            "floor": FloorPublisher(ports.outbox),
-            "unswept": UnsweptPublisher(ports.outbox),
-            "pheromone": TrailPublisher(ports.outbox),
-        }
-        if ports.fleet is not None:
-            self._periodic["fleet"] = ports.fleet
-        self._rooms_out = RoomsPublisher(ports.outbox, rooms.book)
+        self._begin_messages()
         self._guard = ports.outbox.guard
         self._failed_at = float("-inf")
         self._has_begun = self._is_warm = False
@@ -135,15 +119,17 @@ class Loop:
         self._note(batch)
         commands = self._ports.commands.take(batch.questions, now)
         decision = self._step(events, commands, batch, now)
-        self._log_cycle(TurnNote(now, batch, commands, decision))
+        turns, mission = self._ports.turns, self._runner.mission
+        noted = partial(turns.note, now, batch, commands, decision, mission)
+        if not self._guard.attempt("turns", noted):
+            turns.end("a batch could not be published")
         self._ports.outbox.commands(commands, decision.answers)
-        self._keeper.keep(self._runner.mission, now)
+        self._keeper.keep(mission, now)
         # An order may hold numbers of rooms, which must not be lost while the ledger has them.
         at_once = any(asked.room is not None or asked.command == "start" for asked in commands)
         self._rooms.keep(now, at_once=at_once)
         self._guard.attempt("status", partial(self._publish_status, now))
         if not self._status.yield_reason:
-            mission = self._runner.mission
             self._guard.attempt("rooms", partial(self._rooms_out.publish, mission, now))
         self._answer(decision.answers, now)
         ended = time.monotonic()
@@ -232,8 +218,15 @@ class Loop:
         self._runner.restart(config or self.config, held, why)
         self._send_path()
         self._latency = MapLatency()
-        self._coverage.forget()
-        self._rooms_out.forget()
+        self._begin_messages()
+
+    def _begin_messages(self) -> None:
+        """Begin the periodic messages: all are due."""
+        outbox, fleet = self._ports.outbox, self._ports.fleet
+        self._rooms_out = RoomsPublisher(outbox, self._rooms.book)
+        self._periodic = {name: make(outbox) for name, make in OF_MISSION.items()}
+        if fleet is not None:
+            self._periodic["fleet"] = fleet
 
     def _count_faults(self, faults: Sequence[FasacoError]) -> None:
         """Count faults; query the map that updates lack."""
@@ -334,11 +327,6 @@ class Loop:
         if not self._is_warm:
             gc.freeze()
             self._is_warm = True
-
-    def _log_cycle(self, note: TurnNote) -> None:
-        turns = self._ports.turns
-        if not self._guard.attempt("turns", partial(turns.note, note, self._runner.mission)):
-            turns.end("a batch could not be published")
 
     def _answer(self, answers: Sequence[Answer], now: float) -> None:
         """Reply to queries; to commands once the ledger has their changes."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -30,6 +31,7 @@ from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.topics import COVERAGE, DIRECTIONS, FLOOR, PHEROMONE, ROOMS, UNSWEPT
 
 if TYPE_CHECKING:
+    from fasaco_edge.daemon.fleet_wing import PeriodicMessage
     from fasaco_edge.mission.core.mission import Mission
 
 # Least period of the coverage [s].
@@ -80,10 +82,6 @@ class CoveragePublisher:
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox, self._due = outbox, Due()
-
-    def forget(self) -> None:
-        """Publish the next grid even if it has not changed."""
-        self._due.forget()
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish the coverage if that is due."""
@@ -227,6 +225,15 @@ class ShownTrail:
         return encode_occupancy_grid(OccupancyGrid(geometry, values, self.frame, self.stamp_ns))
 
 
+OF_MISSION: dict[str, Callable[[Outbox], PeriodicMessage]] = {
+    "coverage": CoveragePublisher,
+    "floor": FloorPublisher,
+    "unswept": UnsweptPublisher,
+    "pheromone": TrailPublisher,
+}
+"""The messages of a mission; the names are those of failures in the log."""
+
+
 class RoomsPublisher:
     """Publishes the rooms of a book: on change, and as they are swept; also without a mission."""
 
@@ -235,10 +242,6 @@ class RoomsPublisher:
         self._published_at = float("-inf")
         self._version = -1
         self._covered: object = None
-
-    def forget(self) -> None:
-        """Publish the next rooms even if they have not changed."""
-        self._version = -1
 
     def publish(self, mission: Mission | None, now: float) -> None:
         """Publish the rooms if that is due."""
