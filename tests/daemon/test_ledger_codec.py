@@ -211,15 +211,6 @@ def test_another_file_is_no_ledger():
         decode_ledger(enveloped(b"", magic=b"\x89PNG\r\n\x1a\n"), CELL_M)
 
 
-def test_another_version_is_named_with_what_to_do():
-    with pytest.raises(
-        LedgerMismatchError, match="version 6, this release reads versions 1 to 5"
-    ) as told:
-        decode_ledger(enveloped(b"whatever it holds", version=6), CELL_M)
-    assert "install the release that wrote it" in told.value.hint
-    assert "rename the file back" in told.value.hint
-
-
 def test_other_cells_are_named_with_what_to_do():
     with pytest.raises(
         LedgerMismatchError, match=r"are 0\.3 m wide, the configuration's 0\.5"

@@ -5,7 +5,9 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import shutil
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,8 @@ from fasaco_edge.daemon.ledger.writer import (
     open_ledger,
 )
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from fasaco_edge.mission.orders.keep_outs import KeepOut
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at
 from tests.support.ledgers import CELL_M, contents, lane
 from tests.support.waiting import until
@@ -273,3 +277,24 @@ def test_floor_alone_is_restored_too(tmp_path):
     LedgerKeeper(writer, CELL, autostart=True).restore(drive.mission)
     assert drive.mission.floor.pixels == snapshot.floor.pixels > 0
     writer.close(1.0)
+
+
+@pytest.mark.parametrize("change", ["fresh", "another tool"])
+def test_starting_over_keeps_the_keep_outs(tmp_path, change):
+    """Progress is set aside, as it was asked for, or as cells are others; keep-outs are not."""
+    vase = KeepOut("vase", ((0.9, 0.9), (2.1, 0.9), (2.1, 2.1)))
+    note = replace(OrderState.idle(NO_ORDER), keep_out=(vase,)).to_json()
+    begun, again = tmp_path / "begun", tmp_path / "again"
+    LedgerFile(begun, "robot").write(replace(lane(5), note=note))
+    is_fresh, cell_m = change == "fresh", CELL_M if change == "fresh" else 0.4
+    for folder, fresh in ((begun, is_fresh), (again, False)):
+        writer = open_ledger(folder, "robot", cell_m, fresh=fresh)
+        assert document(writer)["restored_cells"] == 0
+        # A robot that waits for orders gets one; then its configuration is changed.
+        for autostart in (False, True):
+            state = LedgerKeeper(writer, cell_m, autostart=autostart).order_state
+            assert (state.keep_out, state.automatic) == ((vase,), autostart)
+        until(lambda writer=writer: not writer.is_behind())
+        if folder == begun:
+            shutil.copytree(begun, again)  # killed before anything was covered
+        writer.close(1.0)

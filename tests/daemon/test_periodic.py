@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from types import SimpleNamespace
 
 from fasaco_edge.daemon.loop.periodic import (
@@ -18,6 +19,7 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.rooms import Rooms
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from tests.mission.test_room_orders import BOTH, IN_EAST, room_at, settled, start
 
 
@@ -60,8 +62,10 @@ def test_an_unchanged_floor_is_published_again_after_a_while():
 
 
 def test_the_trail_is_kept_without_listeners_and_sent_as_soon_as_there_is_one():
-    mission, sent = settled(*BOTH).mission, Sent(is_heard=False)
-    publisher = TrailPublisher(sent)
+    drive, sent = settled(*BOTH), Sent(is_heard=False)
+    start(drive, f"room {room_at(drive, *IN_EAST).id}")
+    drive.plan()
+    mission, publisher = drive.mission, TrailPublisher(sent)
     for now in (0.0, REPEAT_S, 2 * REPEAT_S):
         publisher.publish(mission, now)
     assert (len(sent.kept), sent.messages) == (1, [])
@@ -69,6 +73,19 @@ def test_the_trail_is_kept_without_listeners_and_sent_as_soon_as_there_is_one():
     publisher.publish(mission, 2 * REPEAT_S + TRAIL_PERIOD_S)
     assert [name for name, _ in sent.messages] == ["pheromone", "directions"]
     assert sent.kept[-1]().payload == sent.messages[0][1]
+    # The step from a cell that the path leaves once is where the trail points to, decidedly.
+    grid = decode_occupancy_grid(sent.messages[1][1])
+    ahead = [tuple(cell) for cell in mission.route.path.ahead.tolist()]
+    origin, cell_m = grid.geometry.origin, mission.lattice.cell_m
+    row0, col0 = round(origin.y / cell_m), round(origin.x / cell_m)
+    assert len(ahead) > 9
+    for (row, col), (then_row, then_col) in itertools.pairwise(ahead):
+        if ahead.count((row, col)) == 1:
+            direction = {(0, 1): 0, (1, 0): 1, (0, -1): 2, (-1, 0): 3}[
+                then_row - row, then_col - col
+            ]
+            value = int(grid.cells[row - row0, col - col0])
+            assert (value // 25, value % 25 > 6) == (direction, True)
 
 
 def test_the_last_shares_of_an_order_do_not_wait():

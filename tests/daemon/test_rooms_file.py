@@ -13,22 +13,16 @@ import zlib
 import numpy as np
 import pytest
 
-from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger import rooms_file
 from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms, encode_rooms
 from fasaco_edge.daemon.ledger.rooms_file import PERIOD_S, RoomsFile, RoomsKeeper
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
-from fasaco_edge.daemon.loop.inbox import make_mailbox
-from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.errors import RoomsFileError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.rooms import FoundRooms
-from fasaco_edge.mission.core.events import CommandReceived
 from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
 from fasaco_edge.mission.map.room_edits import split
 from fasaco_edge.mission.map.room_matching import HOLD_CHANGE
 from fasaco_edge.mission.map.room_update import update
-from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.passes import Pass
 
 
@@ -235,22 +229,6 @@ def test_a_file_that_appears_after_the_start_is_not_overwritten(tmp_path):
     keeper.close(5.0)
     (aside,) = (name for name in kept(tmp_path) if ".unread-" in name)
     assert decode_rooms((tmp_path / aside).read_bytes()).room("küche")
-
-
-def test_an_order_by_room_before_any_map_belongs_to_the_frame_of_the_room():
-    """Its outline would lie anywhere on the map of another one."""
-    config = DaemonConfig()
-    writer = LedgerWriter.__new__(LedgerWriter)
-    writer.restored = None
-    keeper = LedgerKeeper(writer, config.cell_m, autostart=False)
-    runner = MissionRunner(config, keeper, make_mailbox(config.map.max_pixels), rooms=two_rooms())
-    runner.rooms.name(1, "kitchen")
-    order = read_order({"zones": [{"name": "kitchen"}]})
-    (answer,) = runner.answer([CommandReceived(1, "start", order)])
-    assert answer.error is None
-    state = runner.order_state
-    assert state.frame == "map"
-    assert state.in_other_frame("it moved").order is None
 
 
 def test_it_is_read_without_a_compiler():

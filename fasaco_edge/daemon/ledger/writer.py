@@ -268,6 +268,19 @@ class LedgerWriter:
             LOG.warning("the ledger before is kept as %s", ", ".join(kept))
 
 
+class NoDisk(LedgerWriter):
+    """A ledger that is never written: a replay leaves no trace."""
+
+    def __init__(self, restored: LedgerSnapshot | None = None) -> None:
+        self.restored = restored
+
+    def put(self, ledger: LedgerSnapshot) -> None:
+        """Write nothing."""
+
+    def begin_anew(self, fault: FasacoError | None, why: str) -> None:
+        """Set nothing aside."""
+
+
 def _cannot_write(file: LedgerFile, error: Exception) -> LedgerFileError:
     return LedgerFileError(
         f"cannot write {file.path}: {reason_of(error)}",

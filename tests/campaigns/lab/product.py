@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, NoDisk
 from fasaco_edge.daemon.loop.inbox import blocked_of, make_mailbox
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.loop import TICK_S as LOOP_S
@@ -62,7 +62,7 @@ class Product:
             mission_config(config, self._planning.planner), OrderState.autostart()
         )
         mailbox = make_mailbox(config.map.max_pixels)
-        keeper = LedgerKeeper(_NoDisk(), config.cell_m, autostart=True)
+        keeper = LedgerKeeper(NoDisk(), config.cell_m, autostart=True)
         self._runner = MissionRunner(config, keeper, mailbox)
         self._runner.mission = self._mission
         self._decoder = config.poses()
@@ -223,10 +223,3 @@ def _follower(config: DaemonConfig, sight: Sight | None) -> Follower:
     )
     follower.take_planner(NAME)
     return follower
-
-
-class _NoDisk(LedgerWriter):
-    """A ledger that nothing is written to."""
-
-    def __init__(self) -> None:
-        self.restored = None
