@@ -6,8 +6,6 @@ import base64
 import errno
 import json
 import os
-import subprocess
-import sys
 import zlib
 
 import numpy as np
@@ -229,8 +227,3 @@ def test_a_file_that_appears_after_the_start_is_not_overwritten(tmp_path):
     keeper.close(5.0)
     (aside,) = (name for name in kept(tmp_path) if ".unread-" in name)
     assert decode_rooms((tmp_path / aside).read_bytes()).room("küche")
-
-
-def test_it_is_read_without_a_compiler():
-    check = "import sys, fasaco_edge.daemon.ledger.rooms_file; sys.exit('numba' in sys.modules)"
-    subprocess.run([sys.executable, "-c", check], check=True)
