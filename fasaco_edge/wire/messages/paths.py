@@ -156,9 +156,7 @@ def _check_poses(poses: NDArray[np.float64], message: str, field_of: Callable[[i
 
 
 def _yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the yaw [rad], float64 (n,), of quaternions x, y, z, w, float64 (n, 4), as
-    ``fields.yaw_of`` has it.
-    """
+    """Return the yaw [rad], float64 (n,), of quaternions x, y, z, w, float64 (n, 4)."""
     x, y, z, w = quaternions.T
     yaw: NDArray[np.float64] = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return yaw
