@@ -41,29 +41,30 @@ Sample = tuple[Labels, float | UnsetType | None]
 
 
 class Figure(NamedTuple):
-    """A metric: name, type (gauge, counter or summary), help text, and its samples from a status.
+    """A metric: name, help text, and its samples from a status.
 
     A sample whose value is None or unset is left out.
     """
 
     name: str
-    kind: str
     about: str
     samples: Callable[[Status], Iterable[Sample]]
+    is_summary: bool = False
+
+    @property
+    def kind(self) -> str:
+        """Its type; a counter has a name that says so."""
+        plain = "counter" if self.name.endswith("_total") else "gauge"
+        return "summary" if self.is_summary else plain
 
 
 def _one(value: Callable[[Status], float | None]) -> Callable[[Status], list[Sample]]:
     return lambda status: [({}, value(status))]
 
 
-def _member(part: str, name: str, unit: float = 1.0) -> Callable[[Status], list[Sample]]:
-    """Return the sampler of a member of a status part that may be null, in base units."""
-
-    def samples(status: Status) -> list[Sample]:
-        value = getattr(getattr(status, part), name, None)
-        return [({}, value * unit if isinstance(value, int | float) else None)]
-
-    return samples
+def _member(part: str, name: str) -> Callable[[Status], list[Sample]]:
+    """Return the sampler of a member of a part that may be missing."""
+    return lambda status: [({}, getattr(getattr(status, part), name, None))]
 
 
 def _times(status: Status) -> list[Sample]:
@@ -94,69 +95,64 @@ def _errors(status: Status) -> list[Sample]:
 FIGURES = (
     Figure(
         "info",
-        "gauge",
         "version of the package, and the robot's name",
         lambda status: [({"robot": status.robot, "version": status.version}, 1)],
     ),
     Figure(
         "state",
-        "gauge",
         "1 for the state of the mission, 0 for the others",
         lambda status: [({"state": name}, name == status.state) for name in STATES],
     ),
-    Figure("trouble", "gauge", "1 for what is wrong in that state, 0 for the others", _troubles),
-    Figure("uptime_seconds", "gauge", "since the daemon began", _one(lambda s: s.uptime_s)),
-    Figure("covered_ratio", "gauge", "covered share of cells", _member("coverage", "fraction")),
-    Figure("covered_cells", "gauge", "cells covered", _member("coverage", "covered")),
-    Figure("coverable_cells", "gauge", "cells within reach", _member("coverage", "coverable")),
-    Figure("recovered_cells", "gauge", "cells covered again", _member("coverage", "recovered")),
+    Figure("trouble", "1 for what is wrong in that state, 0 for the others", _troubles),
+    Figure("uptime_seconds", "since the daemon began", _one(lambda s: s.uptime_s)),
+    Figure("covered_ratio", "covered share of cells", _member("coverage", "fraction")),
+    Figure("covered_cells", "cells covered", _member("coverage", "covered")),
+    Figure("coverable_cells", "cells within reach", _member("coverage", "coverable")),
+    Figure("recovered_cells", "cells covered again", _member("coverage", "recovered")),
     Figure(
         "unreachable_cells",
-        "gauge",
         "cells where the robot would fit, but that it cannot get to",
         _member("coverage", "unreachable"),
     ),
-    Figure("swept_square_metres", "gauge", "floor swept", _member("floor", "swept_m2")),
+    Figure("swept_square_metres", "floor swept", _member("floor", "swept_m2")),
     Figure(
         "reachable_square_metres",
-        "gauge",
         "floor that the tool can reach and is asked to sweep",
         _member("floor", "reachable_m2"),
     ),
-    Figure("battery_ratio", "gauge", "charge of the battery", _member("battery", "level")),
-    Figure("path_revision", "gauge", "counts published paths", _member("path", "revision")),
-    Figure("path_remaining_steps", "gauge", "still to drive", _member("path", "remaining_steps")),
-    Figure("path_gap_ratio", "gauge", "cost above the lower bound", _member("path", "gap")),
-    Figure("plans_total", "counter", "plans made", _member("plan", "plans")),
+    Figure("battery_ratio", "charge of the battery", _member("battery", "level")),
+    Figure("path_revision", "counts published paths", _member("path", "revision")),
+    Figure("path_remaining_steps", "still to drive", _member("path", "remaining_steps")),
+    Figure("path_gap_ratio", "cost above the lower bound", _member("path", "gap")),
+    Figure("plans_total", "plans made", _member("plan", "plans")),
     Figure(
         "plans_outdated_total",
-        "counter",
         "plans that did not hold any more when they came",
         _member("plan", "outdated"),
     ),
-    Figure("latency_seconds", "gauge", "how long a stage took last", _latencies),
-    Figure("cycles_total", "counter", "cycles of the loop", _member("loop_ms", "turns")),
-    Figure("cycles_late_total", "counter", "cycles longer than 100 ms", _member("loop_ms", "late")),
-    Figure("cycle_seconds", "summary", "cycles of the loop since the start, by quantile", _times),
-    Figure("errors_total", "counter", "refused, not published or failed", _errors),
-    Figure("ledger_age_seconds", "gauge", "since progress was written", _member("ledger", "age_s")),
+    Figure("latency_seconds", "how long a stage took last", _latencies),
+    Figure("cycles_total", "cycles of the loop", _member("loop_ms", "turns")),
+    Figure("cycles_late_total", "cycles longer than 100 ms", _member("loop_ms", "late")),
+    Figure(
+        "cycle_seconds", "cycles of the loop since the start, by quantile", _times, is_summary=True
+    ),
+    Figure("errors_total", "refused, not published or failed", _errors),
+    Figure("ledger_age_seconds", "since progress was written", _member("ledger", "age_s")),
     Figure(
         "ledger_faulty",
-        "gauge",
         "1 where something is or was wrong with the progress on disk",
         _one(lambda status: status.ledger.fault is not None),
     ),
     Figure(
         "recorder_up",
-        "gauge",
         "1 while the supervised recorder records",
         lambda s: [({}, s.recorder.state == "recording")] if s.recorder else [],
     ),
-    Figure("recorder_lost_total", "counter", "samples not written", _member("recorder", "lost")),
-    Figure("recorder_restarts_total", "counter", "its restarts", _member("recorder", "restarts")),
-    Figure("memory_bytes", "gauge", "of the process", _one(lambda s: s.rss_mb * MEGABYTE)),
-    Figure("processor_seconds_total", "counter", "of the process", _one(lambda s: s.cpu_s)),
-    Figure("threads", "gauge", "of the process", _one(lambda s: s.threads)),
+    Figure("recorder_lost_total", "samples not written", _member("recorder", "lost")),
+    Figure("recorder_restarts_total", "its restarts", _member("recorder", "restarts")),
+    Figure("memory_bytes", "of the process", _one(lambda s: s.rss_mb * MEGABYTE)),
+    Figure("processor_seconds_total", "of the process", _one(lambda s: s.cpu_s)),
+    Figure("threads", "of the process", _one(lambda s: s.threads)),
 )
 
 
@@ -164,7 +160,6 @@ def exposition(status: Status, age_s: float) -> str:
     """Return all metrics of a status of this age [s]."""
     age = Figure(
         "status_age_seconds",
-        "gauge",
         "since the daemon's loop made these figures; above some seconds it stands still",
         lambda _: [({}, round(age_s, 3))],
     )

@@ -22,8 +22,8 @@ class PathPoints:
         frame: name of the frame of all poses.
         left: number of points not read yet.
 
-        Raises:
-            MalformedMessage: the payload does not begin like a path, or is too short for its poses.
+    Raises:
+        MalformedMessage: the payload does not begin like a path, or is too short for its poses.
     """
 
     def __init__(self, payload: bytes) -> None:
