@@ -234,4 +234,4 @@ def _serve(
         if recorder is not None:
             recorder.close(RECORDER_STOP_S, RECORDER_LONGEST_S)
         rooms.close(LEDGER_LEAST_S)
-        ledger.close(max(stopped + LEDGER_STOP_S - time.monotonic(), LEDGER_LEAST_S))
+        ledger.disk.close(max(stopped + LEDGER_STOP_S - time.monotonic(), LEDGER_LEAST_S))

@@ -96,7 +96,7 @@ class LedgerKeeper:
 
     def is_kept(self, now: float) -> bool:
         """Return whether the changes are on disk, or the timeout is over."""
-        return not self._writer.is_behind() or now - self._kept_at > MOST_WAIT_S
+        return not self._writer.disk.is_behind() or now - self._kept_at > MOST_WAIT_S
 
     def report(self, now: float) -> LedgerReport:
         """Return this part of the status; ``now`` is monotonic time [s]."""
@@ -105,7 +105,7 @@ class LedgerKeeper:
     def take_faults(self) -> list[FasacoError]:
         """Return the faults since the last call; they are logged already."""
         faults, self._faults = self._faults, []
-        return faults + self._writer.take_faults()
+        return faults + self._writer.disk.take_faults()
 
     def note_faults(self, faults: tuple[FasacoError, ...]) -> None:
         """Set the files aside if the mission found them to be of another building."""
@@ -210,6 +210,7 @@ class LedgerWriter:
 
     Attributes:
         restored: the ledger to continue with, if any.
+        disk: the thread that writes it.
     """
 
     def __init__(self, file: LedgerFile, found: LoadedLedger) -> None:
@@ -218,19 +219,15 @@ class LedgerWriter:
         LOG.info("ledger %s: %d cells covered before", file.path, self._restored_cells)
         self._file = file
         self._written_at: float | None = None
-        self._disk = DiskWriter[_Pending](
+        self.disk = DiskWriter[_Pending](
             "ledger", self._write, lambda error: _cannot_write(file, error), _Pending.and_then
         )
         # The fault of the files at the start.
-        self._finding = "" if found.fault is None else self._disk.note(found.fault)
+        self._finding = "" if found.fault is None else self.disk.note(found.fault)
 
     def put(self, ledger: LedgerSnapshot) -> None:
         """Write this ledger next; it replaces a waiting one."""
-        self._disk.put(_Pending((), ledger))
-
-    def is_behind(self) -> bool:
-        """Return whether a write is still due and not prevented."""
-        return self._disk.is_behind()
+        self.disk.put(_Pending((), ledger))
 
     def begin_anew(self, fault: FasacoError | None, why: str) -> None:
         """Set the files aside, with ``why`` in their names: a new ledger follows.
@@ -239,11 +236,7 @@ class LedgerWriter:
         """
         self._finding = fault_text(fault) if fault is not None else ""
         self._restored_cells = 0
-        self._disk.put(_Pending((why,), None))
-
-    def take_faults(self) -> list[FasacoError]:
-        """Return the faults since the last call; a lasting fault is returned once."""
-        return self._disk.take_faults()
+        self.disk.put(_Pending((why,), None))
 
     def report(self, now: float) -> LedgerReport:
         """Return this part of the status; ``now`` is monotonic time [s]."""
@@ -252,12 +245,8 @@ class LedgerWriter:
             path=str(self._file.path),
             age_s=None if written_at is None else round(max(now - written_at, 0.0), 3),
             restored_cells=self._restored_cells,
-            fault=self._disk.hang(now) or self._disk.trouble or self._finding or None,
+            fault=self.disk.hang(now) or self.disk.trouble or self._finding or None,
         )
-
-    def close(self, timeout_s: float) -> None:
-        """Write pending changes and end the thread, within ``timeout_s`` [s]."""
-        self._disk.close(timeout_s)
 
     def _write(self, pending: _Pending) -> None:
         kept = [name for why in pending.unwanted for name in self._file.set_aside(why)]
