@@ -247,13 +247,12 @@ def test_a_page_shows_a_status_that_does_nothing():
     status = tainted("status.json")
     status["claim"]["stand"] = "plans"
     corners = [[0, 0], [1, 0], [1, 1]]
-    status["config"] = {"mission": {"zones": [{"name": TAINT, "polygon": corners}]}}
-    order = {"zones": [{"name": TAINT, "polygon": corners}]}
+    zone = {"name": TAINT, "polygon": corners}
+    status["config"] = {"mission": {"zones": [zone]}}
+    status["mission"]["zones"] = [zone]
     view = ServedView(Keys())
     view.take("token", Token(TOKEN, True), 1.0)
     view.take("status", Sample("", json.dumps(status).encode()), 1.0)
-    command = {"command": "start", "order": order}
-    view.take("command", Sample("", json.dumps(command).encode()), 1.0)
     said = {kind: json.loads(message) for kind, message in view.news(2.0).items()}
     assert SCRIPT in said["state"]["reason"]
     assert len(said["areas"]["zones"]) == 2

@@ -8,8 +8,7 @@ before they reach this program. A role is named after what the *other* side does
   every key is named, and also the key that Zenoh's advanced publishers and subscribers use to serve
   late joiners: ``<key>/@adv/**``.
 * A role that speaks on a key may publish, reply to queries and declare a liveliness token there;
-one
-  that listens may subscribe, query and look for tokens. Neither may delete.
+  one that listens may subscribe, query and look for tokens. Neither may delete.
 * Rules hold in both directions: a message that a role may not receive is not sent to it.
 """
 

@@ -4,7 +4,7 @@ Zenoh's advanced subscriber (1.10) does the same, but as long as the session liv
 a second, every publisher that ever existed, even for subscribers that were undeclared. This one
 queries only publishers that exist, known by their liveliness tokens: each at most once a second,
 and a bounded number of them. So open queries and memory stay bounded however many publishers come
-and go. ``asked_publishers`` schedules the queries; ``sample_order`` orders samples and replies.
+and go. ``sample_order`` schedules the queries, and orders samples and replies.
 
 For the same reason it queries tokens and does not subscribe to them: each key that a subscriber
 has ever received stays in the memory of its session and of its router.
@@ -20,9 +20,13 @@ from typing import Any
 
 import zenoh
 
-from fasaco_edge.bus.one_publisher import ASK_PERIOD_S, AskedPublisher, AskedPublishers
 from fasaco_edge.bus.queries import ask_for_tokens
-from fasaco_edge.bus.sample_order import SampleOrder
+from fasaco_edge.bus.sample_order import (
+    ASK_PERIOD_S,
+    AskedPublisher,
+    AskedPublishers,
+    SampleOrder,
+)
 
 # Timeout of a reply [s]: a large map on a slow link takes long. No query is repeated meanwhile.
 ANSWER_S = 10.0

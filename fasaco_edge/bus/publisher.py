@@ -29,7 +29,7 @@ class Publisher:
         key: key expression to publish on.
         schema: CDR type; "" for JSON.
         qos: quality of service. In Zenoh the sender decides whether a sample is dropped on
-        congestion.
+            congestion.
     """
 
     def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:

@@ -163,37 +163,6 @@ class Question:
         query.drop()
 
 
-def ask_for_answers(
-    session: zenoh.Session,
-    key: str,
-    message: tuple[bytes, bytes],
-    timeout_s: float,
-    end: Callable[[list[Reply]], None],
-) -> None:
-    """Query all queryables that match a key, with a payload and an attachment.
-
-    ``end`` is called with their replies on a Zenoh thread, at once if the session has ended.
-    """
-    replies = list[Reply]()
-    payload, beside = message
-    answered: Any = zenoh.handlers.Callback
-    handler = answered(
-        lambda reply: replies.append(reply_of(reply)), lambda: end(replies), indirect=False
-    )
-    try:
-        session.get(
-            key,
-            handler,
-            target=zenoh.QueryTarget.ALL,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=timeout_s,
-            payload=payload,
-            attachment=beside or None,
-        )
-    except zenoh.ZError:
-        end(replies)
-
-
 def matches(key: str, other: str) -> bool:
     """Return whether two key expressions intersect."""
     return bool(zenoh.KeyExpr(key).intersects(zenoh.KeyExpr(other)))

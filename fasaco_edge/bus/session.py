@@ -8,7 +8,6 @@ pass the sample on.
 from __future__ import annotations
 
 import contextlib
-import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -26,23 +25,17 @@ from fasaco_edge.bus.queries import (
     Request,
     Roll,
     Shared,
-    ask_for_answers,
     reply_of,
     request_of,
     send,
     size_of,
 )
 from fasaco_edge.bus.settings import BusSettings, first_line, session_config
+from fasaco_edge.bus.stand_in import StandIn
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
 from fasaco_edge.wire.topics import IN_ORDER
-
-LOG = logging.getLogger(__name__)
-
-# A port without a listener for this long [s] is taken over: a process that only restarts gets its
-# port back. Retry period if another process has taken it over first [s].
-ABSENT_S, RETRY_S = 2.0, 1.0
 
 # Timeout for closing a session [s]: if a peer no longer reads, Zenoh tries for ten seconds to flush
 # its queue, and then fails.
@@ -195,14 +188,9 @@ class Bus:
                 )
 
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
-        """Query ``selector`` (a key, parameters after ``?``) and return all replies.
+        """Query ``selector`` (a key, parameters after ``?``), with JSON or b"" as its payload.
 
-        A reply that is late is missing.
-
-        Args:
-            selector: the selector.
-            timeout_s: how long to wait for replies [s].
-            payload: JSON payload of the query, b"" for none.
+        Returns all replies that come within ``timeout_s`` [s].
         """
         encoding = JSON if payload else None
         replies = self._session.get(
@@ -224,7 +212,23 @@ class Bus:
         ``end`` is called with the replies, on a Zenoh thread: when all have come, or there is no
         queryable, or after ``timeout_s`` (an error is among them then).
         """
-        ask_for_answers(self._session, key, (payload, beside), timeout_s, end)
+        replies = list[Reply]()
+        answered: Any = zenoh.handlers.Callback
+        handler = answered(
+            lambda reply: replies.append(reply_of(reply)), lambda: end(replies), indirect=False
+        )
+        try:
+            self._session.get(
+                key,
+                handler,
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                timeout=timeout_s,
+                payload=payload,
+                attachment=beside or None,
+            )
+        except zenoh.ZError:  # the session has ended
+            end(replies)
 
     def token(self, key: str) -> object:
         """Declare a liveliness token and return it; it vanishes with this session."""
@@ -326,37 +330,3 @@ def open_bus(settings: BusSettings) -> Bus:
     except zenoh.ZError as error:
         raise BusUnavailable(first_line(error)) from error
     return Bus(session, stand_in=StandIn(session_config(settings)))
-
-
-class StandIn:
-    """Listener that replaces a process that this session had joined and that is gone.
-
-    A session that finds its port taken connects as a client to the process that holds it. Once that
-    process is gone, no other session could reach this one: so it listens there itself, with a
-    second session that the first one finds.
-
-    Args:
-        config: of a session that listens there.
-    """
-
-    def __init__(self, config: zenoh.Config) -> None:
-        self._config = config
-        self._session: Any = None  # close() has no annotation
-        self._try_at: float | None = None
-
-    def poll(self, now: float, *, is_alone: bool) -> None:
-        """Listen once the first session has been alone for ``ABSENT_S``; ``now``: monotonic [s]."""
-        if not is_alone or self._session is not None:
-            self._try_at = None
-        elif self._try_at is None:
-            self._try_at = now + ABSENT_S
-        elif now >= self._try_at:
-            self._try_at = now + RETRY_S
-            with contextlib.suppress(zenoh.ZError):  # another process listens there by now
-                self._session = zenoh.open(self._config)
-                LOG.info("the listener here is gone: this process listens instead")
-
-    def close(self) -> None:
-        """End the session."""
-        if self._session is not None:
-            self._session.close()

@@ -13,13 +13,13 @@ from msgspec import Meta
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.endpoints import from_here
-from fasaco_edge.config.metrics import MetricsConfig
 from fasaco_edge.config.reading import Section
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig
 from fasaco_edge.errors import BadConfiguration, OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M
+from fasaco_edge.host.addresses import Address, read_address
 from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
@@ -241,6 +241,33 @@ class RecordingConfig(Section, frozen=True):
     part_min: Annotated[float, Meta(ge=0, le=10_000)] = 10.0
     quota_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 2000
     least_free_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 200
+
+
+class MetricsConfig(Section, frozen=True):
+    """Where the figures of the status are served over HTTP: ``127.0.0.1:9465``; "" for nowhere.
+
+    Other computers may read them only where ``open_to_everyone`` is set: HTTP asks for no password.
+    """
+
+    listen: str = ""
+    open_to_everyone: bool = False
+
+    def address(self) -> Address | None:
+        """Return where to listen; None for nowhere.
+
+        Raises:
+            BadConfiguration: it is no address with a port, or other computers can reach it although
+                ``open_to_everyone`` is not set.
+        """
+        if not self.listen:
+            return None
+        address = read_address("metrics.listen", self.listen, example=9465)
+        if not address.is_loopback and not self.open_to_everyone:
+            raise BadConfiguration(
+                f"metrics.listen: {self.listen} lets other computers read the status",
+                hint="listen on 127.0.0.1, or set metrics.open_to_everyone",
+            )
+        return address
 
 
 class DaemonConfig(Section, frozen=True):

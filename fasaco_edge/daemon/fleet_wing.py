@@ -35,11 +35,11 @@ class MessagesOfOthers(Protocol):
         """Return the faults since the last call that ``event`` did not raise."""
 
 
-class MessageToOthers(Protocol):
-    """Publisher of this robot's message to the other robots of its fleet."""
+class PeriodicMessage(Protocol):
+    """A message that is published when it is due."""
 
     def publish(self, mission: Mission, now: float) -> None:
-        """Publish a message if due; the caller catches failures."""
+        """Publish it if due at ``now`` [s, monotonic]; the caller catches failures."""
 
 
 def company_of(config: DaemonConfig) -> CompanyKind:
@@ -60,7 +60,7 @@ def receiver_of(config: DaemonConfig) -> MessagesOfOthers | None:
     return FleetReceiver(config)
 
 
-def sender_of(config: DaemonConfig, bus: Bus) -> MessageToOthers | None:
+def sender_of(config: DaemonConfig, bus: Bus) -> PeriodicMessage | None:
     """Return the publisher of this robot's message to the others; None without a fleet."""
     if not config.fleet:
         return None

@@ -1,39 +1,191 @@
-"""The metrics server for Prometheus: the newest status, over HTTP, on a thread of its own.
+"""Metrics for Prometheus: one table of all metrics of a status, and a server of them over HTTP.
 
-It never blocks the loop: the loop only passes a reference. It never blocks on a connection: it
-polls them a few times a second and answers all complete requests, so a client that polls in a
-tight loop costs little CPU.
+The text format is 0.0.4, in base units. The server has a thread of its own: the loop only passes a
+reference to the newest status.
 """
 
 from __future__ import annotations
 
-import fcntl
-import functools
+import asyncio
+import contextlib
 import logging
-import select
 import socket
-import struct
-import sys
-import termios
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import NamedTuple
 
-from fasaco_edge.daemon.exposition import CONTENT_TYPE, exposition
+from msgspec import UnsetType
+
 from fasaco_edge.host.addresses import Address
-from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.documents.replies import STATES
+from fasaco_edge.wire.documents.status import TROUBLES, Status
 
 LOG = logging.getLogger(__name__)
 
 PATH = "/metrics"
-# Limit on the bytes of a request; timeout of its arrival, and of the delivery of its answer [s].
+# Limit on the bytes of a request; timeout of a connection [s].
 MOST_BYTES, LONGEST_S = 8192, 1.0
-# Pause between two polls [s]. Limit on the connections that wait for a poll and are accepted in it.
-# Limit on open connections: beyond it the oldest are closed.
-PAUSE_S, MOST_TAKEN, MOST_OPEN = 0.05, 64, 16
-# Send buffer, which holds a whole answer [bytes].
-ANSWER_BYTES = 1 << 17
+# Time that each answer waits, and for which all get the same one [s]: a client that asks in a tight
+# loop costs little. Limit on open connections: beyond it the oldest are closed.
+PAUSE_S, MOST_OPEN = 0.05, 64
 REASONS = {200: "OK", 404: "Not Found", 405: "Method Not Allowed", 503: "Service Unavailable"}
+
+CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+PREFIX = "fasaco_edge"
+MEGABYTE = 1_000_000
+
+Labels = Mapping[str, str]
+Sample = tuple[Labels, float | UnsetType | None]
+
+
+class Figure(NamedTuple):
+    """A metric: name, help text, and its samples from a status.
+
+    A sample whose value is None or unset is left out.
+    """
+
+    name: str
+    about: str
+    samples: Callable[[Status], Iterable[Sample]]
+    is_summary: bool = False
+
+    @property
+    def kind(self) -> str:
+        """Its type; a counter has a name that says so."""
+        plain = "counter" if self.name.endswith("_total") else "gauge"
+        return "summary" if self.is_summary else plain
+
+
+def _one(value: Callable[[Status], float | None]) -> Callable[[Status], list[Sample]]:
+    return lambda status: [({}, value(status))]
+
+
+def _member(part: str, name: str) -> Callable[[Status], list[Sample]]:
+    """Return the sampler of a member of a part that may be missing."""
+    return lambda status: [({}, getattr(getattr(status, part), name, None))]
+
+
+def _times(status: Status) -> list[Sample]:
+    loop = status.loop_ms
+    shares = (("0.5", loop.p50), ("0.99", loop.p99), ("0.999", loop.p99_9), ("1", loop.max))
+    return [({"quantile": share}, _seconds(value)) for share, value in shares]
+
+
+def _latencies(status: Status) -> list[Sample]:
+    last = status.latency_ms
+    stages = (("ingest", last.ingest), ("plan", last.plan), ("map_to_path", last.map_to_path))
+    return [({"stage": stage}, _seconds(value)) for stage, value in stages]
+
+
+def _seconds(milliseconds: float | None) -> float | None:
+    return None if milliseconds is None else milliseconds / 1000.0
+
+
+def _troubles(status: Status) -> list[Sample]:
+    present = {trouble.code for trouble in status.troubles}
+    return [({"code": code}, code in present) for code in TROUBLES]
+
+
+def _errors(status: Status) -> list[Sample]:
+    return [({"code": code}, count) for code, count in sorted(status.errors.by_code.items())]
+
+
+FIGURES = (
+    Figure(
+        "info",
+        "version of the package, and the robot's name",
+        lambda status: [({"robot": status.robot, "version": status.version}, 1)],
+    ),
+    Figure(
+        "state",
+        "1 for the state of the mission, 0 for the others",
+        lambda status: [({"state": name}, name == status.state) for name in STATES],
+    ),
+    Figure("trouble", "1 for what is wrong in that state, 0 for the others", _troubles),
+    Figure("uptime_seconds", "since the daemon began", _one(lambda s: s.uptime_s)),
+    Figure("covered_ratio", "covered share of cells", _member("coverage", "fraction")),
+    Figure("covered_cells", "cells covered", _member("coverage", "covered")),
+    Figure("coverable_cells", "cells within reach", _member("coverage", "coverable")),
+    Figure("recovered_cells", "cells covered again", _member("coverage", "recovered")),
+    Figure(
+        "unreachable_cells",
+        "cells where the robot would fit, but that it cannot get to",
+        _member("coverage", "unreachable"),
+    ),
+    Figure("swept_square_metres", "floor swept", _member("floor", "swept_m2")),
+    Figure(
+        "reachable_square_metres",
+        "floor that the tool can reach and is asked to sweep",
+        _member("floor", "reachable_m2"),
+    ),
+    Figure("battery_ratio", "charge of the battery", _member("battery", "level")),
+    Figure("path_revision", "counts published paths", _member("path", "revision")),
+    Figure("path_remaining_steps", "still to drive", _member("path", "remaining_steps")),
+    Figure("path_gap_ratio", "cost above the lower bound", _member("path", "gap")),
+    Figure("plans_total", "plans made", _member("plan", "plans")),
+    Figure(
+        "plans_outdated_total",
+        "plans that did not hold any more when they came",
+        _member("plan", "outdated"),
+    ),
+    Figure("latency_seconds", "how long a stage took last", _latencies),
+    Figure("cycles_total", "cycles of the loop", _member("loop_ms", "turns")),
+    Figure("cycles_late_total", "cycles longer than 100 ms", _member("loop_ms", "late")),
+    Figure(
+        "cycle_seconds", "cycles of the loop since the start, by quantile", _times, is_summary=True
+    ),
+    Figure("errors_total", "refused, not published or failed", _errors),
+    Figure("ledger_age_seconds", "since progress was written", _member("ledger", "age_s")),
+    Figure(
+        "ledger_faulty",
+        "1 where something is or was wrong with the progress on disk",
+        _one(lambda status: status.ledger.fault is not None),
+    ),
+    Figure(
+        "recorder_up",
+        "1 while the supervised recorder records",
+        lambda s: [({}, s.recorder.state == "recording")] if s.recorder else [],
+    ),
+    Figure("recorder_lost_total", "samples not written", _member("recorder", "lost")),
+    Figure("recorder_restarts_total", "its restarts", _member("recorder", "restarts")),
+    Figure("memory_bytes", "of the process", _one(lambda s: s.rss_mb * MEGABYTE)),
+    Figure("processor_seconds_total", "of the process", _one(lambda s: s.cpu_s)),
+    Figure("threads", "of the process", _one(lambda s: s.threads)),
+)
+
+
+def exposition(status: Status, age_s: float) -> str:
+    """Return all metrics of a status of this age [s]."""
+    age = Figure(
+        "status_age_seconds",
+        "since the daemon's loop made these figures; above some seconds it stands still",
+        lambda _: [({}, round(age_s, 3))],
+    )
+    return "".join(line + "\n" for figure in (*FIGURES, age) for line in _lines(figure, status))
+
+
+def _lines(figure: Figure, status: Status) -> Iterator[str]:
+    known = [
+        (labels, value)
+        for labels, value in figure.samples(status)
+        if not isinstance(value, UnsetType | None)
+    ]
+    if not known:
+        return
+    name = f"{PREFIX}_{figure.name}"
+    yield f"# HELP {name} {figure.about}"
+    yield f"# TYPE {name} {figure.kind}"
+    for labels, value in known:
+        within = ",".join(f'{label}="{_escaped(text)}"' for label, text in labels.items())
+        number = value if isinstance(value, float) else int(value)
+        yield f"{name}{{{within}}} {number!r}" if within else f"{name} {number!r}"
+
+
+def _escaped(text: str) -> str:
+    r"""Return a label's value; unprintable characters are escaped, as ``\x1b``."""
+    return one_line(text).replace("\\", "\\\\").replace('"', '\\"')
 
 
 class MetricsServer:
@@ -48,137 +200,56 @@ class MetricsServer:
 
     def __init__(self, address: Address) -> None:
         family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
-        self._socket = socket.create_server(address, family=family, backlog=MOST_TAKEN)
-        self._socket.setblocking(False)
+        self._socket = socket.create_server(address, family=family, backlog=MOST_OPEN)
         self._shown: tuple[Status, float] | None = None
-        self._is_closed = threading.Event()
-        threading.Thread(target=self._serve, name="metrics", daemon=True).start()
+        # The newest page, and until when it is served.
+        self._page, self._page_until = "", 0.0
+        # Open connections, the oldest first.
+        self._open: list[asyncio.StreamWriter] = []
+        self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
+        self._loop, self._ended = self._runner.get_loop(), asyncio.Event()
+        threading.Thread(target=self._run, name="metrics", daemon=True).start()
 
     def show(self, status: Status) -> None:
         """Serve this status from now on."""
         self._shown = status, time.monotonic()
 
     def close(self) -> None:
-        """Stop listening; a connection that is open ends with the process, or within a second."""
-        self._is_closed.set()
-        # Closing the socket alone does not wake the thread waiting on it.
+        """Stop listening, and close all connections."""
+        self._loop.call_soon_threadsafe(self._ended.set)
+
+    def _run(self) -> None:
+        with self._runner:
+            self._runner.run(self._serve())
+
+    async def _serve(self) -> None:
+        server = await asyncio.start_server(self._attend, sock=self._socket, limit=MOST_BYTES)
+        await self._ended.wait()
+        server.close()
+
+    async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer one request."""
+        self._open.append(writer)
+        if len(self._open) > MOST_OPEN:
+            self._open.pop(0).transport.abort()
         try:
-            self._socket.shutdown(socket.SHUT_RDWR)
-        except OSError:
-            LOG.debug("metrics: already shut down")
-        self._socket.close()
+            async with asyncio.timeout(LONGEST_S):
+                head = await reader.readuntil(b"\r\n\r\n")
+                await asyncio.sleep(PAUSE_S)
+                writer.write(self._answer(head))
+                writer.close()
+                await writer.wait_closed()
+        except (TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, OSError):
+            LOG.debug("metrics: a request is too long, or its client gone")
+        finally:
+            # What a client does not take is discarded.
+            writer.transport.abort()
+            with contextlib.suppress(ValueError):
+                self._open.remove(writer)
 
-    def _serve(self) -> None:
-        requests: list[_Request] = []
-        while not self._is_closed.is_set():
-            self._wait(requests)
-            requests += self._taken()
-            for request in requests:
-                request.read()
-            self._answer(requests)
-            requests = _kept(requests)
-            self._is_closed.wait(PAUSE_S)
-        for request in requests:
-            request.close()
-
-    def _wait(self, requests: list[_Request]) -> None:
-        """Wait for data, or for the timeout of a request."""
-        # select(2) is not used, as it takes only descriptors below 1024.
-        arrivals = select.poll()
-        try:
-            arrivals.register(self._socket, select.POLLIN)
-            for request in requests:
-                arrivals.register(request, select.POLLIN)
-            arrivals.poll(LONGEST_S * 1e3 if requests else None)
-        except (OSError, ValueError) as error:
-            LOG.debug("metrics: %s", error)  # the socket is closed
-
-    def _taken(self) -> Iterator[_Request]:
-        """Accept waiting connections."""
-        for _ in range(MOST_TAKEN):
-            try:
-                connection, _ = self._socket.accept()
-            except OSError as error:
-                # No connection is waiting any more, the socket is closed, or no descriptor is left.
-                LOG.debug("metrics: %s", error)
-                return
-            yield _Request(connection)
-
-    def _answer(self, requests: list[_Request]) -> None:
-        """Answer the complete requests."""
-        page = functools.cache(self._page)
-        for request in requests:
-            if request.is_whole and not request.is_answered:
-                request.answer(*page(*request.words()))
-
-    def _page(self, method: str, path: str) -> tuple[int, str]:
-        if method not in ("GET", "HEAD"):
-            return 405, "only GET and HEAD\n"
-        if path != PATH:
-            return 404, f"the figures are at {PATH}\n"
-        if self._shown is None:
-            return 503, "no status yet\n"
-        status, at = self._shown
-        return 200, exposition(status, time.monotonic() - at)
-
-
-def _kept(requests: list[_Request]) -> list[_Request]:
-    """Close finished and expired requests, and the oldest beyond the limit; return the rest."""
-    now = time.monotonic()
-    waiting = [request for request in requests if not request.is_over(now)]
-    kept = sorted(waiting, key=lambda request: request.until)[-MOST_OPEN:]
-    for request in set(requests) - set(kept):
-        request.close()
-    return kept
-
-
-class _Request:
-    """The received part of one request, and its answer.
-
-    Attributes:
-        until: deadline of its arrival, then of the delivery of its answer, monotonic [s].
-        is_answered: whether its answer was sent.
-    """
-
-    def __init__(self, connection: socket.socket) -> None:
-        connection.setblocking(False)
-        self._connection, self._head, self._is_gone = connection, b"", False
-        self.until, self.is_answered = time.monotonic() + LONGEST_S, False
-
-    def fileno(self) -> int:
-        """Return the connection's descriptor."""
-        return self._connection.fileno()
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether it is complete, or the size limit is reached."""
-        return b"\r\n\r\n" in self._head or len(self._head) >= MOST_BYTES
-
-    def is_over(self, now: float) -> bool:
-        """Return whether it has expired, its answer is delivered, or the client is gone."""
-        if now > self.until:
-            return True
-        return not self._unsent() if self.is_answered else self._is_gone
-
-    def read(self) -> None:
-        """Read the available bytes."""
-        if self.is_whole:
-            return
-        try:
-            part = self._connection.recv(MOST_BYTES - len(self._head))
-        except BlockingIOError:
-            return
-        except OSError:
-            part = b""
-        self._head, self._is_gone = self._head + part, not part
-
-    def words(self) -> tuple[str, str]:
-        """Return method and path."""
-        method, _, rest = self._head.split(b"\r\n", 1)[0].decode("latin-1").partition(" ")
-        return method, rest.partition(" ")[0].partition("?")[0]
-
-    def answer(self, code: int, body: str) -> None:
-        """Send the answer, without waiting for its delivery."""
+    def _answer(self, request: bytes) -> bytes:
+        method, _, rest = request.split(b"\r\n", 1)[0].decode("latin-1").partition(" ")
+        code, body = self._content(method, rest.partition(" ")[0].partition("?")[0])
         text = body.encode()
         lines = (
             f"HTTP/1.0 {code} {REASONS[code]}",
@@ -188,37 +259,23 @@ class _Request:
             *(["Allow: GET, HEAD"] if code == 405 else ()),
         )
         head = "\r\n".join((*lines, "", "")).encode()
-        self.is_answered, self.until = True, time.monotonic() + LONGEST_S
-        try:
-            self._connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, ANSWER_BYTES)
-            self._connection.send(head if self.words()[0] == "HEAD" else head + text)
-        except OSError as error:
-            LOG.debug("metrics: %s", error)  # the client is gone
+        return head if method == "HEAD" else head + text
 
-    def _unsent(self) -> int:
-        """Return how much of the answer the client has not acknowledged [bytes]."""
-        try:
-            said = fcntl.ioctl(self._connection, termios.TIOCOUTQ, bytes(4))
-        except OSError:
-            return 0
-        return int.from_bytes(said, sys.byteorder)
-
-    def close(self) -> None:
-        """Close the connection, discarding data that the kernel would keep for minutes."""
-        if self._unsent():
-            at_once = struct.pack("ii", 1, 0)
-            self._connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, at_once)
-        self._connection.close()
+    def _content(self, method: str, path: str) -> tuple[int, str]:
+        if method not in ("GET", "HEAD"):
+            return 405, "only GET and HEAD\n"
+        if path != PATH:
+            return 404, f"the figures are at {PATH}\n"
+        if self._shown is None:
+            return 503, "no status yet\n"
+        status, at = self._shown
+        if (now := time.monotonic()) >= self._page_until:
+            self._page, self._page_until = exposition(status, now - at), now + PAUSE_S
+        return 200, self._page
 
 
-def serve_metrics(address: Address | None) -> MetricsServer | None:
-    """Return a server; None if none is configured or it cannot listen: a robot also drives without.
-
-    Args:
-        address: where to listen; None for no server.
-    """
-    if address is None:
-        return None
+def serve_metrics(address: Address) -> MetricsServer | None:
+    """Return a server; None if it cannot listen: a robot also drives without."""
     try:
         server = MetricsServer(address)
     except OSError as error:

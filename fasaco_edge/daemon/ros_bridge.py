@@ -34,7 +34,7 @@ class RosBridge:
 
     Attributes:
         map: the map's subscription, to query a missing map.
-        path, coverage, diagnostics: where to publish them.
+        publishers: by the native topic that is like each.
         commands: command of each service, by the service's key.
     """
 
@@ -51,41 +51,38 @@ class RosBridge:
             bus.token(self._node.token)
         inputs = {name: self._subscribe(name, topic) for name, topic in config.inputs.items()}
         self.map = inputs["map"]
-        likes = (topics.PATH, topics.COVERAGE, topics.COMMAND)
-        self.path, self.coverage, self.diagnostics = (
-            self._publisher(topic, like)
-            for topic, like in zip(config.outputs.values(), likes, strict=True)
-        )
+        likes = {topic.name: topic for topic in (topics.PATH, topics.COVERAGE)}
+        self.publishers = {
+            name: self._publisher(topic, likes.get(name, topics.COMMAND))
+            for name, topic in config.outputs.items()
+        }
         self.commands = {
             self._serve(service): command for command, service in config.commands.items()
         }
 
     def _subscribe(self, kind: str, topic: RosTopic) -> Subscription:
         take = poster(self._mailbox, kind, self._max_pixels)
+        return self._listen(topic, take, in_order=kind in topics.IN_ORDER)
 
+    def subscribe_mask(self, take: Callable[[Sample], None]) -> Subscription:
+        """Subscribe to the keep-out mask; ``take`` is called on a Zenoh thread."""
+        return self._listen(self._config.keep_out_mask, take)
+
+    def _listen(
+        self, topic: RosTopic, take: Callable[[Sample], None], *, in_order: bool = False
+    ) -> Subscription:
         def post(sample: Sample) -> None:
             take(sample.as_type(topic.schema))  # ROS sends no type with a sample
 
         key = self._config.input_key(topic)
-        in_order = kind in topics.IN_ORDER
         subscription = self._bus.subscribe(key, post, topic.latched, topic.depth, in_order=in_order)
-        self._announce("MS", topic)
-        return subscription
-
-    def subscribe_mask(self, take: Callable[[Sample], None]) -> Subscription:
-        """Subscribe to the keep-out mask; ``take`` is called on a Zenoh thread."""
-        topic = self._config.keep_out_mask
-        key = self._config.input_key(topic)
-        subscription = self._bus.subscribe(
-            key, lambda sample: take(sample.as_type(topic.schema)), topic.latched, topic.depth
-        )
         self._announce("MS", topic)
         return subscription
 
     def diagnose(self, status: Status) -> None:
         """Publish a status as diagnostics."""
         payload = encode_diagnostics(status, self._node.name, time.time_ns())
-        self.diagnostics.put(payload)
+        self.publishers["diagnostics"].put(payload)
 
     def _serve(self, service: RosTopic) -> str:
         """Take the requests of a service; return its key expression, which allows any type hash."""

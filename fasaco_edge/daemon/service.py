@@ -9,7 +9,9 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.cautions import log_cautions
@@ -21,17 +23,15 @@ from fasaco_edge.daemon.ledger.rooms_file import RoomsFile, RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
 from fasaco_edge.daemon.loop.answers import Commands, serve_about
 from fasaco_edge.daemon.loop.inbox import Inbox, make_mailbox
-from fasaco_edge.daemon.loop.loop import BusPorts, Host, Loop
+from fasaco_edge.daemon.loop.loop import Loop, Ports
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.mask_topic import MaskTopic
 from fasaco_edge.daemon.memory import afforded, has_default_sizes, needed_bytes
-from fasaco_edge.daemon.metrics import serve_metrics
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
-from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.host.processes import (
     call_on,
     end_within,
@@ -40,6 +40,9 @@ from fasaco_edge.host.processes import (
     return_soon,
 )
 from fasaco_edge.wire import topics
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.metrics import MetricsServer
 
 LOG = logging.getLogger(__name__)
 
@@ -56,8 +59,6 @@ END_S = 9.0
 # Thread switch interval of the interpreter [s]. Zenoh's threads call back with each sample; at
 # Python's default of 5 ms the loop waits for them several times a cycle.
 SWITCH_S = 0.0005
-# Period of a client's retries to reach its router [s].
-ROUTER_RETRY_S = 1.0
 
 
 def run_daemon(
@@ -128,25 +129,28 @@ def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManage
     Raises:
         BusUnavailable: no session can be opened, and waiting does not help.
     """
-    is_waiting = False
-    while True:
-        try:
-            return open_bus(settings)
-        except BusUnavailable as error:
-            # Wrong addresses or credentials of its own cannot be fixed by waiting.
-            if settings.mode != "client" or settings.secured:
-                raise
-            if not is_waiting:
-                there = ", ".join(settings.connect)
-                LOG.warning("waiting for a router at %s: %s", there, error, extra={"event": "bus"})
-                # A service that is never ready is ended after a while; this one is as ready as it
-                # can be.
-                manager.ready()
-                manager.status(f"waiting for a router at {there}")
-                is_waiting = True
+    # Wrong addresses or credentials of its own cannot be fixed by waiting.
+    if settings.mode != "client" or settings.secured:
+        return open_bus(settings)
+
+    def tell(is_first: bool) -> None:
+        if is_first:
+            # A service that is never ready is ended after a while; this one is as ready as it
+            # can be.
+            manager.ready()
+            manager.status(f"waiting for the bus at {', '.join(settings.connect)}")
         manager.alive()
-        if stop.wait(ROUTER_RETRY_S):
-            return None
+
+    return join(settings, stop, tell)
+
+
+def _metrics_of(config: DaemonConfig) -> MetricsServer | None:
+    """Return the server of metrics, if one is configured: a daemon without is smaller."""
+    if (address := config.metrics.address()) is None:
+        return None
+    from fasaco_edge.daemon.metrics import serve_metrics  # noqa: PLC0415
+
+    return serve_metrics(address)
 
 
 def _afforded(config: DaemonConfig) -> DaemonConfig:
@@ -187,7 +191,8 @@ def _serve(
     if config.mission.keep_out_topic:
         reload.mask = MaskTopic(bus, config, ros, lambda: mailbox.post("reloaded", None))
     recorder = RecorderSupervisor(config, bus, record_to) if record_to else None
-    ports = BusPorts(
+    metrics = _metrics_of(config)
+    ports = Ports(
         mailbox=mailbox,
         inbox=Inbox(
             bus,
@@ -203,10 +208,13 @@ def _serve(
         fleet=sender_of(config, bus),
         turns=TurnLog(bus.advertise(keys, topics.TURNS), config, ledger.restored, rooms.restored),
         claim=NameClaim(bus, keys),
+        watchdog=Watchdog(manager),
+        reload=reload,
+        recorder=recorder,
+        metrics=metrics,
     )
     keeper = LedgerKeeper(ledger, config.cell_m, autostart=config.mission.autostart)
-    metrics = serve_metrics(config.metrics.address())
-    loop = Loop(config, ports, keeper, rooms, Host(Watchdog(manager), reload, recorder, metrics))
+    loop = Loop(config, ports, keeper, rooms)
     serve_about(bus, keys, lambda: loop.config)
     try:
         loop.announce()
@@ -226,4 +234,4 @@ def _serve(
         if recorder is not None:
             recorder.close(RECORDER_STOP_S, RECORDER_LONGEST_S)
         rooms.close(LEDGER_LEAST_S)
-        ledger.close(max(stopped + LEDGER_STOP_S - time.monotonic(), LEDGER_LEAST_S))
+        ledger.disk.close(max(stopped + LEDGER_STOP_S - time.monotonic(), LEDGER_LEAST_S))

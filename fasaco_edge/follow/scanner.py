@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.motion import stopping_rate
-from fasaco_edge.wire.messages.grid_octets import GridOctets
+from fasaco_edge.wire.messages.grids import GridOctets
 from fasaco_edge.wire.messages.scans import LaserScan
 
 # Points further away from the sensor do not matter yet [m].

@@ -25,7 +25,7 @@ from fasaco_edge.follow.scanner import (
 )
 from fasaco_edge.follow.supervision import Reason, State
 from fasaco_edge.grid.geometry import Point, Pose2D
-from fasaco_edge.wire.messages.grid_octets import GridOctets, read_grid, with_update
+from fasaco_edge.wire.messages.grids import GridOctets, read_grid, with_update
 from fasaco_edge.wire.messages.scans import decode_scan
 
 # The path is checked this far ahead [m].

@@ -4,19 +4,27 @@ A compiler keeps all that it has loaded, up to a gigabyte. So a process that nee
 this process, waits for it, and loads the compiled kernels. This process holds the lock of the
 folder; once it has grown, it notes what is compiled and begins again as a fresh process. Kernels
 that are damaged, or that others could have written, count as missing.
+
+A second process compiles stages that share few kernels with the others at the same time, in a
+folder of its own. One process alone writes the folder of the kernels, as numba's index of a
+function goes wrong where two write it: so the first moves the files of functions that it has not
+compiled itself, and compiles what is still missing.
 """
 
 from __future__ import annotations
 
 import logging
 import os
+import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
+from typing import Self
 
 from fasaco_edge.errors import ProcessEnded
+from fasaco_edge.host.durable import make_folder
 from fasaco_edge.host.processes import (
     available_memory,
     end_with_parent,
@@ -30,10 +38,10 @@ from fasaco_edge.kernels.manifest import (
     cleared,
     compiling_into,
     record,
+    remove,
     why_missing,
 )
-from fasaco_edge.planners.second_compiler import SecondCompiler
-from fasaco_edge.planners.stages import STAGES
+from fasaco_edge.planners.stages import APART, STAGES
 
 LOG = logging.getLogger(__name__)
 
@@ -45,6 +53,10 @@ MOST_MB, PLENTY_MB = 270.0, 2000.0
 # Limit on fresh starts, of which 25 were measured: a disk that corrupts each file must not go on
 # for ever.
 MOST_RESTARTS = 300
+# Available memory from which two compilers run: each takes up to a gigabyte [MB].
+TWO_MB = 4000.0
+# In place of the count of restarts: a second compiler.
+APART_WORD = "apart"
 # Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"
 
@@ -166,6 +178,9 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     os.umask(0o077)
     end_with_parent(os.getppid())
+    if restarts == APART_WORD:
+        _compile_apart(folder, stages)
+        return
     logging.basicConfig(level=logging.WARNING, handlers=[_ToStarter()])
     try:
         _compile(folder, int(restarts), stages)
@@ -215,6 +230,68 @@ def _compile(folder: Path, restarts: int, stages: list[str]) -> None:
         except OSError:
             cleared(folder)
             raise
+
+
+def _compile_apart(folder: Path, stages: list[str]) -> None:
+    from fasaco_edge.kernels.jit import compile_into  # noqa: PLC0415
+
+    compile_into(folder, lambda _: None)
+    from fasaco_edge.planners.warmup import TinyRoom, run_stage  # noqa: PLC0415
+
+    room = TinyRoom()
+    for stage in stages:
+        run_stage(stage, room)
+
+
+class SecondCompiler:
+    """The second compiler, as seen by the first; it may have nothing to compile.
+
+    Attributes:
+        stages: stages that it compiles.
+    """
+
+    def __init__(self, folder: Path, stages: Sequence[str]) -> None:
+        apart = [stage for stage in stages if stage in APART]
+        can_run = len(os.sched_getaffinity(0)) > 1 and available_memory() >= TWO_MB * 1e6
+        self.stages = apart if can_run and len(apart) < len(stages) else []
+        self._target, self._folder = folder, folder.with_name(f"{folder.name}.second")
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Self:
+        remove(self._folder)
+        if self.stages:
+            make_folder(self._folder, mode=0o700)
+            self._process = subprocess.Popen(
+                python_program(MODULE, str(self._folder), APART_WORD, *self.stages),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def hand_over(self) -> None:
+        """Wait for its end, and move what it has compiled and the first compiler has not.
+
+        If it failed, nothing is moved: the first compiler compiles all.
+
+        Raises:
+            OSError: a file cannot be moved.
+        """
+        process, self._process = self._process, None
+        if process is None or process.wait() != 0:
+            return
+        there = {file.stem for file in self._target.glob("*.nbi")}
+        for index in self._folder.glob("*.nbi"):
+            if index.stem not in there:
+                # Code before the index that lists it.
+                for file in (*self._folder.glob(f"{index.stem}.*.nbc"), index):
+                    file.replace(self._target / file.name)
 
 
 class _ToStarter(logging.Handler):

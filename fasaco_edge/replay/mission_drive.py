@@ -11,7 +11,7 @@ from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.fleet_wing import receiver_of
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, NoDisk
 from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loader import Loader
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
@@ -92,7 +92,7 @@ class MissionDrive:
         self.mission, worker = loaded
         worker.close(LOAD_S)
         self.planner = planner_of(planner.name, planner.colony(), planner.threads)
-        keeper = LedgerKeeper(_NoDisk(ledger), config.cell_m, autostart=config.mission.autostart)
+        keeper = LedgerKeeper(NoDisk(ledger), config.cell_m, autostart=config.mission.autostart)
         self._runner = MissionRunner(config, keeper, self.mailbox, lambda *_: loader, rooms)
         self.began: float | None = None
         self.state = ""
@@ -142,16 +142,3 @@ class _NoBus(Bus):
 
     def subscribe(self, *_args: object, **_options: object) -> Subscription:
         return Subscription(None)
-
-
-class _NoDisk(LedgerWriter):
-    """A ledger that is never written: a replay leaves no trace."""
-
-    def __init__(self, restored: LedgerSnapshot | None) -> None:
-        self.restored = restored
-
-    def put(self, ledger: LedgerSnapshot) -> None:
-        pass
-
-    def begin_anew(self, fault: FasacoError | None, why: str) -> None:
-        pass

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterator
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
 from typing import Any
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.robot_state import RobotState
+from fasaco_edge.grid.geometry import Point
 from fasaco_edge.serve import plain
-from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.replies import (
     FloorReport,
     MissionReport,
 )
-from fasaco_edge.wire.documents.settings import KnownSettings
-from fasaco_edge.wire.documents.status import FleetReport, Status
+from fasaco_edge.wire.documents.settings import Corners, KnownSettings, RobotSettings
+from fasaco_edge.wire.documents.status import DriveReport, FleetReport, Status
 from fasaco_edge.wire.reasons import plain as plain_words
 
 Digest = dict[str, object]
@@ -24,14 +27,48 @@ Digest = dict[str, object]
 # Limits on the shown entries of received lists.
 MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
 MOST_CORNERS = 1_000
-# MOST_AREAS from the operator, and as many from the order.
-MOST_KEEP_OUTS = 2 * MOST_AREAS
 # A longer time means a speed of almost 0 [s].
 MOST_TO_GO_S = 1e8
 # Coordinates beyond this are invalid [m].
 MOST_M = 1e6
 # States with a path to drive.
 UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
+
+
+class Way:
+    """The remaining distance and turns from each point of a path.
+
+    Args:
+        xy: its points (x, y) [m].
+    """
+
+    def __init__(self, xy: Sequence[Point] = ()) -> None:
+        way_m, turns, heading = 0.0, 0.0, None
+        lengths, quarters = array("d"), array("d")
+        for here, there in zip(xy[-2::-1], xy[:0:-1], strict=True):
+            way_m += math.dist(here, there)
+            towards = math.atan2(there[1] - here[1], there[0] - here[0])
+            if heading is not None:
+                turns += abs(math.remainder(heading - towards, math.tau)) / (math.pi / 2)
+            heading = towards
+            lengths.append(way_m)
+            quarters.append(turns)
+        self._lengths, self._quarters = lengths[::-1], quarters[::-1]
+
+    def left_s(
+        self, at: int, robot: RobotSettings, drive: DriveReport, beyond_m: float = 0.0
+    ) -> float | None:
+        """Return the remaining time from ``beyond_m`` [m] beyond point ``at`` [s].
+
+        None if no speed is known.
+        """
+        speed_m_s = drive.speed_m_s or robot.speed_m_s
+        if not speed_m_s > 0.0:
+            return None
+        if not 0 <= at < len(self._lengths):
+            return 0.0
+        turn_s = drive.quarter_turn_s or drive.planned_quarter_turn_s
+        return max(self._lengths[at] - beyond_m, 0.0) / speed_m_s + self._quarters[at] * turn_s
 
 
 def state(
@@ -158,9 +195,10 @@ def _again(mission: MissionReport, order: dict[str, Any] | None) -> Digest | Non
     if order is None or (mission.ordered is not None and mission.stage != "over"):
         return None
     # A room may have another outline by now: its number is enough.
+    given = order.get("zones")
     zones = [
         {name: value for name, value in zone.items() if name != "polygon" or "room" not in zone}
-        for zone in _items(order.get("zones"))
+        for zone in (given if isinstance(given, list) else ())
         if isinstance(zone, dict)
     ]
     is_usual = order.get("passes") in (None, 1) and not (
@@ -201,50 +239,32 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
     ]
 
 
-def areas(settings: KnownSettings, order: dict[str, Any], report: MissionReport) -> Digest:
-    """Return standing zones, the zones of the order, and keep-outs in force.
-
-    ``order``: as received, for daemons whose reports have no corners of its zones.
-    """
+def areas(settings: KnownSettings, report: MissionReport) -> Digest:
+    """Return standing zones, the zones of the order, and keep-outs in force."""
     mission = settings.mission
-    reported = [
-        {"name": zone.name, "polygon": polygon, "is": "ordered"}
-        for zone in report.zones[:MOST_AREAS]
-        if (polygon := _polygon(list(map(list, zone.polygon))))
-    ]
-    standing = [
-        {"name": zone.name, "polygon": zone.polygon[:MOST_CORNERS], "is": "standing"}
-        for zone in mission.zones[:MOST_AREAS]
-    ]
-    ordered = reported or [
-        {"name": str(zone.get("name", "")), "polygon": polygon, "is": "ordered"}
-        for zone in _items(order.get("zones"))
-        if isinstance(zone, dict) and (polygon := _polygon(zone.get("polygon")))
-    ]
-    kept_out = [
-        *(
-            {"name": each.name, "polygon": polygon, "is": each.by}
-            for each in report.keep_outs[:MOST_KEEP_OUTS]
-            if (polygon := _polygon(list(map(list, each.polygon))))
-        ),
-        *({"polygon": each[:MOST_CORNERS], "is": "standing"} for each in mission.keep_out),
-    ]
-    return {"zones": standing + ordered, "keep_out": kept_out[: MOST_KEEP_OUTS + MOST_AREAS]}
+    return {
+        "zones": [
+            *_areas((zone.name, zone.polygon, "standing") for zone in mission.zones),
+            *_areas((zone.name, zone.polygon, "ordered") for zone in report.zones),
+        ],
+        "keep_out": [
+            *_areas((each.name, each.polygon, each.by) for each in report.keep_outs),
+            *_areas(("", polygon, "standing") for polygon in mission.keep_out),
+        ],
+    }
 
 
-def _items(value: object, most: int = MOST_AREAS) -> list[object]:
-    return value[:most] if isinstance(value, list) else []
+def _areas(found: Iterable[tuple[str, Corners, str]]) -> Iterator[Digest]:
+    """Yield areas, by name, polygon and kind, that can be drawn: so many at most."""
+    drawn = (area for area in found if _is_polygon(area[1]))
+    for name, polygon, kind in islice(drawn, 2 * MOST_AREAS):
+        yield {"name": name, "polygon": polygon, "is": kind}
 
 
-def _polygon(value: object) -> list[list[float]]:
-    """Return corners (x, y) [m]; none if they are invalid."""
-    pairs = (pair for pair in _items(value, MOST_CORNERS) if isinstance(pair, list))
-    corners = [
-        [float(x), float(y)]
-        for x, y in (pair for pair in pairs if len(pair) == 2)
-        if all(isinstance(v, int | float) and abs(v) < MOST_M for v in (x, y))
-    ]
-    return corners if len(corners) >= 3 else []
+def _is_polygon(corners: Corners) -> bool:
+    return 3 <= len(corners) <= MOST_CORNERS and all(
+        abs(value) < MOST_M for corner in corners for value in corner
+    )
 
 
 def lately(events: EventLog) -> list[Digest]:

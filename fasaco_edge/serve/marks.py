@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from fasaco_edge.serve.messages import framed
 from fasaco_edge.wire.documents.settings import MapSettings
-from fasaco_edge.wire.messages.grid_octets import GridOctets
+from fasaco_edge.wire.messages.grids import GridOctets
 
 # Marks of a map: unmarked pixels are unknown.
 FREE, WALL = 1, 2

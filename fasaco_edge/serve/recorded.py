@@ -23,7 +23,7 @@ from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.grid_octets import GridOctets
+from fasaco_edge.wire.messages.grids import GridOctets
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.schemas import PATH
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import PathProgress, RobotState
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.serve.digest import areas, lately, state
+from fasaco_edge.serve.digest import Way, areas, lately, state
 from fasaco_edge.serve.marks import (
     COVERAGE_MARKS,
     FIELD_MARKS,
@@ -20,7 +20,6 @@ from fasaco_edge.serve.marks import (
     map_marks,
 )
 from fasaco_edge.serve.messages import framed, message_text
-from fasaco_edge.serve.pace import Way
 from fasaco_edge.serve.rooms import rooms, shares
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
@@ -28,7 +27,7 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.grid_octets import GridOctets, read_field, read_grid, with_update
+from fasaco_edge.wire.messages.grids import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
 
 # Limit on the points shown of a path; reading a path takes some 4 us a point.
@@ -66,8 +65,6 @@ class ServedView(RobotState):
         super().__init__(keys.robot)
         self._keys = keys
         self._grids: dict[str, GridOctets] = {}
-        # The order as received: the status of an older daemon only names its zones.
-        self._order: dict[str, object] = {}
         # The newest order by command, also after its end.
         self._last_order: dict[str, object] | None = None
         self._others: dict[str, tuple[float, float, float]] = {}
@@ -95,9 +92,7 @@ class ServedView(RobotState):
             "state": lambda now: message_text(
                 "state", **state(self, self._way, now, self._ordered, self._last_order)
             ),
-            "areas": lambda _: message_text(
-                "areas", **areas(self.settings, self._order, self._mission)
-            ),
+            "areas": lambda _: message_text("areas", **areas(self.settings, self._mission)),
             "rooms": lambda _: message_text("rooms", **rooms(self.rooms)),
             "shares": lambda _: message_text("shares", **shares(self.rooms)),
             "events": lambda _: message_text("events", entries=lately(self.events)),
@@ -139,7 +134,7 @@ class ServedView(RobotState):
             "pose": (self.pose, self.walk, self.walk.at),
             "path": self._shown_path,
             "events": self.events.count,
-            "areas": (self.settings, self._order, self._mission.zones, self._mission.keep_outs),
+            "areas": (self.settings, self._mission.zones, self._mission.keep_outs),
             "rooms": (self.rooms,),
             "shares": (self.rooms,),
             "map": (self._grids.get("map", self._grids.get("coverage")), self.settings.map),
@@ -220,11 +215,9 @@ class ServedView(RobotState):
 
     def _follow(self, document: dict[str, object], now: float) -> None:
         super()._follow(document, now)
-        order = document.get("order")
         if document.get("command") == "start":
-            self._order = self._last_order = order if isinstance(order, dict) else {}
-        elif document.get("command") in ("cancel", "reset"):
-            self._order = {}
+            order = document.get("order")
+            self._last_order = order if isinstance(order, dict) else {}
 
     def _near(self, now: float) -> Iterator[dict[str, object]]:
         for robot, (at_s, x, y) in list(self._others.items()):

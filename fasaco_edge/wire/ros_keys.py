@@ -1,4 +1,4 @@
-"""Names of ROS 2 on Zenoh: keys, liveliness tokens, attachments, type hashes.
+"""Names of ROS 2 on Zenoh: keys, liveliness tokens, attachments, type hashes, actions.
 
 Sources: ros2/rmw_zenoh, docs/design.md at commit 99a6a2b (keys, tokens), rmw_zenoh_cpp at
 commit 3411fde (``liveliness_utils.cpp``: tokens, quality of service) and 5347477
@@ -8,10 +8,8 @@ eclipse-zenoh/zenoh-plugin-ros2dds at commit ebdb1e0 (``route_subscriber.rs``).
 Humble has no type hashes: it writes ``TypeHashNotSupported``, and does not match endpoints that
 send a type hash.
 
-Names of a ROS 2 action on Zenoh: its services, and its server in liveliness tokens.
-
 An action is three services and two topics below ``<action>/_action``; rmw_zenoh and
-zenoh-bridge-ros2dds have no other notion of an action. Sources: rcl_action of Jazzy (names),
+zenoh-bridge-ros2dds have no other notion of one. Sources: rcl_action of Jazzy (names),
 rmw_zenoh_cpp at commit 028bbe3 (``rmw_service_data.cpp``: attachment of a request; sequence numbers
 must not repeat), nav2_msgs of Humble, Iron, Jazzy and Lyrical. Hashes follow REP 2016; that of
 CancelGoal is also published.
@@ -57,7 +55,6 @@ GID_BYTES = 16
 # Sequence number, time [ns], length of the gid, gid: Zenoh's serialisation of two int64 and an
 # array of bytes.
 _ATTACHMENT = struct.Struct(f"<qqB{GID_BYTES}s")
-
 
 Endpoint = Literal["MP", "MS", "SS"]
 

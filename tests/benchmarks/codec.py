@@ -32,9 +32,8 @@ from fasaco_edge.wire.messages.maps import (
 )
 from fasaco_edge.wire.messages.paths import decode_path, encode_path
 from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
-from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID, POSE_SCHEMAS
+from fasaco_edge.wire.schemas import OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID
 from tests.benchmarks.harness import within
-from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 
 class RosbagsCodec:
@@ -96,7 +95,7 @@ class _Case:
 
 
 WAYS = ("encode", "decode")
-MESSAGES = 3 + len(POSE_SCHEMAS)
+MESSAGES = 4
 
 
 def measure(side: int, poses: int, repeats: int, say: Say) -> Generator[CodecTiming, None, None]:
@@ -149,18 +148,12 @@ def _cases(side: int, poses: int) -> Iterator[_Case]:
         decode_map_update,
     )
     stamped = StampedPose(Pose2D(1.25, -3.5, 2.5), "map", STAMP_NS)
-    encoders: dict[str, Callable[[StampedPose], bytes]] = {
-        schemas.POSE_STAMPED: encode_pose_stamped,
-        schemas.POSE_WITH_COVARIANCE_STAMPED: encode_pose_with_covariance_stamped,
-        schemas.ODOMETRY: encode_odometry,
-    }
-    for schema in POSE_SCHEMAS:
-        yield _Case(
-            schema.rsplit("/", 1)[1].removesuffix("Stamped"),
-            schema,
-            partial(encoders[schema], stamped),
-            partial(decode_pose, schema=schema),
-        )
+    yield _Case(
+        "Pose",
+        schemas.POSE_STAMPED,
+        partial(encode_pose_stamped, stamped),
+        partial(decode_pose, schema=schemas.POSE_STAMPED),
+    )
     xy, yaw = rng.normal(scale=30.0, size=(poses, 2)), rng.uniform(-3.0, 3.0, poses)
     yield _Case(
         f"path, {poses} poses",

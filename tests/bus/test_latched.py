@@ -13,7 +13,7 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.bus import latched, sample_order
-from fasaco_edge.bus.one_publisher import ASK_PERIOD_S, MOST_PUBLISHERS
+from fasaco_edge.bus.sample_order import ASK_PERIOD_S, MOST_PUBLISHERS
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.wire.topics import QOS

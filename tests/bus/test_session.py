@@ -133,20 +133,6 @@ def test_a_sample_travels_as_its_key_says(bus, client, name):
     assert sample.express == qos.express
 
 
-def test_a_latched_subscription_hears_what_was_said_before_it(bus, endpoint, samples):
-    text = {"mode": "client", "connect": {"endpoints": [endpoint]}}
-    # Without time stamps Zenoh refuses to keep samples.
-    text["timestamping"] = {"enabled": True}
-    cache = zenoh.ext.CacheConfig(max_samples=1)
-    with zenoh.open(zenoh.Config.from_json5(json.dumps(text))) as client:
-        publisher = zenoh.ext.declare_advanced_publisher(
-            client, KEY, cache=cache, publisher_detection=True
-        )
-        publisher.put(b"before")
-        bus.subscribe(KEY, samples.put, latched=True)
-        assert samples.get(timeout=TIMEOUT_S).payload == b"before"
-
-
 def test_it_knows_whether_anybody_listens(bus, client):
     for latched in (False, True):
         publisher = bus.publisher(f"{KEY}/{latched}", qos=QOS["path" if latched else "pose"])
@@ -228,16 +214,6 @@ def test_who_joined_listens_once_the_other_is_gone(endpoint, samples, mode):
         until(is_reached)
         assert samples.get(timeout=TIMEOUT_S).payload == b"to the second"
         until(third.is_in_touch)
-
-
-def test_two_clients_meet_in_a_peer(bus, endpoint, samples):
-    client = BusSettings("client", (endpoint,))
-    with open_bus(client) as one, open_bus(client) as other:
-        one.subscribe(KEY, samples.put)
-        publisher = other.publisher(KEY)
-        until(publisher.has_listeners)
-        publisher.put(b"hello")
-        assert samples.get(timeout=TIMEOUT_S).payload == b"hello"
 
 
 @pytest.mark.parametrize(

@@ -22,11 +22,11 @@ import numpy as np
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
-from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, encode_rooms
-from fasaco_edge.daemon.loop.last_samples import ShownTrail
+from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms, encode_rooms
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.mission_reports import mission_report
-from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
+from fasaco_edge.daemon.loop.outbox import headings
+from fasaco_edge.daemon.loop.periodic import MOST_SQUARES, ShownTrail
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
@@ -326,8 +326,8 @@ class MissionTrial:
             _hold(bool((floor_again[place] == swept).all()), f"tile of floor {place}")
         _hold(snapshot.floor.pixels == self._mission.floor.pixels, "swept pixels")
         _hold(OrderState.from_json(again.note).to_json() == snapshot.note, "note")
-        rooms = encode_rooms(BookSnapshot.of(self._mission.rooms))
-        _hold(encode_rooms(BookSnapshot.of(decode_rooms(rooms))) == rooms, "rooms")
+        rooms = encode_rooms(self._mission.rooms)
+        _hold(encode_rooms(decode_rooms(rooms)) == rooms, "rooms")
         self.counts["rooms read again"] += len(self._mission.rooms.rooms)
         self.counts["ledgers read again"] += 1
         self.counts["largest ledger [tiles]"] = max(

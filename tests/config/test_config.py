@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -325,17 +323,6 @@ def test_whatever_is_written_is_a_configuration_or_refused(tmp_path_factory, doc
     assert 0 < robot.tool_width_m <= 10
     assert config.map.free_at_most < config.map.occupied_at_least
     assert math.isfinite(planner.q0 + planner.alpha + planner.tau0 + planner.budget_s)
-
-
-def test_checking_needs_no_compiler(tmp_path):
-    """A configuration is refused at once: numba takes half a second and 60 MB."""
-    file = tmp_path / "config.yaml"
-    file.write_text("planner: {velocities: '4,2', ants: 100}")
-    code = (
-        "import sys; from pathlib import Path; from fasaco_edge.config.loading import load_config; "
-        f"load_config(Path({str(file)!r})); assert 'numba' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,6 @@ from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process, fasaco_edge
 from tests.support.rooms import (
     HALL,
-    TOOL_M,
     begin,
     cells_of,
     drive,
@@ -163,35 +162,6 @@ def test_an_order_before_any_map_and_a_life_after_it(tmp_path):
         assert (status["pose"]["x"], status["pose"]["y"]) == (0.45, 0.45)
 
 
-def test_a_keep_out_zone_is_kept_out_of_and_named(tmp_path):
-    # A square of 4 x 4 cells.
-    corners = [[0.9, 0.9], [2.1, 0.9], [2.1, 2.1], [0.9, 2.1]]
-    inside = {(row, col) for row in range(3, 7) for col in range(3, 7)}
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        paths = outsider.listen("path")
-        begin(outsider)
-        paths.wait(lambda heard: True)
-        answer = command(outsider, "start", {"keep_out": [corners], "keep_covered": True})
-        assert answer["mission"]["keep_out"] == 1
-        heard = paths.wait(lambda heard: about(heard)["reason"] == "everything reachable", since=1)
-        driven = set(cells_of(planned(heard)[0]))
-        # The robot is wider than its tool: it keeps its rim out, too.
-        around = {(row, col) for row in range(2, 8) for col in range(2, 8)}
-        assert not driven & inside
-        assert not driven & around
-        status = outsider.wait_status(lambda status: status["mission"]["unreached"]["cells"])
-        (area,) = status["mission"]["unreached"]["areas"]
-        assert area["reason"] == "in a keep-out zone"
-        assert area["cells"] == len(around)
-        assert area["m2"] == pytest.approx(len(around) * TOOL_M**2)
-        # A zone beyond the map is refused, and the mission goes on.
-        beyond = {"name": "moon", "polygon": [[100, 0], [101, 0], [101, 1]]}
-        error = command(outsider, "start", {"zones": [beyond]})
-        assert error["code"] == "bad_order"
-        assert "zone 'moon' lies outside of the map" in error["message"]
-        assert outsider.ask_status()["state"] == "covering"
-
-
 def test_an_order_ends_at_its_time_limit(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)
@@ -220,19 +190,6 @@ def test_a_map_of_dirt_says_what_comes_first_where_time_is_short(tmp_path):
         outsider.wait_status(lambda status: status["mission"]["first_from"] is None)
 
 
-def test_cancelled_it_stays_so_after_a_kill(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        begin(outsider)
-        drive(outsider, lanes(10))
-        assert command(outsider, "cancel")["state"] == "idle"
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        status = outsider.ask_status()
-        assert (status["state"], status["reason"]) == ("idle", "cancelled")
-        assert status["ledger"]["restored_cells"] == 10
-
-
 def test_reset_keeps_the_ledger_aside(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)
@@ -254,23 +211,6 @@ def test_reset_keeps_the_ledger_aside(tmp_path):
         assert outsider.ask_status()["ledger"]["restored_cells"] == 0
 
 
-def test_an_order_that_cannot_be_read_moves_no_robot(tmp_path):
-    from dataclasses import replace
-
-    from fasaco_edge.daemon.ledger.file import LedgerFile
-    from tests.support.ledgers import lane
-
-    (tmp_path / "state").mkdir()
-    LedgerFile(tmp_path / "state", "robot").write(replace(lane(5), note='{"version":9}'))
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        status = outsider.ask_status()
-        assert status["state"] == "idle"
-        assert status["reason"].startswith("the order kept with the ledger cannot be read")
-        assert status["errors"]["by_code"] == {"bad_order": 1}
-        assert status["ledger"]["restored_cells"] == 5
-        assert command(outsider, "start", {"keep_covered": True})["state"] == "waiting for map"
-
-
 def test_zones_of_the_configuration(tmp_path):
     zones = [{"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}]
     mission = {"autostart": False, "zones": zones, "keep_out": [[[2, 2], [2.4, 2], [2.4, 2.4]]]}
@@ -290,51 +230,6 @@ def test_zones_of_the_configuration(tmp_path):
         refused = fasaco_edge("mission", "start", "--zone", "hall", "--connect", running.endpoint)
         assert refused.code == 1
         assert "no zone 'hall' in mission.zones" in refused.err
-
-
-@pytest.mark.parametrize("frame", ["floor_1", "floor_2"])
-def test_a_zone_named_before_a_map_applies_to_its_map_alone(tmp_path, frame):
-    mission = {"autostart": False, "map_frame": "floor_1"}
-    mission["zones"] = [{"name": "kitchen", "polygon": KITCHEN["polygon"]}]
-    with (
-        daemon_process(tmp_path, mission=mission) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        paths = outsider.listen("path")
-        command(outsider, "start", {"zones": [{"name": "kitchen"}]})
-        outsider.put("map", map_bytes(room(3.0, 3.0), frame=frame))
-        outsider.put("pose", pose_bytes(0.75, 0.75, frame=frame))
-        if frame == "floor_1":
-            outsider.wait_status(lambda status: status["state"] == "covering")
-            return
-        status = outsider.wait_status(lambda status: status["state"] == "idle")
-        assert status["reason"] == (
-            "it was given in frame 'floor_1', the map is in 'floor_2': the order was dropped"
-        )
-        assert not paths.heard
-    # Progress on another map says before any map comes that it is not theirs.
-    with (
-        daemon_process(tmp_path, mission=mission) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        refused = command(outsider, "start", {"zones": [{"name": "kitchen"}]})
-        assert refused["code"] == "bad_order"
-        assert "given for the map in frame 'floor_1'" in refused["message"]
-
-
-def test_poses_that_stop_are_a_state(tmp_path):
-    patience = {"lost_pose_s": 0.5, "stale_map_s": 60.0}
-    with (
-        daemon_process(tmp_path, mission=patience) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        outsider.put("map", map_bytes(room(3.0, 3.0)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
-        status = outsider.wait_status(lambda status: status["state"] == "degraded")
-        assert status["reason"].startswith("no pose for 0.5 s")
-        assert status["path"]["steps"] > 0
-        outsider.put("pose", pose_bytes(0.75, 0.75))
-        outsider.wait_status(lambda status: status["state"] == "covering")
 
 
 def test_the_command_line(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 
 from tests.support.outsider import Outsider
@@ -18,12 +17,6 @@ from tests.support.rooms import (
     map_bytes,
     pose_bytes,
 )
-
-
-def command(client, name):
-    payload = json.dumps({"command": name, "discard": True}).encode()
-    (reply,) = client.session.get(f"{client.prefix}/@rpc/mission", payload=payload, timeout=5.0)
-    return json.loads(reply.ok.payload.to_bytes())
 
 
 def aside(folder):
@@ -43,48 +36,6 @@ def test_one_map_in_a_wrong_frame_after_a_restart_costs_nothing(tmp_path):
         assert status["map"]["frame"] == "map"
         assert status["ledger"]["fault"] is None
     assert aside(tmp_path) == []
-
-
-def test_map_and_poses_long_in_another_frame_mean_a_new_building(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
-        begin(client)
-        drive(client, lanes(30))
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
-        client.put("map", map_bytes(HALL, frame="odom"))
-        deadline = time.monotonic() + 60.0
-        while client.ask_status()["state"] != "covering":
-            assert time.monotonic() < deadline
-            client.put("pose", pose_bytes(0.45, 0.45, frame="odom"))
-            time.sleep(0.1)
-        status = client.ask_status()
-        assert status["errors"]["by_code"]["ledger_mismatch"] == 1
-        assert "lies in frame 'map', the map in 'odom'" in status["ledger"]["fault"]
-        assert status["coverage"]["covered"] == 1
-    assert aside(tmp_path) != []
-
-
-def test_a_reset_lets_another_frame_count_at_once(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
-        begin(client)
-        drive(client, lanes(30))
-        client.put("map", map_bytes(HALL, frame="odom"))
-        client.put("pose", pose_bytes(0.45, 0.45, frame="odom"))
-        client.wait_status(lambda status: status["errors"]["by_code"].get("wrong_frame") == 2)
-        assert command(client, "reset")["state"] == "idle"
-        client.put("pose", pose_bytes(0.45, 0.45, frame="odom"))
-        client.wait_status(lambda status: status["map"]["frame"] == "odom")
-        command(client, "start")
-        client.wait_status(lambda status: status["state"] == "covering")
-
-
-def test_a_wrong_map_while_kernels_load_is_not_used(tmp_path):
-    """Each is latched, and comes once."""
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
-        client.put("map", map_bytes(HALL))
-        client.put("map", map_bytes(HALL, frame="odom"))
-        client.put("pose", pose_bytes(0.45, 0.45))
-        status = client.wait_status(lambda status: status["state"] == "covering")
-        assert status["map"]["frame"] == "map"
 
 
 def another_floor() -> Pixels:

@@ -13,7 +13,6 @@ import pytest
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.config.config import BusConfig, DaemonConfig
 from fasaco_edge.daemon import supervisor
-from tests.support.disks import disk_fixture
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import fill, map_bytes, odometry_bytes, pose_bytes, room
@@ -119,28 +118,6 @@ def test_a_slow_recorder_gets_time_to_start_but_a_hung_one_ends(tmp_path, monkey
             watched.close(60.0, 60.0)
     assert {"starting", "recording"} <= {state.state for state in states}
     assert states[-1].reason == "no status for 0 s"
-
-
-# 50 MB are the least that a recorder leaves free.
-small_disk = disk_fixture("60m")
-
-
-def test_a_full_disk_is_told_and_planning_goes_on(tmp_path, small_disk):
-    pytest.importorskip("rerun")
-    with (
-        daemon_process(
-            tmp_path, "--record", str(small_disk), recording={"least_free_mb": 50}
-        ) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        wait_recorder(outsider, RECORDING)
-        ballast = small_disk / "ballast"
-        ballast.write_bytes(bytes(15_000_000))
-        full = wait_recorder(outsider, "disk full")
-        assert "free" in full["reason"]
-        assert len(plan_times(outsider, 3, 0)) == 3
-        ballast.unlink()
-        assert wait_recorder(outsider, RECORDING)["restarts"] == 0
 
 
 def test_the_recorder_takes_untyped_poses_as_the_daemon_does(tmp_path):

@@ -89,27 +89,6 @@ def test_it_outlives_a_kill_and_comes_before_any_map(tmp_path):
         assert keep_out(outsider, "remove", {"name": "vase"})["mission"]["keep_outs"] == []
 
 
-def test_without_autostart_a_keep_out_starts_nothing(tmp_path):
-    for _ in range(2):
-        with (
-            daemon_process(tmp_path, mission={"autostart": False}) as running,
-            Outsider(running.endpoint) as outsider,
-        ):
-            assert keep_out(outsider, "add", VASE)["state"] == "idle"
-
-
-def test_with_autostart_a_daemon_that_has_one_still_starts(tmp_path):
-    """A robot that waits for orders gets one; then its configuration is changed."""
-    with (
-        daemon_process(tmp_path, mission={"autostart": False}) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        keep_out(outsider, "add", VASE)
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        mission = outsider.ask_status()["mission"]
-        assert (mission["ordered"], mission["keep_out"]) == ("itself", 1)
-
-
 @pytest.mark.parametrize("name", ["start", "reset"])
 def test_what_is_covered_is_not_forgotten_without_consent(tmp_path, name):
     order = {"passes": 2} if name == "start" else None
@@ -143,25 +122,3 @@ def test_a_keep_out_before_a_map_forgets_nothing_in_the_ledger(tmp_path):
         for order in ({}, {"passes": 2, "keep_covered": True}):
             assert "code" not in command(outsider, "start", order, discard=False)
         assert outsider.ask_status()["ledger"]["restored_cells"] == 12
-
-
-@pytest.mark.parametrize("change", ["fresh", "another tool"])
-def test_starting_over_keeps_the_keep_outs(tmp_path, change):
-    """Progress is set aside, as it was asked for, or as cells are others; keep-outs are not."""
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        begin(outsider)
-        drive(outsider, lanes(12))
-        keep_out(outsider, "add", VASE)
-    words, more = (["--fresh"], {}) if change == "fresh" else ([], {"tool_width_m": 0.4})
-    for again in (words, []):
-        # The second time as after a kill before anything was covered.
-        with (
-            daemon_process(tmp_path, *again, robot=more) as running,
-            Outsider(running.endpoint) as outsider,
-        ):
-            status = outsider.ask_status()
-            assert status["ledger"]["restored_cells"] == 0
-            assert [area["name"] for area in status["mission"]["keep_outs"]] == ["vase"]
-            assert status["mission"]["ordered"] == "itself"
-            running.process.send_signal(signal.SIGKILL)
-            running.process.wait()

@@ -158,25 +158,16 @@ def test_a_ledger_of_a_large_building_is_small():
     assert size < 12_000
 
 
-def test_a_file_cut_at_any_byte_is_refused():
+def test_a_file_cut_longer_or_with_a_flipped_bit_is_refused():
     payload = encode_ledger(lane(9))
-    for length in range(len(payload)):
-        with pytest.raises(LedgerFileError):
-            decode_ledger(payload[:length], CELL_M)
-
-
-def test_a_file_that_goes_on_is_refused():
-    with pytest.raises(LedgerFileError):
-        decode_ledger(encode_ledger(lane(9)) + b"\0", CELL_M)
-
-
-def test_any_bit_that_flips_is_found():
-    payload = encode_ledger(lane(9))
+    broken = [payload + b"\0", *(payload[:length] for length in range(len(payload)))]
     for bit in range(8 * len(payload)):
         flipped = bytearray(payload)
         flipped[bit // 8] ^= 1 << bit % 8
+        broken.append(bytes(flipped))
+    for one in broken:
         with pytest.raises(LedgerFileError):
-            decode_ledger(bytes(flipped), CELL_M)
+            decode_ledger(one, CELL_M)
 
 
 @examples(300)
@@ -218,15 +209,6 @@ def test_impossible_cells_are_refused(cell_m, version):
 def test_another_file_is_no_ledger():
     with pytest.raises(LedgerFileError, match="not a ledger"):
         decode_ledger(enveloped(b"", magic=b"\x89PNG\r\n\x1a\n"), CELL_M)
-
-
-def test_another_version_is_named_with_what_to_do():
-    with pytest.raises(
-        LedgerMismatchError, match="version 6, this release reads versions 1 to 5"
-    ) as told:
-        decode_ledger(enveloped(b"whatever it holds", version=6), CELL_M)
-    assert "install the release that wrote it" in told.value.hint
-    assert "rename the file back" in told.value.hint
 
 
 def test_other_cells_are_named_with_what_to_do():

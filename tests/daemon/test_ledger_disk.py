@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import time
 from pathlib import Path
 
-from fasaco_edge.daemon.ledger.writer import RETRY_S
+from fasaco_edge.daemon.ledger.disk_writer import RETRY_S
 from tests.support.disks import disk_fixture
 from tests.support.outsider import Outsider
 from tests.support.processes import STOP_S, Daemon, daemon_process
@@ -66,40 +65,6 @@ def test_a_full_disk_is_told_and_nothing_is_lost(tmp_path, small_disk):
     ):
         status = outsider.ask_status()
         assert (status["ledger"]["restored_cells"], status["ledger"]["fault"]) == (60, None)
-
-
-def test_a_disk_that_turns_read_only_is_told_and_nothing_is_lost(tmp_path, small_disk):
-    def remount(how: str) -> None:
-        subprocess.run(["mount", "-o", f"remount,{how}", str(small_disk)], check=True)
-
-    with (
-        daemon_process(tmp_path, "--state", str(small_disk)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        begin(outsider)
-        drive(outsider, lanes(20))
-        wait_written(outsider)
-        remount("ro")
-        check_trouble(running, outsider, "Read-only file system")
-        remount("rw")
-        outsider.wait_status(lambda status: status["ledger"]["fault"] is None)
-    with (
-        daemon_process(tmp_path, "--state", str(small_disk)) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        assert outsider.ask_status()["ledger"]["restored_cells"] == 60
-
-
-def test_a_folder_that_cannot_be_is_told_and_the_mission_goes_on(tmp_path):
-    (tmp_path / "file").write_text("not a folder")
-    with (
-        daemon_process(tmp_path, "--state", str(tmp_path / "file")) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
-        begin(outsider)
-        drive(outsider, lanes(20))
-        check_trouble(running, outsider, f"cannot write {tmp_path / 'file' / 'robot.ledger'}")
-        running.stop()
 
 
 def test_a_hanging_disk_delays_neither_mission_nor_shutdown(tmp_path):

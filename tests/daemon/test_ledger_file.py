@@ -41,18 +41,6 @@ def test_the_newest_is_found_and_the_one_before_kept(written):
     assert (written / NAMES[1]).read_bytes() == encode_ledger(lane(3))
 
 
-def test_a_folder_is_made_when_something_is_written(tmp_path):
-    folder = tmp_path / "a" / "b"
-    LedgerFile(folder, "robot").write(lane(2))
-    assert contents(load(folder).ledger) == contents(lane(2))
-
-
-def test_each_robot_has_its_own(tmp_path):
-    LedgerFile(tmp_path, "robot").write(lane(2))
-    LedgerFile(tmp_path, "mower-2").write(lane(5))
-    assert contents(load(tmp_path).ledger) == contents(lane(2))
-
-
 def test_a_file_cut_at_any_byte_falls_back_to_the_one_before(written):
     newest = written / NAMES[0]
     whole, before = newest.read_bytes(), (written / NAMES[1]).read_bytes()

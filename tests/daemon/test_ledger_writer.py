@@ -5,7 +5,9 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import shutil
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,18 +15,20 @@ from typing import Any
 import pytest
 from msgspec.structs import asdict
 
-from fasaco_edge.daemon.ledger import writer as ledger_writer
+from fasaco_edge.daemon.ledger import disk_writer
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
+from fasaco_edge.daemon.ledger.disk_writer import HANGS_S
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.daemon.ledger.writer import (
     FLOOR_PERIOD_S,
-    HANGS_S,
     PERIOD_S,
     LedgerKeeper,
     LedgerWriter,
     open_ledger,
 )
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from fasaco_edge.mission.orders.keep_outs import KeepOut
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at
 from tests.support.ledgers import CELL_M, contents, lane
 from tests.support.waiting import until
@@ -47,7 +51,7 @@ def document(writer: LedgerWriter) -> dict[str, Any]:
 
 @pytest.fixture
 def retry_soon(monkeypatch):
-    monkeypatch.setattr(ledger_writer, "RETRY_S", 0.05)
+    monkeypatch.setattr(disk_writer, "RETRY_S", 0.05)
 
 
 def test_what_is_put_is_written(tmp_path):
@@ -59,16 +63,16 @@ def test_what_is_put_is_written(tmp_path):
     until(lambda: document(writer)["age_s"] is not None)
     assert on_disk(tmp_path) == contents(lane(3))
     assert 0 <= document(writer)["age_s"] < DEADLINE_S
-    writer.close(1.0)
+    writer.disk.close(1.0)
     assert document(writer)["fault"] is None
-    assert writer.take_faults() == []
+    assert writer.disk.take_faults() == []
 
 
 def test_the_last_thing_put_is_on_disk_when_it_is_closed(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     for length in range(1, 50):
         writer.put(lane(length))
-    writer.close(5.0)
+    writer.disk.close(5.0)
     assert on_disk(tmp_path) == contents(lane(49))
 
 
@@ -77,7 +81,7 @@ def test_what_was_written_is_restored(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     assert contents(writer.restored) == contents(lane(7))
     assert document(writer)["restored_cells"] == 7
-    writer.close(1.0)
+    writer.disk.close(1.0)
 
 
 def test_a_fresh_start_keeps_what_there_was_aside(tmp_path):
@@ -85,7 +89,7 @@ def test_a_fresh_start_keeps_what_there_was_aside(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M, fresh=True)
     assert writer.restored is None
     assert document(writer)["fault"] is None
-    writer.close(1.0)
+    writer.disk.close(1.0)
     (aside,) = tmp_path.glob("robot.ledger.fresh-*")
     aside.rename(tmp_path / "robot.ledger")
     assert on_disk(tmp_path) == contents(lane(7))
@@ -95,15 +99,15 @@ def test_what_was_wrong_on_disk_is_told(tmp_path, caplog):
     LedgerFile(tmp_path, "robot").write(lane(7))
     (tmp_path / "robot.ledger").write_bytes(b"torn")
     writer = open_ledger(tmp_path, "robot", CELL_M)
-    (fault,) = writer.take_faults()
+    (fault,) = writer.disk.take_faults()
     assert isinstance(fault, LedgerFileError)
-    assert writer.take_faults() == []
+    assert writer.disk.take_faults() == []
     writer.put(lane(1))
     until(lambda: document(writer)["age_s"] is not None)
     # It is still worth knowing after all is well again.
     assert document(writer)["fault"] == f"{fault}: {fault.hint}"
     assert str(fault) in caplog.text
-    writer.close(1.0)
+    writer.disk.close(1.0)
 
 
 def test_another_ledger_never_overwrites_the_one_kept_aside(tmp_path):
@@ -112,7 +116,7 @@ def test_another_ledger_never_overwrites_the_one_kept_aside(tmp_path):
     writer.put(lane(8))
     writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
     writer.put(lane(2))
-    writer.close(5.0)
+    writer.disk.close(5.0)
     assert on_disk(tmp_path) == contents(lane(2))
     aside = tmp_path / "aside"
     aside.mkdir()
@@ -131,7 +135,7 @@ def test_each_new_beginning_keeps_what_there_was_until_then(tmp_path, caplog):
         until(lambda length=length: on_disk(tmp_path) == contents(lane(length)))
         writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
         until(lambda: not (tmp_path / "robot.ledger").exists())
-    writer.close(1.0)
+    writer.disk.close(1.0)
     aside = sorted(path.read_bytes() for path in tmp_path.glob("robot.ledger.mismatch-*"))
     assert aside == sorted(encode_ledger(lane(length)) for length in (3, 5))
     assert caplog.text.count("the ledger before is kept as robot.ledger.mismatch-") == 2
@@ -142,7 +146,7 @@ def test_the_files_are_kept_aside_although_nothing_follows(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
     until(lambda: not (tmp_path / "robot.ledger").exists())
-    writer.close(1.0)
+    writer.disk.close(1.0)
     assert on_disk(tmp_path) is None
 
 
@@ -162,14 +166,14 @@ def test_a_disk_that_fails_is_told_once_and_tried_again(tmp_path, monkeypatch, c
     assert f"cannot write {tmp_path / 'robot.ledger'}: No space left on device" in told
     assert "kept in memory, and writing is retried" in told
     assert caplog.text.count("No space left") == 1
-    assert len(writer.take_faults()) == 1
+    assert len(writer.disk.take_faults()) == 1
     assert min(b - a for a, b in pairwise(tries)) >= 0.05, "no busy loop"
     writer.put(lane(4))
     monkeypatch.setattr(os, "fsync", real)
     until(lambda: document(writer)["fault"] is None)
     assert on_disk(tmp_path) == contents(lane(4))
     assert "written again" in caplog.text
-    writer.close(1.0)
+    writer.disk.close(1.0)
 
 
 def test_new_ledgers_do_not_make_a_failing_disk_busy(tmp_path, monkeypatch):
@@ -179,7 +183,7 @@ def test_new_ledgers_do_not_make_a_failing_disk_busy(tmp_path, monkeypatch):
         tries.append(descriptor)
         raise OSError(errno.EIO, "Input/output error")
 
-    monkeypatch.setattr(ledger_writer, "RETRY_S", 600.0)
+    monkeypatch.setattr(disk_writer, "RETRY_S", 600.0)
     writer = open_ledger(tmp_path, "robot", CELL_M)
     monkeypatch.setattr(os, "fsync", failing)
     for length in range(1, 60):
@@ -187,7 +191,7 @@ def test_new_ledgers_do_not_make_a_failing_disk_busy(tmp_path, monkeypatch):
         time.sleep(0.005)
     assert len(tries) == 1
     # One last try, then it ends.
-    writer.close(60.0)
+    writer.disk.close(60.0)
     assert len(tries) == 2
 
 
@@ -207,7 +211,7 @@ def test_set_aside_comes_first_also_after_failures(tmp_path, monkeypatch, retry_
         until(lambda: len(tries) >= 3)
         assert on_disk(tmp_path) == contents(lane(7))
     until(lambda: on_disk(tmp_path) == contents(lane(2)))
-    writer.close(1.0)
+    writer.disk.close(1.0)
     assert list(tmp_path.glob("robot.ledger.mismatch-*"))
 
 
@@ -224,8 +228,8 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path, caplog, retry_soon):
     until(lambda: writer.report(time.monotonic() + HANGS_S).fault is not None)
     report = writer.report(time.monotonic() + 2 * HANGS_S)
     assert "the disk has hung for 10 s or more" in str(report.fault)
-    assert len(writer.take_faults()) == 1
-    writer.close(0.1)
+    assert len(writer.disk.take_faults()) == 1
+    writer.disk.close(0.1)
     assert "the disk is too slow" in caplog.text
     os.close(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK))  # so that the thread can end
 
@@ -234,7 +238,7 @@ def test_a_ledger_that_somebody_writes_is_refused(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     with pytest.raises(LedgerFileError, match="another daemon"):
         open_ledger(tmp_path, "robot", CELL_M)
-    writer.close(1.0)
+    writer.disk.close(1.0)
 
 
 def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
@@ -246,12 +250,12 @@ def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
         return on_disk(tmp_path, CELL) == contents(drive.mission.snapshot())
 
     keeper.keep(drive.mission, 0.0)
-    until(lambda: is_written() and not writer.is_behind())
+    until(lambda: is_written() and not writer.disk.is_behind())
     visits = drive.mission.ledger.total
     drive.tell(pose_at(0, 0.2))
     assert drive.mission.ledger.total == visits
     keeper.keep(drive.mission, PERIOD_S)
-    assert not writer.is_behind()
+    assert not writer.disk.is_behind()
     assert not is_written()
     keeper.keep(drive.mission, FLOOR_PERIOD_S)
     until(is_written)
@@ -259,7 +263,7 @@ def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
     drive.tell(pose_at(0, 1))
     keeper.keep(drive.mission, FLOOR_PERIOD_S + PERIOD_S)
     until(is_written)
-    writer.close(1.0)
+    writer.disk.close(1.0)
 
 
 def test_floor_alone_is_restored_too(tmp_path):
@@ -272,4 +276,25 @@ def test_floor_alone_is_restored_too(tmp_path):
     drive = Drive((0, 0))
     LedgerKeeper(writer, CELL, autostart=True).restore(drive.mission)
     assert drive.mission.floor.pixels == snapshot.floor.pixels > 0
-    writer.close(1.0)
+    writer.disk.close(1.0)
+
+
+@pytest.mark.parametrize("change", ["fresh", "another tool"])
+def test_starting_over_keeps_the_keep_outs(tmp_path, change):
+    """Progress is set aside, as it was asked for, or as cells are others; keep-outs are not."""
+    vase = KeepOut("vase", ((0.9, 0.9), (2.1, 0.9), (2.1, 2.1)))
+    note = replace(OrderState.idle(NO_ORDER), keep_out=(vase,)).to_json()
+    begun, again = tmp_path / "begun", tmp_path / "again"
+    LedgerFile(begun, "robot").write(replace(lane(5), note=note))
+    is_fresh, cell_m = change == "fresh", CELL_M if change == "fresh" else 0.4
+    for folder, fresh in ((begun, is_fresh), (again, False)):
+        writer = open_ledger(folder, "robot", cell_m, fresh=fresh)
+        assert document(writer)["restored_cells"] == 0
+        # A robot that waits for orders gets one; then its configuration is changed.
+        for autostart in (False, True):
+            state = LedgerKeeper(writer, cell_m, autostart=autostart).order_state
+            assert (state.keep_out, state.automatic) == ((vase,), autostart)
+        until(lambda writer=writer: not writer.disk.is_behind())
+        if folder == begun:
+            shutil.copytree(begun, again)  # killed before anything was covered
+        writer.disk.close(1.0)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 
 import numpy as np
 import pytest
 
-from fasaco_edge.wire.messages.maps import decode_occupancy_grid
-from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import (
@@ -18,12 +15,9 @@ from tests.support.rooms import (
     RADIUS_M,
     RESOLUTION_M,
     TOOL_M,
-    UNKNOWN,
-    WALL,
     cells_of,
     covariant_bytes,
     coverable_cells,
-    fill,
     map_bytes,
     odometry_bytes,
     pillared_room,
@@ -285,26 +279,6 @@ def test_an_update_that_opens_a_door_leads_to_a_new_path(fresh):
     assert about(third)["map_revision"] == 3
 
 
-def test_a_change_that_touches_no_coverable_cell_changes_no_path(fresh):
-    pixels = pillared_room()
-    receiver = fresh.listen("path")
-    fresh.put("map", map_bytes(pixels))
-    fresh.put("pose", pose_bytes(*START))
-    receiver.wait(lambda heard: True)
-    # Inside the pillar; and more of the unknown around.
-    hollow = fill(pixels, 2.15, 1.15, 2.25, 1.25, UNKNOWN)
-    wider = np.full((pixels.shape[0] + 30, pixels.shape[1] + 30), UNKNOWN, np.int8)
-    wider[: pixels.shape[0], : pixels.shape[1]] = pixels
-    for revision, changed in enumerate((hollow, wider, pixels), start=2):
-        fresh.put("map", map_bytes(changed, stamp_ns=revision))
-        fresh.wait_status(
-            lambda status, revision=revision: (status["map"] or {}).get("revision") == revision
-        )
-    status = fresh.wait_status(lambda status: True)
-    assert status["plan"]["plans"] == 1
-    assert len(receiver.heard) == 1
-
-
 def test_poses_may_come_as_other_messages_that_say_so(fresh):
     receiver = fresh.listen("path")
     fresh.put("map", map_bytes(room(3.0, 3.0)))
@@ -318,21 +292,6 @@ def test_poses_may_come_as_other_messages_that_say_so(fresh):
     fresh.wait_status(lambda status: status["errors"]["by_code"] == {"malformed_message": 1})
     fresh.put("pose", pose_bytes(1.35, 0.75), "")
     fresh.wait_status(lambda status: status["pose"]["x"] == 1.35)
-
-
-@pytest.mark.parametrize("name", ["PoseWithCovarianceStamped", "Odometry"])
-def test_poses_that_do_not_say_are_what_the_configuration_says(tmp_path, name):
-    make = {"Odometry": odometry_bytes, "PoseWithCovarianceStamped": covariant_bytes}[name]
-    package = "nav_msgs" if name == "Odometry" else "geometry_msgs"
-    with (
-        daemon_process(tmp_path, pose={"schema": f"{package}/msg/{name}"}) as running,
-        Outsider(running.endpoint) as client,
-    ):
-        client.put("pose", make(0.75, 1.05), "")
-        client.put("map", map_bytes(room(3.0, 3.0)), "")
-        status = client.wait_status(lambda status: status["state"] == "covering")
-        assert (status["pose"]["x"], status["pose"]["y"]) == (0.75, 1.05)
-        assert status["errors"]["total"] == 0
 
 
 def test_a_robot_that_covers_all_is_done(fresh):
@@ -349,111 +308,3 @@ def test_a_robot_that_covers_all_is_done(fresh):
     last = receiver.wait(lambda heard: True, since=1)
     assert len(planned(last)[0]) == 0
     assert about(last)["reason"] == "every reachable cell is covered"
-
-
-def test_a_robot_in_a_wall_is_blocked_until_it_stands_well(fresh):
-    pixels = fill(room(4.0, 3.0), 2.0, 0.0, 4.0, 3.0, WALL)
-    fresh.put("map", map_bytes(pixels))
-    fresh.put("pose", pose_bytes(3.3, 1.5))
-    status = fresh.wait_status(lambda status: status["state"] == "blocked")
-    assert status["reason"].startswith("robot is in an occupied cell")
-    fresh.put("pose", pose_bytes(0.75, 0.75))
-    status = fresh.wait_status(lambda status: status["state"] == "covering")
-    assert status["coverage"]["coverable"] == len(coverable_cells(pixels))
-
-
-def test_another_frame_is_refused_and_counted(fresh):
-    fresh.put("map", map_bytes(room(3.0, 3.0)))
-    fresh.put("pose", pose_bytes(*START))
-    fresh.wait_status(lambda status: status["state"] == "covering")
-    fresh.put("pose", pose_bytes(1.05, 1.05, frame="odom"))
-    fresh.put("map", map_bytes(room(6.0, 6.0), frame="odom"))
-    status = fresh.wait_status(lambda status: status["errors"]["total"] == 2)
-    assert status["errors"]["by_code"] == {"wrong_frame": 2}
-    assert status["map"]["rows"] == 60
-    assert status["pose"]["x"] == START[0]
-
-
-def test_a_map_beyond_the_limit_is_refused_and_counted(tmp_path):
-    with (
-        daemon_process(tmp_path, map={"max_lattice_cells": 200}) as running,
-        Outsider(running.endpoint) as client,
-    ):
-        client.put("pose", pose_bytes(*START))
-        client.put("map", map_bytes(room(6.0, 6.0)))
-        status = client.wait_status(lambda status: status["errors"]["total"] == 1)
-        assert status["errors"]["by_code"] == {"map_too_large": 1}
-        assert "exceeds 200 cells" in status["errors"]["last"]
-        client.put("map", map_bytes(room(3.0, 3.0)))
-        client.wait_status(lambda status: status["state"] == "covering")
-
-
-def test_the_swept_floor_is_sent_to_who_listens(fresh):
-    fresh.put("map", map_bytes(room(3.0, 3.0)))
-    fresh.put("pose", pose_bytes(*START))
-    fresh.wait_status(lambda status: status["floor"] and status["floor"]["swept_m2"] > 0)
-    heard = fresh.listen("floor", late=False).wait(lambda heard: True)
-    assert heard.encoding == "application/cdr;nav_msgs/msg/OccupancyGrid"
-    grid = oracle.from_bytes("nav_msgs/msg/OccupancyGrid", heard.payload)
-    assert grid.header.frame_id == "map"
-    assert grid.info.resolution == pytest.approx(0.025)
-    swept = np.flatnonzero(grid.data)
-    assert len(swept) == pytest.approx(math.pi / 4 * TOOL_M**2 / 0.025**2, rel=0.05)
-    rows, cols = np.divmod(swept, grid.info.width)
-    x = grid.info.origin.position.x + 0.025 * (cols.mean() + 0.5)
-    y = grid.info.origin.position.y + 0.025 * (rows.mean() + 0.5)
-    assert (x, y) == pytest.approx(START[:2], abs=0.01)
-
-
-def test_the_pheromone_is_sent_only_to_who_listens(fresh):
-    receiver = fresh.listen("pheromone", late=False)
-    fresh.put("map", map_bytes(room(3.0, 3.0)))
-    fresh.put("pose", pose_bytes(*START))
-    heard = receiver.wait(lambda heard: True)
-    assert heard.encoding == "application/cdr;fasaco_msgs/msg/PheromoneGrid"
-    grid = oracle.from_bytes("fasaco_msgs/msg/PheromoneGrid", heard.payload)
-    assert grid.header.frame_id == "map"
-    assert grid.levels.size == grid.info.width * grid.info.height
-    assert grid.levels.max() > 0
-
-
-def test_the_living_trail_is_sent_with_how_decided_it_is(fresh):
-    receiver = fresh.listen("pheromone", late=False)
-    fresh.put("map", map_bytes(room(3.0, 3.0)))
-    fresh.put("pose", pose_bytes(*START))
-    first = receiver.wait(lambda heard: bool(heard.attachment) and about(heard)["revision"] == 1)
-    trail, told = decode_pheromone(first.payload), about(first)
-    assert (trail.velocity, trail.cohort) == (0, 0)
-    assert told["cells"] == np.count_nonzero(trail.levels)
-    assert 1.0 <= told["branching"] < 2.0
-    # What was driven fades: the robot goes on along its path, and no new one comes.
-    ahead = planned(fresh.listen("path").wait(lambda heard: True))[0]
-    for x, y in ahead[1:4].tolist():
-        fresh.put("pose", pose_bytes(x, y))
-    last = receiver.wait(lambda heard: bool(heard.attachment) and heard.payload != first.payload)
-    assert about(last)["cells"] == told["cells"]
-    # Who comes late gets the newest, though nothing changes any more.
-    late = fresh.listen("pheromone").wait(lambda heard: True)
-    assert late.attachment
-
-
-def test_where_the_trail_points_to_is_sent_to_who_listens(fresh):
-    receiver = fresh.listen("directions", late=False)
-    fresh.put("map", map_bytes(room(3.0, 3.0)))
-    fresh.put("pose", pose_bytes(*START))
-    ahead = planned(fresh.listen("path").wait(lambda heard: True))[0]
-    # Every step of the path that no other one leaves its cell by is where the trail points to.
-    cells = [tuple(cell) for cell in np.floor(ahead / 0.3).astype(int)[:, ::-1].tolist()]
-    (row, col), (then_row, then_col) = next(
-        pair for pair in itertools.pairwise(cells) if cells.count(pair[0]) == 1
-    )
-    direction = {(0, 1): 0, (1, 0): 1, (0, -1): 2, (-1, 0): 3}[then_row - row, then_col - col]
-
-    def points_along(heard) -> bool:
-        grid = decode_occupancy_grid(heard.payload)
-        origin = grid.geometry.origin
-        at = row - round(origin.y / 0.3), col - round(origin.x / 0.3)
-        value = int(grid.cells[at])
-        return value // 25 == direction and value % 25 > 24 / 4
-
-    receiver.wait(points_along)

@@ -169,10 +169,13 @@ def test_a_frozen_daemon_is_replaced_and_then_waits(tmp_path, robot_at):
         robot.wait_claims(1, 1)
         robot.wait_path()
         second, first = sorted(daemons, key=waits, reverse=True)
-        heard = len(robot.paths.heard)
+        heard, since = len(robot.paths.heard), Collector(begins=True)
+        robot.session.declare_subscriber(f"{PREFIX}/path", since)
         first.process.send_signal(signal.SIGSTOP)
         robot.wait_claims(1)
         robot.wait_path(heard)
+        # Before any path of its own it withdraws the other's.
+        assert attached(since.heard[0])["reason"] == "this daemon plans from now on"
         first.process.send_signal(signal.SIGCONT)
         robot.wait_claims(1, 1)
         # Whichever goes on, the robot is left with a path to drive.
@@ -233,22 +236,6 @@ def test_where_a_network_grows_together_one_goes_on(tmp_path, robot_at):
                 assert [attached(path)["steps"] > 0 for path in receiver.heard] == [True]
 
 
-def test_a_router_that_comes_late_with_another_behind_it(tmp_path, robot_at):
-    endpoint = free_endpoint()
-    (tmp_path / "a").mkdir()
-    early = {"mode": "peer", "listen": [], "connect": [endpoint]}
-    late = {"mode": "client", "listen": [], "connect": [endpoint]}
-    with daemon_process(tmp_path / "a", bus=early) as first:
-        until(lambda: "ready after" in first.log_text())
-        with router_process(endpoint), two_daemons(tmp_path, endpoint):
-            robot = robot_at(endpoint)
-            robot.wait_claims(1, 1)
-            robot.wait_path()
-            assert [one["mode"] for one in (early, late)] == ["peer", "client"]
-            revisions = [attached(path)["revision"] for path in robot.paths.heard]
-            assert len(revisions) == len(set(revisions))
-
-
 def test_a_flood_of_claims_is_survived(tmp_path, robot_at):
     """Three thousand tokens that plan, then none: it waits, answers, and goes on."""
     endpoint = free_endpoint()
@@ -297,19 +284,3 @@ def test_one_that_waits_holds_no_more_than_its_maps(tmp_path):
         # Taken as it was held: no more maps than one.
         assert outsider.ask_status()["map"]["revision"] <= 2
         assert peak_mb(running.pid) < needed_bytes(convert(config, DaemonConfig)) / 1e6
-
-
-def test_two_names_are_none_of_each_others_business(tmp_path):
-    endpoint = free_endpoint()
-    bus = {"mode": "client", "listen": [], "connect": [endpoint]}
-    with router_process(endpoint), ExitStack() as stack:
-        for name in ("one", "two"):
-            (tmp_path / name).mkdir()
-            running = daemon_process(tmp_path / name, bus=bus, robot={"name": name})
-            stack.enter_context(running)
-        seats = [stack.enter_context(Outsider(endpoint, name)) for name in ("one", "two")]
-        paths = [seat.listen("path") for seat in seats]
-        for seat, path in zip(seats, paths, strict=True):
-            seat.put("map", map_bytes(ROOM))
-            seat.put("pose", pose_bytes(0.75, 0.75))
-            path.wait(lambda heard: attached(heard)["steps"] > 0)

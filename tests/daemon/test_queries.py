@@ -127,10 +127,6 @@ def test_parameters_of_zenoh_are_stepped_over(covering):
     assert get(covering, "@rpc/version?_time=[now(-1h)..]")[0].ok is not None
 
 
-def test_a_parameter_that_was_removed_is_refused(covering):
-    assert error(covering, "@rpc/pheromone?cohort=0")["code"] == "bad_query"
-
-
 def test_the_living_trail_is_told_though_nobody_listens(covering):
     def told() -> tuple[bytes, dict]:
         reply = covering.ask("@rpc/pheromone")

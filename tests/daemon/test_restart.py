@@ -20,7 +20,6 @@ from tests.support.ledgers import CELL_M
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import (
-    FREE,
     HALL,
     begin,
     drive,
@@ -96,18 +95,6 @@ def test_it_goes_on_where_it_was_told_to_end(covered):
         assert status["coverage"]["covered"] == COVERED + 10
 
 
-def test_what_is_on_the_disk_outlives_a_kill(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        begin(outsider)
-        drive(outsider, lanes(20))
-        wait_cells(tmp_path, 20)
-        drive(outsider, lanes(23)[20:])
-        running.process.send_signal(signal.SIGKILL)
-        running.process.wait()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        assert 20 <= outsider.ask_status()["ledger"]["restored_cells"] <= 23
-
-
 def trail_of(outsider: Outsider) -> tuple[PheromoneMessage, int]:
     """Return the living trail, once there is one, and the revision of the path in force."""
     deadline = time.monotonic() + 150
@@ -137,28 +124,6 @@ def test_the_trail_goes_on_where_it_was_after_a_kill(tmp_path):
     assert told.trail_max > 2 * told.trail_min
 
 
-def test_it_writes_now_and_then_while_the_robot_drives(tmp_path):
-    """Often enough to lose no second, and no more often: memory cards wear out."""
-    newest, seen = tmp_path / "state" / "robot.ledger", set()
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        begin(outsider)
-        started = time.monotonic()
-        for point in lanes(60):
-            outsider.put("pose", pose_bytes(*point))
-            time.sleep(0.06)
-            with contextlib.suppress(FileNotFoundError):
-                seen.add(newest.stat().st_mtime_ns)
-        lasted = time.monotonic() - started
-        # One was there already, and the first is written at once.
-        assert 2 <= len(seen) <= lasted / PERIOD_S + 2
-        # Once it stands still, nothing is written any more.
-        wait_cells(tmp_path, 60)
-        time.sleep(2 * PERIOD_S)
-        before = newest.stat().st_mtime_ns
-        time.sleep(2 * PERIOD_S)
-        assert newest.stat().st_mtime_ns == before
-
-
 def test_a_fresh_start_covers_everything_and_throws_nothing_away(covered):
     with daemon_process(covered, "--fresh") as running, Outsider(running.endpoint) as outsider:
         status = begin(outsider)
@@ -166,30 +131,6 @@ def test_a_fresh_start_covers_everything_and_throws_nothing_away(covered):
         assert status["ledger"]["fault"] is None
         assert status["coverage"]["covered"] == 1
     assert [name for name in state_files(covered) if name.startswith("robot.ledger.fresh-")]
-
-
-def test_a_torn_file_is_told(covered):
-    newest = covered / "state" / "robot.ledger"
-    whole = newest.read_bytes()
-    (covered / "state" / "robot.ledger.previous").write_bytes(whole)
-    newest.write_bytes(whole[:-3])
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
-        status = outsider.wait_status(lambda status: status["errors"]["total"] > 0)
-        assert status["errors"]["by_code"] == {"ledger_file": 1}
-        assert "resumed from the previous ledger" in status["ledger"]["fault"]
-        assert status["ledger"]["restored_cells"] == COVERED
-        assert "WARNING" in running.log_text()
-        assert status["ledger"]["fault"] in running.log_text()
-
-
-def test_two_torn_files_are_told_and_it_begins_anew(covered):
-    for name in state_files(covered):
-        (covered / "state" / name).write_bytes(b"")
-    with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
-        status = begin(outsider)
-        assert "a new one was started" in status["ledger"]["fault"]
-        assert status["coverage"]["covered"] == 1
-    assert [name for name in state_files(covered) if ".broken-" in name]
 
 
 def test_another_tool_needs_another_ledger(covered):
@@ -262,7 +203,3 @@ def test_the_configured_folder_takes_precedence_over_systemds(tmp_path):
                 tmp_path / folder / "robot.ledger"
             )
         assert (tmp_path / folder / "robot.ledger").exists()
-
-
-def test_the_hall_is_as_the_lanes_say():
-    assert all(HALL[round(y / 0.05), round(x / 0.05)] == FREE for x, y in lanes(13 * 18))

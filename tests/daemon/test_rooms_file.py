@@ -6,29 +6,21 @@ import base64
 import errno
 import json
 import os
-import subprocess
-import sys
 import zlib
 
 import numpy as np
 import pytest
 
-from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger import rooms_file
-from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, decode_rooms, encode_rooms
+from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms, encode_rooms
 from fasaco_edge.daemon.ledger.rooms_file import PERIOD_S, RoomsFile, RoomsKeeper
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
-from fasaco_edge.daemon.loop.inbox import make_mailbox
-from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.errors import RoomsFileError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.rooms import FoundRooms
-from fasaco_edge.mission.core.events import CommandReceived
 from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
 from fasaco_edge.mission.map.room_edits import split
 from fasaco_edge.mission.map.room_matching import HOLD_CHANGE
 from fasaco_edge.mission.map.room_update import update
-from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.passes import Pass
 
 
@@ -60,7 +52,7 @@ def full():
 
 
 def written(book):
-    return encode_rooms(BookSnapshot.of(book))
+    return encode_rooms(book)
 
 
 def test_a_book_is_read_as_it_was_written():
@@ -235,42 +227,3 @@ def test_a_file_that_appears_after_the_start_is_not_overwritten(tmp_path):
     keeper.close(5.0)
     (aside,) = (name for name in kept(tmp_path) if ".unread-" in name)
     assert decode_rooms((tmp_path / aside).read_bytes()).room("küche")
-
-
-def test_a_disk_that_fails_is_reported_once_and_tried_again(tmp_path):
-    folder = tmp_path / "state"
-    folder.write_text("a file is in the way")
-    keeper = RoomsKeeper(RoomsFile(folder, "robot"))
-    for _ in range(HOLD_CHANGE):
-        update(keeper.book, found(), "map")
-    keeper.keep(0.0)
-    faults = []
-    while not faults:
-        faults = keeper.take_faults()
-    assert "cannot write" in str(faults[0])
-    assert keeper.is_kept(0.0)  # no command waits for it
-    os.unlink(folder)
-    keeper.close(5.0)
-    assert kept(folder) == ["robot.rooms.json"]
-    assert not keeper.take_faults()
-
-
-def test_an_order_by_room_before_any_map_belongs_to_the_frame_of_the_room():
-    """Its outline would lie anywhere on the map of another one."""
-    config = DaemonConfig()
-    writer = LedgerWriter.__new__(LedgerWriter)
-    writer.restored = None
-    keeper = LedgerKeeper(writer, config.cell_m, autostart=False)
-    runner = MissionRunner(config, keeper, make_mailbox(config.map.max_pixels), rooms=two_rooms())
-    runner.rooms.name(1, "kitchen")
-    order = read_order({"zones": [{"name": "kitchen"}]})
-    (answer,) = runner.answer([CommandReceived(1, "start", order)])
-    assert answer.error is None
-    state = runner.order_state
-    assert state.frame == "map"
-    assert state.in_other_frame("it moved").order is None
-
-
-def test_it_is_read_without_a_compiler():
-    check = "import sys, fasaco_edge.daemon.ledger.rooms_file; sys.exit('numba' in sys.modules)"
-    subprocess.run([sys.executable, "-c", check], check=True)

@@ -246,26 +246,23 @@ def test_services_command_the_mission_and_diagnostics_show_it(naming, tmp_path):
 
 
 def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):
-    for naming in (RMW, BRIDGE):
-        first, second = Naming(naming.domain, "/robot1"), Naming(naming.domain, "/robot2")
-        folder = tmp_path / str(naming.domain)
-        folder.mkdir()
-        with (
-            daemon_process(folder, ros2=ros2(first)) as one,
-            ros_robot(one.endpoint, second) as robot,
-            Outsider(one.endpoint) as native,
-        ):
-            bus = {"listen": [], "connect": [one.endpoint], "mode": "client"}
-            names = {"robot": {"name": "second"}, "bus": bus, "ros2": ros2(second)}
-            with daemon_process(folder, **names), Outsider(one.endpoint, "second") as other:
-                other_path = RosRobot(robot.session, first).listen("coverage_path", PATH)
-                path = robot.listen("coverage_path", PATH)
-                put_map(robot)
-                robot.put_tf("map", "base_link", Pose2D(1.0, 1.0))
-                check_path(path.wait(is_walk), near=(1.0, 1.0))
-                other.wait_status(lambda status: status["map"])
-                assert native.ask_status()["map"] is None
-                assert not any(map(is_walk, other_path.heard))
+    first, second = Naming(RMW.domain, "/robot1"), Naming(RMW.domain, "/robot2")
+    with (
+        daemon_process(tmp_path, ros2=ros2(first)) as one,
+        ros_robot(one.endpoint, second) as robot,
+        Outsider(one.endpoint) as native,
+    ):
+        bus = {"listen": [], "connect": [one.endpoint], "mode": "client"}
+        names = {"robot": {"name": "second"}, "bus": bus, "ros2": ros2(second)}
+        with daemon_process(tmp_path, **names), Outsider(one.endpoint, "second") as other:
+            other_path = RosRobot(robot.session, first).listen("coverage_path", PATH)
+            path = robot.listen("coverage_path", PATH)
+            put_map(robot)
+            robot.put_tf("map", "base_link", Pose2D(1.0, 1.0))
+            check_path(path.wait(is_walk), near=(1.0, 1.0))
+            other.wait_status(lambda status: status["map"])
+            assert native.ask_status()["map"] is None
+            assert not any(map(is_walk, other_path.heard))
 
 
 def test_a_client_of_a_router_serves_nodes_that_are_its_peers(tmp_path):

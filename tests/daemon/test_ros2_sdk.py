@@ -21,7 +21,7 @@ from tests.support.ros_robot import GRID, PATH
 from tests.wire import oracle
 
 PYTHON = os.environ.get("ZENOH_ROS2_SDK_PYTHON", sys.executable)
-ROBOT = Path(__file__).with_name("ros2_sdk_robot.py")
+ROBOT = Path(__file__).parents[1] / "support" / "ros2_sdk_robot.py"
 HAS_SDK = subprocess.run([PYTHON, "-c", "import zenoh_ros2_sdk"], capture_output=True, check=False)
 
 

@@ -10,13 +10,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 import yaml
 from PIL import Image
 
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process
-from tests.support.rooms import fill, map_bytes, pillared_room, pose_bytes, two_rooms
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms
 from tests.support.service_manager import Manager
 
 WATCHDOG_S = 1.0
@@ -129,37 +128,11 @@ def test_a_large_mask_is_read_beside_the_loop(tmp_path):
         assert status["errors"]["total"] == 0
 
 
-def test_other_thresholds_change_the_map_but_keep_the_coverage(tmp_path):
-    doubtful = fill(two_rooms(door=True), 3.2, 0.2, 5.8, 2.8, DOUBTFUL)
+def test_a_wrong_file_changes_nothing(tmp_path):
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
-        path = outsider.listen("path")
-        outsider.put("map", map_bytes(doubtful))
-        outsider.put("pose", pose_bytes(0.5, 0.5))
+        outsider.put("map", map_bytes(pillared_room()))
+        outsider.put("pose", pose_bytes(1.0, 1.0))
         outsider.wait_status(lambda status: status["path"])
-        for x in (0.8, 1.1, 1.4):
-            outsider.put("pose", pose_bytes(x, 0.5))
-        before = outsider.wait_status(lambda status: status["coverage"]["covered"] == 4)
-        paths = len(path.heard)
-        rewritten(running, map={"free_at_most": 45})
-        manager.wait("READY=1")
-        after = outsider.wait_status(
-            lambda status: (
-                status["coverage"]
-                and status["coverage"]["coverable"] > before["coverage"]["coverable"] + 10
-            )
-        )
-        assert after["coverage"]["covered"] == before["coverage"]["covered"]
-        path.wait(lambda heard: len(heard.payload) > 100, since=paths)
-        assert after["errors"]["total"] == 0
-
-
-@pytest.mark.parametrize("planning", [False, True])
-def test_a_wrong_file_changes_nothing(tmp_path, planning):
-    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
-        if planning:
-            outsider.put("map", map_bytes(pillared_room()))
-            outsider.put("pose", pose_bytes(1.0, 1.0))
-            outsider.wait_status(lambda status: status["path"])
         before = outsider.ask("@rpc/config").json()
         rewritten(running, planner={"ants": "many"})
         manager.wait("READY=1")
@@ -186,19 +159,6 @@ def test_a_daemon_waiting_for_another_reloads_its_configuration(tmp_path):
         outsider.put("pose", pose_bytes(1.0, 1.0))
         status = outsider.wait_status(lambda status: status["state"] == "covering")
         assert status["config"]["planner"]["seed"] == 7
-
-
-def test_an_order_from_before_the_first_map_outlives_a_reload(tmp_path):
-    with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
-        zone = {"name": "hall", "polygon": [[0.4, 0.4], [2.0, 0.4], [2.0, 2.0], [0.4, 2.0]]}
-        order = json.dumps({"command": "start", "order": {"zones": [zone]}})
-        (reply,) = outsider.session.get(f"{outsider.prefix}/@rpc/mission", payload=order)
-        assert reply.ok is not None
-        rewritten(running, planner={"seed": 7})
-        manager.wait("RELOADING=1")
-        manager.wait("READY=1")
-        status = outsider.wait_status(lambda status: status["config"]["planner"]["seed"] == 7)
-        assert [one["name"] for one in status["mission"]["zones"]] == ["hall"]
 
 
 def test_without_a_service_manager_a_closed_terminal_ends_it(tmp_path):

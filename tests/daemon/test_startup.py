@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import msgspec
 import numpy as np
 
-from fasaco_edge.daemon.loop.held_events import HeldEvents
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, NoDisk
+from fasaco_edge.daemon.loop.inbox import make_mailbox
+from fasaco_edge.daemon.loop.mission_runner import HeldEvents, MissionRunner
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.mission.core.events import MapReceived, PatchesLost, PatchReceived, PoseReceived
+from fasaco_edge.mission.core.events import (
+    CommandReceived,
+    MapReceived,
+    PatchesLost,
+    PatchReceived,
+    PoseReceived,
+)
+from fasaco_edge.mission.orders.order import read_order
+from fasaco_edge.mission.orders.order_state import OrderState
+from tests.daemon.test_rooms_file import two_rooms
+from tests.support.ledgers import lane
 
 SIDE = 8
 GEOMETRY = GridGeometry(SIDE, SIDE, 0.1, Pose2D(0.0, 0.0))
@@ -75,3 +91,46 @@ def test_after_lost_updates_only_another_map_counts():
     before.take([a_map()])
     assert before.take([update(0)]) == []
     assert [type(held) for held in before.events] == [MapReceived]
+
+
+def runner_of(config: DaemonConfig, restored=None, rooms=None) -> MissionRunner:
+    """Return a runner before its first mission, with the ledger of the process before."""
+    keeper = LedgerKeeper(NoDisk(restored), config.cell_m, autostart=False)
+    return MissionRunner(config, keeper, make_mailbox(config.map.max_pixels), rooms=rooms)
+
+
+def start(runner: MissionRunner, **order):
+    (answer,) = runner.answer([CommandReceived(1, "start", read_order(order))])
+    return answer.error
+
+
+def test_an_order_by_room_before_any_map_belongs_to_the_frame_of_the_room():
+    """Its outline would lie anywhere on the map of another one."""
+    runner = runner_of(DaemonConfig(), rooms=two_rooms())
+    runner.rooms.name(1, "kitchen")
+    assert start(runner, zones=[{"name": "kitchen"}]) is None
+    state = runner.order_state
+    assert state.frame == "map"
+    assert state.in_other_frame("it moved").order is None
+
+
+def test_a_zone_named_before_a_map_applies_to_its_map_alone():
+    kitchen = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5]]}
+    mission = {"map_frame": "floor_1", "zones": [kitchen]}
+    runner = runner_of(msgspec.convert({"mission": mission}, DaemonConfig))
+    assert start(runner, zones=[{"name": "kitchen"}]) is None
+    assert runner.order_state.frame == "floor_1"
+    # Progress on another map says before any map comes that it is not theirs.
+    note = replace(OrderState.idle("done"), frame="floor_2").to_json()
+    runner = runner_of(runner.config, replace(lane(5), frame="floor_2", note=note))
+    refused = start(runner, zones=[{"name": "kitchen"}])
+    assert refused.code == "bad_order"
+    assert "given for the map in frame 'floor_1'" in str(refused)
+
+
+def test_an_order_that_cannot_be_read_moves_no_robot():
+    runner = runner_of(DaemonConfig(), replace(lane(5), note='{"version":9}'))
+    assert runner.order_state.order is None
+    assert runner.order_state.why.startswith("the order kept with the ledger cannot be read")
+    assert start(runner, keep_covered=True) is None
+    assert runner.order_state.order is not None

@@ -15,7 +15,6 @@ from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
 from tests.support.router import router_process
 from tests.support.service_manager import Manager
-from tests.support.waiting import until
 
 ROOM = room(6.0, 4.0)
 BLANK = fill(ROOM, 0.0, 0.0, 6.0, 4.0, FREE)
@@ -114,20 +113,3 @@ def test_a_daemon_that_was_killed_and_started_again(tmp_path, bus):
             # No map and no pose has come since.
             assert stops(begun.wait(lambda heard: True))
             assert outsider.ask_status()["state"] in ("waiting for map", "loading")
-
-
-def test_a_daemon_that_takes_over_from_a_frozen_one(tmp_path, bus):
-    folders = [tmp_path / name for name in ("first", "second")]
-    for folder in folders:
-        folder.mkdir()
-    with daemon_process(folders[0], bus=bus) as first, Outsider(first.endpoint) as outsider:
-        paths = outsider.listen("path", late=False, begins=True)
-        drive(outsider, paths)
-        # The second comes once the first plans: of two that start together, the id decides.
-        with daemon_process(folders[1], bus=bus) as second:
-            until(lambda: "this one waits" in second.log_text(), why=second.log_text)
-            first.process.send_signal(signal.SIGSTOP)
-            since = len(paths.heard)
-            void = paths.wait(lambda heard: b"this daemon plans" in heard.attachment, since)
-            assert void is paths.heard[since]
-            first.process.send_signal(signal.SIGCONT)

@@ -6,10 +6,17 @@ import urllib.request
 from dataclasses import dataclass
 
 from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, NoDisk
+from fasaco_edge.daemon.loop.inbox import make_mailbox
+from fasaco_edge.daemon.loop.mission_runner import MissionRunner
+from fasaco_edge.daemon.loop.status import BEGUN_S, StatusBoard
 from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level
+from fasaco_edge.mission.map.idle_places import PERIOD_S as LOOK_S
+from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.wire.messages.battery import BatteryState, encode_battery
 from fasaco_edge.wire.schemas import BATTERY_STATE
+from tests.mission.test_idle_places import FAR, drive_with, in_or_beside
 from tests.serve.serving import looking, served
 from tests.support.outsider import TIMEOUT_S, Outsider
 from tests.support.processes import daemon_process, fasaco_edge, free_endpoint
@@ -101,26 +108,28 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
     assert "does not charge: its level falls" in daemon.log_text()
 
 
-def test_a_mission_that_cannot_begin_is_a_trouble_until_it_does(tmp_path):
-    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
-        status = outsider.wait_status(lambda status: bool(status["troubles"]))
-        assert (status["state"], codes(status)) == ("waiting for map", ["not_begun"])
-        assert status["troubles"][0]["text"] == "the mission cannot begin: no map yet"
-        outsider.put("map", map_bytes(room(3.0, 3.0)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
-        outsider.wait_status(lambda status: status["state"] == "covering" and not codes(status))
+def before_a_mission():
+    """Return a status board, and what it reports of: nothing has come yet."""
+    config = DaemonConfig()
+    keeper = LedgerKeeper(NoDisk(), config.cell_m, autostart=True)
+    return StatusBoard(config), MissionRunner(config, keeper, make_mailbox(100)), keeper
 
 
-def test_a_keep_out_beside_the_map_is_reported_without_a_stop(tmp_path):
-    far = [[500, 500], [501, 500], [501, 501]]
-    with (
-        daemon_process(tmp_path, mission={"keep_out": [far]}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
-    ):
-        outsider.put("map", map_bytes(room(3.0, 3.0)))
-        outsider.put("pose", pose_bytes(0.75, 0.75))
-        status = outsider.wait_status(lambda status: status["state"] == "covering")
-        (trouble,) = status["troubles"]
-        text = "no free ground of the map so far lies in or beside mission.keep_out[0]"
-        assert (trouble["code"], trouble["text"]) == ("no_effect", text)
-    assert text in daemon.log_text()
+def test_a_mission_that_cannot_begin_is_a_trouble_until_it_does():
+    board, runner, keeper = before_a_mission()
+    assert board.due(runner, 0.0).troubles == ()
+    (trouble,) = board.due(runner, BEGUN_S + 1.0).troubles
+    assert (trouble.code, trouble.since_s) == ("not_begun", 1.0)
+    assert trouble.text == "the mission cannot begin: no map yet"
+    keeper.order_state = OrderState.idle("no order yet")
+    assert board.due(runner, BEGUN_S + 2.0).troubles == ()
+
+
+def test_a_keep_out_beside_the_map_is_reported_without_a_stop():
+    board, runner, _ = before_a_mission()
+    drive = drive_with(keep_out=(FAR,))
+    runner.mission = drive.mission
+    status = board.due(runner, drive.now + LOOK_S)
+    (trouble,) = status.troubles
+    assert (trouble.code, trouble.text) == ("no_effect", in_or_beside("mission.keep_out[0]"))
+    assert status.state != "blocked"

@@ -5,16 +5,15 @@ import os
 import pytest
 
 from fasaco_edge.kernels.manifest import chosen_folder
-from fasaco_edge.planners import second_compiler
-from fasaco_edge.planners.compiling import compile_missing
-from fasaco_edge.planners.second_compiler import SecondCompiler
+from fasaco_edge.planners import compiling
+from fasaco_edge.planners.compiling import SecondCompiler, compile_missing
 from fasaco_edge.planners.stages import AREAS, STAGES, WALKS
 
 
 @pytest.fixture
 def two_cores(monkeypatch):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 1})
-    monkeypatch.setattr(second_compiler, "TWO_MB", 0.0)
+    monkeypatch.setattr(compiling, "TWO_MB", 0.0)
 
 
 def handed_over(folder, stages):
@@ -37,7 +36,7 @@ def test_functions_that_the_first_lacks_are_moved(tmp_path, two_cores):
 
 
 def test_nothing_is_moved_of_one_that_failed(tmp_path, two_cores, monkeypatch):
-    monkeypatch.setattr(second_compiler, "APART", ("no stage",))
+    monkeypatch.setattr(compiling, "APART", ("no stage",))
     (tmp_path / "own").mkdir()
     assert handed_over(tmp_path / "own", (WALKS, "no stage")) == set()
 
@@ -45,5 +44,5 @@ def test_nothing_is_moved_of_one_that_failed(tmp_path, two_cores, monkeypatch):
 @pytest.mark.parametrize(("cores", "needed_mb"), [(1, 0.0), (2, 1e9)])
 def test_one_core_or_little_memory_has_one_compiler(tmp_path, monkeypatch, cores, needed_mb):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(cores)))
-    monkeypatch.setattr(second_compiler, "TWO_MB", needed_mb)
+    monkeypatch.setattr(compiling, "TWO_MB", needed_mb)
     assert SecondCompiler(tmp_path / "own", (WALKS, AREAS)).stages == []

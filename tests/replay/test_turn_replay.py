@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
-from fasaco_edge.daemon.ledger.rooms_codec import BookSnapshot, encode_rooms
+from fasaco_edge.daemon.ledger.rooms_codec import encode_rooms
 from fasaco_edge.daemon.ledger.rooms_file import RoomsFile
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
@@ -122,7 +122,7 @@ def test_keep_outs_rooms_and_what_was_not_to_be_forgotten_are_repeated(tmp_path)
     labels, book = np.ones((54, 72), np.int32), RoomBook()
     for _ in range(HOLD_NEW):
         update(book, FoundRooms(GridGeometry(54, 72, 0.05, Pose2D(0.0, 0.0)), labels, 1), "map")
-    RoomsFile(tmp_path / "state", "robot").write(encode_rooms(BookSnapshot.of(book)))
+    RoomsFile(tmp_path / "state", "robot").write(encode_rooms(book))
     hall = {"zones": [{"name": "hall"}], "return_home": True}
     commands = (
         (7.0, {"command": "room_name", "room": {"id": 1, "name": "hall"}}, ""),

@@ -14,12 +14,12 @@ import pytest
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.serve import marks
+from fasaco_edge.serve.digest import Way
 from fasaco_edge.serve.guard import Guard, is_same_origin, read_tokens
 from fasaco_edge.serve.messages import message_text
-from fasaco_edge.serve.pace import Way
 from fasaco_edge.wire.documents.settings import MapSettings, RobotSettings
 from fasaco_edge.wire.documents.status import DriveReport
-from fasaco_edge.wire.messages.grid_octets import GridOctets
+from fasaco_edge.wire.messages.grids import GridOctets
 from fasaco_edge.wire.messages.maps import CoverageValue
 
 

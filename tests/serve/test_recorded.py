@@ -76,7 +76,7 @@ def told(folder: Path, **options: Any) -> list[Path]:
             tell("map", map_bytes(fill(room(*SIZE_M), 2.0, 0.0, 4.0, 3.0, UNKNOWN)))
             tell("command", encode_json({"command": "start", "order": ORDER}))
             path(1, WEST)
-            status("covering", 1, 2)
+            status("covering", 1, 2, mission={"zones": ORDER["zones"]})
             for x in (0.45, 0.75, 1.05):
                 tell("pose", pose_bytes(x, 0.45))
             time.sleep(0.5)

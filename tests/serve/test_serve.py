@@ -40,7 +40,6 @@ from tests.support.processes import (
     mapped_files,
 )
 from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes, update_bytes
-from tests.support.statuses import FULL, MALFORMED, malformed_status
 from tests.support.waiting import until
 
 # Memory of its own at most, without pages of files [MB].
@@ -164,16 +163,6 @@ def test_it_stays_small(covering, page):
         assert resident < SERVE_MB
         mapped = mapped_files(pid)
         assert [name for name in ("numba", "numpy", "rerun", "PIL") if name in mapped] == []
-
-
-def test_who_may_only_look_commands_nothing(covering, page):
-    with looking(page) as looker:
-        for name in ("start", "pause", "cancel"):
-            answer = looker.command(name)
-            assert answer["ok"] is False
-            assert "may only look" in answer["text"]
-    with Outsider(covering.endpoint) as outsider:
-        assert outsider.ask_status()["mission"]["ordered"] == "itself"
 
 
 @pytest.mark.parametrize("said", ["", "{", '{"kind":"command"}', '{"kind":"hello"}', "[" * 9999])
@@ -471,22 +460,6 @@ def test_it_outlives_the_daemon(tmp_path):
         looker.wait("state", lambda state: "has been gone" in state["absent"])
         with daemon_process(tmp_path, bus={"listen": [endpoint]}):
             looker.wait("state", lambda state: state["absent"] == "")
-
-
-def test_no_status_of_a_peer_ends_the_page_of_others(page, covering):
-    with looking(page) as looker, looking(page) as other, Outsider(covering.endpoint) as peer:
-        for viewer in (looker, other):
-            viewer.wait("state", is_told)
-        for name in MALFORMED:
-            peer.put("status", malformed_status(name), "")
-        for viewer in (looker, other):
-            viewer.wait("events", lambda said: "status cannot be read (4 so far)" in str(said))
-            # The daemon's own go on to be shown.
-            assert viewer.seen.pop("state")["version"] != FULL["version"]
-            again = viewer.wait("state", is_told)
-            assert again["version"] != FULL["version"]
-    assert page.get()[0] == 200
-    assert page.process.poll() is None
 
 
 def test_an_order_beyond_the_limits_fails_for_its_sender_alone(covering, tmp_path):

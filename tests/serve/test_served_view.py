@@ -44,19 +44,6 @@ def test_other_robots_of_the_fleet_are_shown_until_silent():
     assert heard(view, "others", 4.0 + OTHER_LASTS_S)["robots"] == []
 
 
-def test_an_order_is_drawn_until_it_is_cancelled():
-    view = ServedView(Keys())
-    order = {
-        "zones": [{"name": "hall", "polygon": CORNERS}, {"name": "of old"}],
-    }
-    tell(view, "command", {"command": "start", "order": order}, 1.0)
-    tell(view, "command", {"command": "pause"}, 1.0)
-    areas = heard(view, "areas", 1.0)
-    assert [zone["name"] for zone in areas["zones"]] == ["hall"]
-    tell(view, "command", {"command": "cancel"}, 2.0)
-    assert heard(view, "areas", 2.0)["zones"] == []
-
-
 @pytest.mark.parametrize("ended", [{"stage": "over", "ordered": "command"}, {"ordered": None}])
 def test_an_order_that_has_ended_can_be_given_again(ended):
     """As it was, but for what was kept of the one before, and the outline that a room had."""
@@ -87,18 +74,6 @@ def test_the_zones_of_an_order_are_drawn_by_the_status_alone():
     tell(view, "status", {"state": "covering", "mission": {"zones": zones}}, 1.0)
     drawn = [{"name": "hall", "polygon": CORNERS, "is": "ordered"}]
     assert heard(view, "areas", 1.0)["zones"] == drawn
-
-
-def test_an_order_is_drawn_with_all_its_valid_corners():
-    view = ServedView(Keys())
-    many = [[float(index), float(index % 2)] for index in range(300)]
-    places = [CORNERS[0], [1e12, 0], [1.0, True], *CORNERS[1:]]
-    zones = [{"name": "hall", "polygon": many}, {"name": "den", "polygon": places}]
-    payload = json.dumps({"command": "start", "order": {"zones": zones}}).encode()
-    view.take("command", Sample("", payload), 1.0)
-    areas = heard(view, "areas", 1.0)
-    assert areas["zones"][0]["polygon"] == many
-    assert [0.0, 0.0] in areas["zones"][1]["polygon"]
 
 
 def test_the_keep_outs_in_force_are_drawn_by_the_status_alone():

@@ -20,7 +20,6 @@ from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from fasaco_edge.wire.messages.scans import encode_scan
 from fasaco_edge.wire.messages.twists import encode_velocity
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
-from tests.support.poses import encode_odometry, encode_pose_with_covariance_stamped
 
 
 def _path(path: PathMessage) -> bytes:
@@ -48,8 +47,6 @@ ENCODERS: dict[str, Callable[[Any], bytes]] = {
     schemas.PATH: _path,
     schemas.PHEROMONE_GRID: _pheromone,
     schemas.POSE_STAMPED: encode_pose_stamped,
-    schemas.POSE_WITH_COVARIANCE_STAMPED: encode_pose_with_covariance_stamped,
-    schemas.ODOMETRY: encode_odometry,
     schemas.BATTERY_STATE: encode_battery,
     schemas.LASER_SCAN: encode_scan,
     **{schema: partial(encode_velocity, schema=schema) for schema in TWIST_SCHEMAS},

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from fasaco_edge.grid.geometry import GridGeometry, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.wire.messages.battery import BatteryState
@@ -61,8 +63,19 @@ def facts_of(message: Any) -> dict[str, Any]:
     return facts
 
 
-def flat(value: Any) -> list[Any]:
+def check_facts(said: dict[str, Any], facts: dict[str, Any]) -> None:
+    """Check that what is said of a message are these facts."""
+    assert said.keys() == facts.keys(), said
+    for name, value in facts.items():
+        if isinstance(value, list) and all(isinstance(leaf, int | float) for leaf in _flat(value)):
+            # One ulp of an arctangent is not a matter of the contract.
+            np.testing.assert_allclose(_flat(said[name]), _flat(value), rtol=1e-15, atol=1e-15)
+        else:
+            assert said[name] == value, name
+
+
+def _flat(value: Any) -> list[Any]:
     """Return the leaves of nested lists, in order."""
     if not isinstance(value, list):
         return [value]
-    return [leaf for item in value for leaf in flat(item)]
+    return [leaf for item in value for leaf in _flat(item)]

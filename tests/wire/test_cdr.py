@@ -10,7 +10,7 @@ import pytest
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter
-from fasaco_edge.wire.messages.grid_fields import write_cells
+from fasaco_edge.wire.messages.maps import write_cells
 from tests.wire.decoders import DECODERS
 from tests.wire.mutations import seeds_of
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-import sys
 from dataclasses import dataclass
 
 import pytest
@@ -168,13 +167,3 @@ def test_error_reply() -> None:
         "message": "every reachable cell is covered",
         "hint": NothingToCover.hint,
     }
-
-
-def test_reading_the_bus_needs_no_compiler() -> None:
-    import subprocess
-
-    messages = [f"messages.{name}" for name in ("maps", "poses", "paths", "pheromone")]
-    modules = [*messages, "documents.json_text", "keys"]
-    program = "; ".join(f"import fasaco_edge.wire.{module}" for module in modules)
-    check = f"{program}; import sys; sys.exit('numba' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

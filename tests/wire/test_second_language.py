@@ -27,7 +27,7 @@ from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pillared_room
 from tests.wire.decoders import DECODERS
-from tests.wire.facts import facts_of, flat
+from tests.wire.facts import check_facts, facts_of
 from tests.wire.mutations import mutant, seeds_of
 
 CLIENTS = folder("protocol") / "clients"
@@ -66,16 +66,6 @@ def read(client: Path, messages: Sequence[tuple[str, bytes]]) -> list[dict[str, 
     said = [json.loads(line) for line in ended.stdout.splitlines()]
     assert len(said) == len(messages)
     return said
-
-
-def check_facts(said: dict[str, Any], facts: dict[str, Any]) -> None:
-    assert said.keys() == facts.keys(), said
-    for name, value in facts.items():
-        if isinstance(value, list) and all(isinstance(leaf, int | float) for leaf in flat(value)):
-            # One ulp of an arctangent is not a matter of the contract.
-            np.testing.assert_allclose(flat(said[name]), flat(value), rtol=1e-15, atol=1e-15)
-        else:
-            assert said[name] == value, name
 
 
 def index(kind: str) -> list[dict[str, Any]]:

@@ -155,8 +155,8 @@ class LedgerFile:
         Args:
             why: a word for the new names.
 
-            Raises:
-                OSError: renaming failed; it is retried before the next write.
+        Raises:
+            OSError: renaming failed; it is retried before the next write.
         """
         self._unwanted = [(path, why) for path in self._generations]
         return self._rename_unwanted()

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import msgspec
@@ -35,7 +35,7 @@ from fasaco_edge.mission.map.room_book import (
     RoomSettings,
     RoomSheet,
 )
-from fasaco_edge.mission.map.room_raster import MOST_SQUARES, Cut, RoomRaster
+from fasaco_edge.mission.map.room_raster import MOST_SQUARES, RoomRaster
 from fasaco_edge.mission.orders.keep_outs import PlaceName, check_name
 from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_of
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY, Priority
@@ -99,38 +99,16 @@ class BookNote(_Note, frozen=True):
     sheets: Annotated[list[SheetNote], Meta(max_length=MOST_SHEETS)]
 
 
-@dataclass(frozen=True, slots=True)
-class SheetSnapshot:
-    """A sheet at a moment; the book replaces its values, and changes none of them."""
+def snapshot_of(book: RoomBook) -> RoomBook:
+    """Return a book as it is now, which another thread can encode.
 
-    frame: str
-    raster: RoomRaster
-    gone: RoomRaster
-    rooms: tuple[Room, ...]
-    cuts: tuple[Cut, ...]
+    The book replaces the rooms and rasters of its sheets, and changes none of them.
+    """
+    sheets = [replace(each, rooms=dict(each.rooms), cuts=list(each.cuts)) for each in book.sheets]
+    return RoomBook(sheets, book.next_id)
 
 
-@dataclass(frozen=True, slots=True)
-class BookSnapshot:
-    """A book at a moment, which another thread can encode."""
-
-    next_id: int
-    sheets: tuple[SheetSnapshot, ...]
-
-    @classmethod
-    def of(cls, book: RoomBook) -> BookSnapshot:
-        """Return that of a book."""
-        sheets = (
-            SheetSnapshot(
-                *(each.frame, each.raster, each.gone),
-                *(tuple(each.rooms.values()), tuple(each.cuts)),
-            )
-            for each in book.sheets
-        )
-        return cls(book.next_id, tuple(sheets))
-
-
-def encode_rooms(book: BookSnapshot) -> bytes:
+def encode_rooms(book: RoomBook) -> bytes:
     """Return a book as bytes; ``decode_rooms`` reads them."""
     sheets = [
         SheetNote(
@@ -138,7 +116,7 @@ def encode_rooms(book: BookSnapshot) -> bytes:
             square_m=each.raster.square_m,
             squares=_raster_note(each.raster),
             gone=_raster_note(each.gone),
-            rooms=[_room_note(room) for room in each.rooms],
+            rooms=[_room_note(room) for room in each.rooms.values()],
             cuts=list(each.cuts),
         )
         for each in book.sheets

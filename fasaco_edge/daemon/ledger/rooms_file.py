@@ -1,4 +1,4 @@
-"""Rooms on disk: a file beside the ledger, written by a thread of its own when rooms change.
+"""Rooms on disk: a file beside the ledger, written when rooms change.
 
 A new file is written beside the old one, fsynced, and renamed over it: at every moment there is a
 complete one. A file that cannot be read is set aside, and the rooms begin anew.
@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import logging
 import os
-import threading
-from collections import deque
 from pathlib import Path
 
-from fasaco_edge.daemon.figures import log_fault
+from fasaco_edge.daemon.ledger.disk_writer import MOST_WAIT_S, DiskWriter
 from fasaco_edge.daemon.ledger.file import move_aside, reason_of
 from fasaco_edge.daemon.ledger.rooms_codec import (
     MOST_BYTES,
-    BookSnapshot,
     decode_rooms,
     encode_rooms,
+    snapshot_of,
 )
 from fasaco_edge.errors import FasacoError, RoomsFileError
 from fasaco_edge.host.durable import make_folder, sync_folder, write_through
@@ -29,8 +27,6 @@ LOG = logging.getLogger(__name__)
 
 # Least time between two writes without a command that waits [s]: memory cards wear out.
 PERIOD_S = 5.0
-# Time before a retry after a failure, and longest wait of a command for the disk [s].
-RETRY_S, MOST_WAIT_S = 2.0, 1.0
 
 
 class RoomsFile:
@@ -102,80 +98,36 @@ class RoomsKeeper:
 
     def __init__(self, file: RoomsFile) -> None:
         self.restored, self.book, fault = file.load()
-        self._file = file
-        self._faults = deque[FasacoError]()
+        self._path = file.path
+        self._writer = DiskWriter[RoomBook](
+            "rooms", lambda book: file.write(encode_rooms(book)), self._cannot_write
+        )
         self._kept, self._kept_at = self.book.version, float("-inf")
-        self._changed = threading.Condition()
-        self._waiting: BookSnapshot | None = None
-        self._trouble = ""
-        self._is_ending = False
-        # Started with the first change.
-        self._thread: threading.Thread | None = None
         if fault is not None:
-            self._note(fault)
+            self._writer.note(fault)
 
     def keep(self, now: float, *, at_once: bool = False) -> None:
         """Write the rooms if they have changed; ``at_once``: a command waits for it."""
         if self.book.version == self._kept or (now - self._kept_at < PERIOD_S and not at_once):
             return
         self._kept, self._kept_at = self.book.version, now
-        with self._changed:
-            self._waiting = BookSnapshot.of(self.book)
-            self._changed.notify()
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="rooms", daemon=True)
-            self._thread.start()
+        self._writer.put(snapshot_of(self.book))
 
     def is_kept(self, now: float) -> bool:
         """Return whether the last change passed on is on disk, or has waited for long enough."""
-        with self._changed:
-            is_behind = self._waiting is not None and not self._trouble
-        return not is_behind or now - self._kept_at > MOST_WAIT_S
+        return not self._writer.is_behind() or now - self._kept_at > MOST_WAIT_S
 
     def take_faults(self) -> list[FasacoError]:
         """Return the faults since the last call; they are logged already."""
-        return [self._faults.popleft() for _ in range(len(self._faults))]
+        return self._writer.take_faults()
 
     def close(self, timeout_s: float) -> None:
-        """Write what has changed and end the thread, within ``timeout_s`` [s]."""
+        """Write what has changed, within ``timeout_s`` [s]."""
         self.keep(float("inf"))
-        if self._thread is None:
-            return
-        with self._changed:
-            self._is_ending = True
-            self._changed.notify()
-        self._thread.join(timeout_s)
+        self._writer.close(timeout_s)
 
-    def _run(self) -> None:
-        is_failed = False
-        while True:
-            with self._changed:
-                if is_failed:
-                    self._changed.wait_for(lambda: self._is_ending, RETRY_S)
-                else:
-                    self._changed.wait_for(lambda: self._is_ending or self._waiting is not None)
-                book, is_ending = self._waiting, self._is_ending
-            is_failed = book is not None and not self._write(book)
-            with self._changed:
-                if not is_failed and self._waiting is book:
-                    self._waiting = None
-                if is_ending and (is_failed or self._waiting is None):
-                    return
-
-    def _write(self, book: BookSnapshot) -> bool:
-        try:
-            self._file.write(encode_rooms(book))
-        except Exception as error:
-            # No failure here may stop the mission.
-            text = f"cannot write {self._file.path}: {reason_of(error)}"
-            if text != self._trouble:
-                self._trouble = text
-                hint = "rooms are kept in memory, and writing is retried; see ledger.fault, too"
-                self._note(RoomsFileError(text, hint=hint))
-            return False
-        self._trouble = ""
-        return True
-
-    def _note(self, fault: FasacoError) -> None:
-        log_fault(LOG, fault)
-        self._faults.append(fault)
+    def _cannot_write(self, error: Exception) -> RoomsFileError:
+        return RoomsFileError(
+            f"cannot write {self._path}: {reason_of(error)}",
+            hint="rooms are kept in memory, and writing is retried; see ledger.fault, too",
+        )

@@ -1,20 +1,16 @@
-"""The ledger's writer: a thread, so that a slow or full disk does not delay the mission.
-
-A ledger that cannot be written stays in memory and is retried; meanwhile the status reports it.
-"""
+"""The ledger's keeper: when progress is written, and what is restored of it."""
 
 from __future__ import annotations
 
 import logging
-import threading
 import time
-from collections import deque
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from fasaco_edge.daemon.figures import fault_text, log_fault
+from fasaco_edge.daemon.ledger.disk_writer import MOST_WAIT_S, DiskWriter
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
 from fasaco_edge.errors import (
     FasacoError,
@@ -39,12 +35,6 @@ PERIOD_S = 0.5
 # Period if only floor and trail changed: they change with every pose or path, and memory cards
 # wear out.
 FLOOR_PERIOD_S = 1.0
-# Time before a retry after a failure [s].
-RETRY_S = 2.0
-# Timeout of a command's reply on a slow disk [s].
-MOST_WAIT_S = 1.0
-# A disk that has not taken a ledger for this long hangs [s]; memory cards pause for some.
-HANGS_S = 10.0
 
 
 class _Kept(NamedTuple):
@@ -106,7 +96,7 @@ class LedgerKeeper:
 
     def is_kept(self, now: float) -> bool:
         """Return whether the changes are on disk, or the timeout is over."""
-        return not self._writer.is_behind() or now - self._kept_at > MOST_WAIT_S
+        return not self._writer.disk.is_behind() or now - self._kept_at > MOST_WAIT_S
 
     def report(self, now: float) -> LedgerReport:
         """Return this part of the status; ``now`` is monotonic time [s]."""
@@ -115,7 +105,7 @@ class LedgerKeeper:
     def take_faults(self) -> list[FasacoError]:
         """Return the faults since the last call; they are logged already."""
         faults, self._faults = self._faults, []
-        return faults + self._writer.take_faults()
+        return faults + self._writer.disk.take_faults()
 
     def note_faults(self, faults: tuple[FasacoError, ...]) -> None:
         """Set the files aside if the mission found them to be of another building."""
@@ -202,11 +192,25 @@ def _writing_on(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerW
     return writer
 
 
+class _Pending(NamedTuple):
+    """What is to be written: files to set aside for these reasons, and then a ledger, if any."""
+
+    unwanted: tuple[str, ...]
+    ledger: LedgerSnapshot | None
+
+    def and_then(self, later: _Pending) -> _Pending:
+        """Return both as one: a later ledger replaces this one."""
+        return _Pending(self.unwanted + later.unwanted, later.ledger)
+
+
 class LedgerWriter:
     """Writes the newest ledger it was given.
 
+    A ledger that cannot be written stays in memory and is retried; meanwhile the status reports it.
+
     Attributes:
         restored: the ledger to continue with, if any.
+        disk: the thread that writes it.
     """
 
     def __init__(self, file: LedgerFile, found: LoadedLedger) -> None:
@@ -215,32 +219,15 @@ class LedgerWriter:
         LOG.info("ledger %s: %d cells covered before", file.path, self._restored_cells)
         self._file = file
         self._written_at: float | None = None
-        self._faults = deque[FasacoError]()
-        # The present reason not to write; the faults of the files at the start.
-        self._trouble, self._finding = "", ""
-        # Start of the present write; whether its hanging was reported.
-        self._writes_since: float | None = None
-        self._is_hang_reported = False
-        if found.fault is not None:
-            self._finding = log_fault(LOG, found.fault)
-            self._faults.append(found.fault)
-        self._changed = threading.Condition()
-        self._waiting: LedgerSnapshot | None = None
-        self._unwanted: list[str] = []
-        self._stopping = False
-        self._thread = threading.Thread(target=self._run, name="ledger", daemon=True)
-        self._thread.start()
+        self.disk = DiskWriter[_Pending](
+            "ledger", self._write, lambda error: _cannot_write(file, error), _Pending.and_then
+        )
+        # The fault of the files at the start.
+        self._finding = "" if found.fault is None else self.disk.note(found.fault)
 
     def put(self, ledger: LedgerSnapshot) -> None:
         """Write this ledger next; it replaces a waiting one."""
-        with self._changed:
-            self._waiting = ledger
-            self._changed.notify()
-
-    def is_behind(self) -> bool:
-        """Return whether a write is still due and not prevented."""
-        with self._changed:
-            return self._has_work() and not self._trouble
+        self.disk.put(_Pending((), ledger))
 
     def begin_anew(self, fault: FasacoError | None, why: str) -> None:
         """Set the files aside, with ``why`` in their names: a new ledger follows.
@@ -249,91 +236,38 @@ class LedgerWriter:
         """
         self._finding = fault_text(fault) if fault is not None else ""
         self._restored_cells = 0
-        with self._changed:
-            self._waiting = None
-            self._unwanted.append(why)
-            self._changed.notify()
-
-    def take_faults(self) -> list[FasacoError]:
-        """Return the faults since the last call; a lasting fault is returned once."""
-        return [self._faults.popleft() for _ in range(len(self._faults))]
+        self.disk.put(_Pending((why,), None))
 
     def report(self, now: float) -> LedgerReport:
         """Return this part of the status; ``now`` is monotonic time [s]."""
         written_at = self._written_at
-        hangs = self._hang(now)
         return LedgerReport(
             path=str(self._file.path),
             age_s=None if written_at is None else round(max(now - written_at, 0.0), 3),
             restored_cells=self._restored_cells,
-            fault=hangs or self._trouble or self._finding or None,
+            fault=self.disk.hang(now) or self.disk.trouble or self._finding or None,
         )
 
-    def _hang(self, now: float) -> str:
-        """Return the fault of a hanging disk, "" for none; count it once."""
-        since = self._writes_since
-        if since is None or now - since < HANGS_S:
-            self._is_hang_reported = False
-            return ""
-        fault = _cannot_write(self._file, OSError(f"the disk has hung for {HANGS_S:g} s or more"))
-        if not self._is_hang_reported:
-            self._is_hang_reported = True
-            self._faults.append(fault)
-            log_fault(LOG, fault)
-        return fault_text(fault)
-
-    def close(self, timeout_s: float) -> None:
-        """Write pending changes and end the thread, within ``timeout_s`` [s]."""
-        with self._changed:
-            self._stopping = True
-            self._changed.notify()
-        self._thread.join(timeout_s)
-        if self._thread.is_alive():
-            LOG.warning("the disk is too slow: the last changes of the ledger may be lost")
-
-    def _run(self) -> None:
-        failed = False
-        while True:
-            with self._changed:
-                if failed:
-                    self._changed.wait_for(lambda: self._stopping, RETRY_S)
-                else:
-                    self._changed.wait_for(lambda: self._stopping or self._has_work())
-                ledger, unwanted, stopping = self._waiting, self._unwanted[:], self._stopping
-            self._writes_since = time.monotonic()
-            failed = not self._work(ledger, unwanted)
-            self._writes_since = None
-            with self._changed:
-                if stopping and (failed or not self._has_work()):
-                    return
-
-    def _has_work(self) -> bool:
-        return self._waiting is not None or bool(self._unwanted)
-
-    def _work(self, ledger: LedgerSnapshot | None, unwanted: list[str]) -> bool:
-        """Write a ledger, and set files aside; return whether that succeeded."""
-        try:
-            kept = [name for why in unwanted for name in self._file.set_aside(why)]
-            if ledger is not None:
-                kept += self._file.write(ledger)
-            if kept:
-                LOG.warning("the ledger before is kept as %s", ", ".join(kept))
-        except Exception as error:
-            # No failure here may stop the mission.
-            fault = _cannot_write(self._file, error)
-            if str(fault) not in self._trouble:
-                self._trouble = log_fault(LOG, fault)
-                self._faults.append(fault)
-            return False
-        with self._changed:
-            del self._unwanted[: len(unwanted)]
-            self._waiting = None if self._waiting is ledger else self._waiting
-        if ledger is not None:
+    def _write(self, pending: _Pending) -> None:
+        kept = [name for why in pending.unwanted for name in self._file.set_aside(why)]
+        if pending.ledger is not None:
+            kept += self._file.write(pending.ledger)
             self._written_at = time.monotonic()
-            if self._trouble:
-                LOG.warning("ledger %s: written again", self._file.path)
-                self._trouble = ""
-        return True
+        if kept:
+            LOG.warning("the ledger before is kept as %s", ", ".join(kept))
+
+
+class NoDisk(LedgerWriter):
+    """A ledger that is never written: a replay leaves no trace."""
+
+    def __init__(self, restored: LedgerSnapshot | None = None) -> None:
+        self.restored = restored
+
+    def put(self, ledger: LedgerSnapshot) -> None:
+        """Write nothing."""
+
+    def begin_anew(self, fault: FasacoError | None, why: str) -> None:
+        """Set nothing aside."""
 
 
 def _cannot_write(file: LedgerFile, error: Exception) -> LedgerFileError:

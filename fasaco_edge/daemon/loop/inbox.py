@@ -11,8 +11,9 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
 from fasaco_edge.bus.one_publisher import OnePublisher
-from fasaco_edge.bus.queries import Question, Reply
+from fasaco_edge.bus.queries import Question
 from fasaco_edge.bus.session import Bus
+from fasaco_edge.daemon.loop.answers import error_reply
 from fasaco_edge.daemon.loop.returning_maps import ReturningMaps
 from fasaco_edge.daemon.memory import most_bytes, queues
 from fasaco_edge.errors import CommandError, FasacoError, MalformedMessage, MapTooLarge
@@ -31,7 +32,6 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.blocked import decode_blocked
-from fasaco_edge.wire.documents.replies import encode_error
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_PRIORITY_BYTES
 from fasaco_edge.wire.messages.battery import decode_battery
@@ -141,7 +141,7 @@ def _refuse(lost: object) -> None:
     """Reject a command dropped by a full queue; its client must not take it as done."""
     if isinstance(lost, Question):
         error = CommandError("too many commands at once: not carried out", hint="ask again")
-        lost.answer(Reply(encode_error(error), is_error=True))
+        lost.answer(error_reply(error))
 
 
 def _size_of(item: object) -> int:
@@ -187,10 +187,7 @@ class Inbox:
         self._max_pixels = max_pixels
         self._fleet = fleet
         self._asked_for_map_at = float("-inf")
-        self._maps = [
-            bus.listen(keys, topics.MAP, poster(mailbox, "map", max_pixels)),
-            *maps,
-        ]
+        self._maps = [bus.listen(keys, topics.MAP, poster(mailbox, "map", max_pixels)), *maps]
         others = topics.MAP_UPDATE, topics.POSE, topics.BATTERY, topics.PRIORITY, topics.BLOCKED
         for topic in others:
             bus.listen(keys, topic, poster(mailbox, topic.name, max_pixels))

@@ -20,16 +20,10 @@ from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.daemon.loop.outbox import (
-    CoveragePublisher,
-    FloorPublisher,
-    Outbox,
-    TrailPublisher,
-    UnsweptPublisher,
-)
-from fasaco_edge.daemon.loop.rooms_publisher import RoomsPublisher
+from fasaco_edge.daemon.loop.outbox import Outbox
+from fasaco_edge.daemon.loop.periodic import OF_MISSION, RoomsPublisher
 from fasaco_edge.daemon.loop.status import StatusBoard
-from fasaco_edge.daemon.loop.turn_log import TurnLog, TurnNote
+from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
@@ -43,7 +37,7 @@ from fasaco_edge.mission.core.events import (
 )
 
 if TYPE_CHECKING:
-    from fasaco_edge.daemon.fleet_wing import MessageToOthers
+    from fasaco_edge.daemon.fleet_wing import PeriodicMessage
     from fasaco_edge.daemon.metrics import MetricsServer
 
 LOG = logging.getLogger(__name__)
@@ -57,8 +51,8 @@ SOON_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class BusPorts:
-    """The loop's ports on the bus: for incoming and outgoing messages."""
+class Ports:
+    """The loop's ports on the bus, and services on its computer; None for those not requested."""
 
     mailbox: Mailbox[object]
     inbox: Inbox
@@ -66,17 +60,11 @@ class BusPorts:
     outbox: Outbox
     turns: TurnLog
     claim: NameClaim
-    fleet: MessageToOthers | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Host:
-    """The loop's services on its computer; None for those not requested."""
-
     watchdog: Watchdog
     reload: Reload
-    recorder: RecorderSupervisor | None
-    metrics: MetricsServer | None
+    fleet: PeriodicMessage | None = None
+    recorder: RecorderSupervisor | None = None
+    metrics: MetricsServer | None = None
 
 
 class Loop:
@@ -85,23 +73,17 @@ class Loop:
     def __init__(
         self,
         config: DaemonConfig,
-        bus: BusPorts,
+        ports: Ports,
         keeper: LedgerKeeper,
         rooms: RoomsKeeper,
-        host: Host,
     ) -> None:
-        self._bus = bus
+        self._ports = ports
         self._keeper, self._rooms = keeper, rooms
-        self._host = host
-        self._runner = MissionRunner(config, keeper, bus.mailbox, rooms=rooms.book)
+        self._runner = MissionRunner(config, keeper, ports.mailbox, rooms=rooms.book)
         self._status = StatusBoard(config)
         self._latency = MapLatency()
-        self._coverage = CoveragePublisher(bus.outbox)
-        self._floor = FloorPublisher(bus.outbox)
-        self._unswept = UnsweptPublisher(bus.outbox)
-        self._trail = TrailPublisher(bus.outbox)
-        self._rooms_out = RoomsPublisher(bus.outbox, rooms.book)
-        self._guard = bus.outbox.guard
+        self._begin_messages()
+        self._guard = ports.outbox.guard
         self._failed_at = float("-inf")
         self._has_begun = self._is_warm = False
 
@@ -115,41 +97,43 @@ class Loop:
         while not stop.is_set():
             if self._follow_claim(time.monotonic()):
                 self._begin_reload()
-                self._cycle(take_batch(self._bus.mailbox, self._tick_s()))
+                self._cycle(take_batch(self._ports.mailbox, self._tick_s()))
             else:
                 stop.wait(TICK_S)
 
     def _tick_s(self) -> float:
         runner = self._runner
-        is_idle = runner.mission is None and not runner.loading and self._bus.claim.is_settled
+        is_idle = runner.mission is None and not runner.loading and self._ports.claim.is_settled
         return IDLE_TICK_S if is_idle else TICK_S
 
     def _cycle(self, batch: Batch) -> None:
         taken = time.monotonic()
-        if self._host.reload.is_read and not self._runner.loading:
+        if self._ports.reload.is_read and not self._runner.loading:
             self._reload_config(batch)
         now = time.monotonic()
         has_mission = self._runner.mission is not None
-        self._bus.inbox.leave_out(batch, now)
+        self._ports.inbox.leave_out(batch, now)
         self._status.conflicts = self._conflicts(now)
-        events, faults = self._bus.inbox.decode(batch, has_mission=has_mission)
+        events, faults = self._ports.inbox.decode(batch, has_mission=has_mission)
         self._count_faults(faults)
         self._note(batch)
-        commands = self._bus.commands.take(batch.questions, now)
+        commands = self._ports.commands.take(batch.questions, now)
         decision = self._step(events, commands, batch, now)
-        self._log_cycle(TurnNote(now, batch, commands, decision))
-        self._bus.outbox.commands(commands, decision.answers)
-        self._keeper.keep(self._runner.mission, now)
+        turns, mission = self._ports.turns, self._runner.mission
+        noted = partial(turns.note, now, batch, commands, decision, mission)
+        if not self._guard.attempt("turns", noted):
+            turns.end("a batch could not be published")
+        self._ports.outbox.commands(commands, decision.answers)
+        self._keeper.keep(mission, now)
         # An order may hold numbers of rooms, which must not be lost while the ledger has them.
         at_once = any(asked.room is not None or asked.command == "start" for asked in commands)
         self._rooms.keep(now, at_once=at_once)
         self._guard.attempt("status", partial(self._publish_status, now))
         if not self._status.yield_reason:
-            mission = self._runner.mission
             self._guard.attempt("rooms", partial(self._rooms_out.publish, mission, now))
         self._answer(decision.answers, now)
         ended = time.monotonic()
-        self._host.watchdog.beat(self._runner.worker, ended)
+        self._ports.watchdog.beat(self._runner.worker, ended)
         self._status.turns.note(ended - taken)
 
     def announce(self) -> None:
@@ -160,7 +144,7 @@ class Loop:
         """Withdraw the path, flush turn log and ledger, and end the planning thread."""
         self._runner.paths.withdraw("the daemon ends")
         self._send_path()
-        self._guard.attempt("turns", self._bus.turns.publish)
+        self._guard.attempt("turns", self._ports.turns.publish)
         self._keeper.keep(self._runner.mission, float("inf"))
         self._runner.close(timeout_s)
 
@@ -168,14 +152,14 @@ class Loop:
 
     def _follow_claim(self, now: float) -> bool:
         """Wait while another daemon of this name plans; return whether to run a cycle."""
-        claim, mission = self._bus.claim, self._runner.mission
+        claim, mission = self._ports.claim, self._runner.mission
         if claim.update(now):
             self._status.yield_reason = claim.reason if claim.state.is_waiting else ""
             if claim.state.is_waiting:
-                self._bus.turns.end(claim.reason)
+                self._ports.turns.end(claim.reason)
                 if mission is not None:
                     self._restart(claim.reason)
-                    self._bus.outbox.forget()
+                    self._ports.outbox.forget()
                 self._runner.stand_by()
             else:
                 self._void_path("this daemon plans from now on")
@@ -194,7 +178,7 @@ class Loop:
 
         Maps wait meanwhile: reading a keep-out mask uses their share of the memory.
         """
-        reload, mailbox = self._host.reload, self._bus.mailbox
+        reload, mailbox = self._ports.reload, self._ports.mailbox
         if reload.mask is not None:
             reload.mask.map_frame = self._runner.map_frame
             reload.mask.choose(time.monotonic())
@@ -204,8 +188,8 @@ class Loop:
 
     def _reload_config(self, batch: Batch) -> None:
         """Apply the configuration that was read; restart the mission if it has changed."""
-        reload, watchdog = self._host.reload, self._host.watchdog
-        self._bus.mailbox.let_go()
+        reload, watchdog = self._ports.reload, self._ports.watchdog
+        self._ports.mailbox.let_go()
         config, faults = reload.take(self.config)
         self._status.faults.count(faults, is_logged=True)
         watchdog.remark = f"configuration refused: {faults[0]}" if faults else ""
@@ -227,26 +211,33 @@ class Loop:
             config: the new configuration, if it changed.
             held: the first events; None for the present map and pose.
         """
-        self._bus.turns.end(why)
+        self._ports.turns.end(why)
         if config is not None:
             self._status.show(config)
         held = self._runner.held() if held is None else held
         self._runner.restart(config or self.config, held, why)
         self._send_path()
         self._latency = MapLatency()
-        self._coverage.forget()
-        self._rooms_out.forget()
+        self._begin_messages()
+
+    def _begin_messages(self) -> None:
+        """Begin the periodic messages: all are due."""
+        outbox, fleet = self._ports.outbox, self._ports.fleet
+        self._rooms_out = RoomsPublisher(outbox, self._rooms.book)
+        self._periodic = {name: make(outbox) for name, make in OF_MISSION.items()}
+        if fleet is not None:
+            self._periodic["fleet"] = fleet
 
     def _count_faults(self, faults: Sequence[FasacoError]) -> None:
         """Count faults; query the map that updates lack."""
         self._status.faults.count(faults)
         if any(isinstance(fault, PatchWithoutBase) for fault in faults):
-            self._bus.inbox.ask_for_map(time.monotonic())
+            self._ports.inbox.ask_for_map(time.monotonic())
 
     def _conflicts(self, now: float) -> list[str]:
         """Return which inputs come from two publishers."""
-        mask = self._host.reload.mask
-        return self._bus.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
+        mask = self._ports.reload.mask
+        return self._ports.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
     def _note(self, batch: Batch) -> None:
         """Take the times of plans and maps."""
@@ -263,7 +254,7 @@ class Loop:
         self, events: list[Event], commands: list[CommandReceived], batch: Batch, now: float
     ) -> Decision:
         """Step the mission and perform its decision; during startup, only hold events."""
-        mission, events, faults = self._runner.mission_for(events, self._bus.claim.state)
+        mission, events, faults = self._runner.mission_for(events, self._ports.claim.state)
         self._count_faults(faults)
         if mission is None:
             if self.config.mission.waits_for_mask:
@@ -288,12 +279,8 @@ class Loop:
         if mission.route.wanted and mission.route.is_improving:
             self._runner.interrupt()  # a needed plan comes before an improvement
         self._perform(decision)
-        self._guard.attempt("coverage", partial(self._coverage.publish, mission, now))
-        self._guard.attempt("floor", partial(self._floor.publish, mission, now))
-        self._guard.attempt("unswept", partial(self._unswept.publish, mission, now))
-        self._guard.attempt("pheromone", partial(self._trail.publish, mission, now))
-        if self._bus.fleet is not None:
-            self._guard.attempt("fleet", partial(self._bus.fleet.publish, mission, now))
+        for name, message in self._periodic.items():
+            self._guard.attempt(name, partial(message.publish, mission, now))
         return decision
 
     def _perform(self, decision: Decision) -> None:
@@ -332,7 +319,7 @@ class Loop:
         self._send_path()
 
     def _send_path(self) -> None:
-        path = self._runner.paths.send(self._bus.outbox.path)
+        path = self._runner.paths.send(self._ports.outbox.path)
         if path is None or path.plan is None:
             return
         if (seconds := self._latency.answer()) is not None:
@@ -341,14 +328,9 @@ class Loop:
             gc.freeze()
             self._is_warm = True
 
-    def _log_cycle(self, note: TurnNote) -> None:
-        turns = self._bus.turns
-        if not self._guard.attempt("turns", partial(turns.note, note, self._runner.mission)):
-            turns.end("a batch could not be published")
-
     def _answer(self, answers: Sequence[Answer], now: float) -> None:
         """Reply to queries; to commands once the ledger has their changes."""
-        commands, runner = self._bus.commands, self._runner
+        commands, runner = self._ports.commands, self._runner
         commands.note(answers, now)
         if commands.are_asked:
             report = self._status.reply(runner)
@@ -358,17 +340,17 @@ class Loop:
 
     def _publish_status(self, now: float) -> None:
         status, runner = self._status, self._runner
-        if self._host.recorder is not None:
-            status.recorder = self._host.recorder.poll(now)
-        status.claim = self._bus.claim.report()
+        if self._ports.recorder is not None:
+            status.recorder = self._ports.recorder.poll(now)
+        status.claim = self._ports.claim.report()
         status.ledger = self._keeper.report(now)
         status.faults.count(self._keeper.take_faults(), is_logged=True)
         status.faults.count(self._rooms.take_faults(), is_logged=True)
         status.faults.count(self._guard.take_faults(), is_logged=True)
         due = status.due(runner, now)
         if due is not None:
-            # First, so that the metrics are never older than the status on the bus.
-            if self._host.metrics is not None:
-                self._host.metrics.show(due)
-            self._bus.outbox.status(due)
-            self._host.watchdog.tell(due)
+            # First, so that the metrics are never older than the status on the ports.
+            if self._ports.metrics is not None:
+                self._ports.metrics.show(due)
+            self._ports.outbox.status(due)
+            self._ports.watchdog.tell(due)

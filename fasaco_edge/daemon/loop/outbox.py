@@ -1,14 +1,14 @@
-"""The outbox: publishers of path, status, commands, and grids that change as the robot drives.
+"""The outbox: a publisher for each topic that the daemon sends, and the last samples for queries.
 
-The last samples are kept for queries (``daemon.loop.last_samples``).
+Messages that are sent from time to time are made in ``daemon.loop.periodic``.
 """
 
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,26 +16,23 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fasaco_edge.bus.queries import Reply, Shared
+from fasaco_edge.bus.queries import Request, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.figures import log_fault
-from fasaco_edge.daemon.loop.last_samples import LastSamples, ShownTrail
+from fasaco_edge.daemon.loop.answers import Said, answering, check
 from fasaco_edge.daemon.ros_bridge import RosBridge
-from fasaco_edge.errors import FasacoError, NotPublished
-from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
+from fasaco_edge.errors import FasacoError, NotPublished, NotYet
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.order import command_document
-from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
-from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.maps import coverage_values, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.topic_types import Topic
 
 if TYPE_CHECKING:
-    from fasaco_edge.mission.core.mission import Mission
     from fasaco_edge.mission.core.path_exit import PublishedPath
 
 
@@ -45,10 +42,20 @@ LOG = logging.getLogger(__name__)
 LOG_PERIOD_S = 10.0
 # Limit on the failures that wait to be counted.
 MOST_FAULTS = 100
+# What is sent here; the turn log and the fleet have publishers of their own.
+SENT = tuple(
+    topic
+    for topic in topics.TOPICS
+    if topic.direction == "out" and topic not in (topics.TURNS, topics.FLEET)
+)
+# Parameter of the query for a path, and what is kept for it.
+BEFORE_STOP = "before_stop"
 
 
 class Outbox:
-    """The publishers of a daemon; the last sample of each is kept for queries.
+    """The publishers of a daemon.
+
+    A query, or one on the topic itself, gets the last sample of a topic that has its name.
 
     Attributes:
         guard: publishes all messages.
@@ -58,16 +65,53 @@ class Outbox:
         self.guard = PublishGuard()
         self._id = bus.id
         self._ros = ros
-        self._last = LastSamples(bus, keys)
-        self._path = bus.advertise(keys, topics.PATH)
-        self._coverage = bus.advertise(keys, topics.COVERAGE)
-        self._floor = bus.advertise(keys, topics.FLOOR)
-        self._unswept = bus.advertise(keys, topics.UNSWEPT)
-        self._pheromone = bus.advertise(keys, topics.PHEROMONE)
-        self._directions = bus.advertise(keys, topics.DIRECTIONS)
-        self._rooms = bus.advertise(keys, topics.ROOMS)
-        self._status = bus.advertise(keys, topics.STATUS)
-        self._command = bus.advertise(keys, topics.COMMAND)
+        self._publishers = {topic.name: bus.advertise(keys, topic) for topic in SENT}
+        self._ros_publishers = {} if ros is None else ros.publishers
+        self._lock = threading.Lock()
+        self._kept: dict[str, Callable[[], Said]] = {}
+        for topic in SENT:
+            if topic.name in topics.RPC_NAMES:
+                answer = answering(partial(self._answer, topic.name))
+                for key in (keys.rpc(topic.name), keys.of(topic)):
+                    bus.serve(key, answer)
+
+    def has_listeners(self, topic: Topic) -> bool:
+        """Return whether a topic has subscribers."""
+        return self._publishers[topic.name].has_listeners()
+
+    def put(self, topic: Topic, payload: bytes, attachment: bytes = b"") -> None:
+        """Send a message that is not kept; the caller catches failures."""
+        self._publishers[topic.name].put(payload, attachment)
+
+    def send(self, topic: Topic, payload: bytes, attachment: bytes = b"") -> None:
+        """Send a message, under ROS 2 too, and keep it for queries; the caller catches failures."""
+        message = Shared.of(payload, topic.schema, attachment)
+        self.keep(topic.name, lambda: message)
+        self._publishers[topic.name].put(message.payload, attachment)
+        if (publisher := self._ros_publishers.get(topic.name)) is not None:
+            publisher.put(message.payload)
+
+    def keep(self, name: str, reply: Callable[[], Said]) -> None:
+        """Keep the reply to queries of a name; it is made on a thread of Zenoh's."""
+        with self._lock:
+            self._kept[name] = reply
+
+    def _answer(self, name: str, request: Request) -> Said:
+        check(request, *((BEFORE_STOP,) if name == topics.PATH.name else ()))
+        with self._lock:
+            kept = self._kept.get(BEFORE_STOP if BEFORE_STOP in request.parameters else name)
+        if kept is None:
+            what = "are no rooms" if name == topics.ROOMS.name else f"is no {name}"
+            raise NotYet(f"there {what} yet")
+        return kept()
+
+    def forget(self) -> None:
+        """Drop samples cached for late joiners: another daemon publishes them."""
+        for topic in SENT:
+            if topic is not topics.STATUS:
+                self._publishers[topic.name].forget()
+        for publisher in self._ros_publishers.values():
+            publisher.forget()
 
     def path(self, path: PublishedPath) -> bool:
         """Publish a path, by default facing along the way; return whether that succeeded."""
@@ -79,29 +123,17 @@ class Outbox:
             yaw[-1] = path.end_yaw
         attachment = encode_json(structs.replace(path_attachment(path), daemon=self._id))
         payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
-        message = Shared.of(payload, schemas.PATH, attachment)
-        self._last.keep_path(message, stops=path.stops)
-        self._path.put(message.payload, attachment)
-        if self._ros is not None:
-            self._ros.path.put(message.payload)
-
-    def forget(self) -> None:
-        """Drop samples cached for late joiners: another daemon publishes them."""
-        published = self._path, self._coverage, self._rooms, self._pheromone, self._directions
-        for publisher in published:
-            publisher.forget()
-        if self._ros is not None:
-            self._ros.path.forget()
-            self._ros.coverage.forget()
+        self.send(topics.PATH, payload, attachment)
+        if not path.stops:
+            with self._lock:
+                self._kept[BEFORE_STOP] = self._kept[topics.PATH.name]
 
     def status(self, status: Status) -> None:
-        """Publish the status."""
-        self.guard.attempt("status", lambda: self._say_status(status))
+        """Publish the status, under ROS 2 as diagnostics."""
+        self.guard.attempt("status", lambda: self._put_status(status))
 
-    def _say_status(self, status: Status) -> None:
-        payload = encode_json(status)
-        self._last.keep("status", Reply(payload))
-        self._status.put(payload)
+    def _put_status(self, status: Status) -> None:
+        self.send(topics.STATUS, encode_json(status))
         if self._ros is not None:
             self._ros.diagnose(status)
 
@@ -110,56 +142,10 @@ class Outbox:
         refused = {answer.number for answer in answers if answer.error is not None}
         for asked in commands:
             if asked.number not in refused:
-                self.guard.attempt("command", partial(self._say_command, asked))
+                self.guard.attempt("command", partial(self._put_command, asked))
 
-    def _say_command(self, asked: CommandReceived) -> None:
-        self._command.put(encode_json(command_document(asked.asked)))
-
-    def coverage(self, grid: OccupancyGrid) -> None:
-        """Publish the coverage, a grid on the lattice; the caller catches failures."""
-        coverage = Shared.of(encode_occupancy_grid(grid), schemas.OCCUPANCY_GRID)
-        self._last.keep("coverage", coverage)
-        self._coverage.put(coverage.payload)
-        if self._ros is not None:
-            self._ros.coverage.put(coverage.payload)
-
-    def rooms(self, rooms: Rooms) -> None:
-        """Publish the rooms; the caller catches failures."""
-        payload = encode_json(rooms)
-        self._last.keep("rooms", Reply(payload))
-        self._rooms.put(payload)
-
-    @property
-    def shows_floor(self) -> bool:
-        """Whether the swept floor has subscribers."""
-        return self._floor.has_listeners()
-
-    def floor(self, grid: OccupancyGrid) -> None:
-        """Publish the swept floor; the caller catches failures."""
-        self._floor.put(encode_occupancy_grid(grid))
-
-    @property
-    def shows_unswept(self) -> bool:
-        """Whether the unswept floor has subscribers."""
-        return self._unswept.has_listeners()
-
-    def unswept(self, grid: OccupancyGrid) -> None:
-        """Publish the unswept floor; the caller catches failures."""
-        self._unswept.put(encode_occupancy_grid(grid))
-
-    @property
-    def shows_pheromone(self) -> bool:
-        """Whether the pheromone field or its directions have subscribers."""
-        return self._pheromone.has_listeners() or self._directions.has_listeners()
-
-    def trail(self, shown: ShownTrail) -> None:
-        """Publish the living trail and its directions; the caller catches failures."""
-        self._pheromone.put(*shown.field())
-        self._directions.put(shown.directions())
-
-    def keep_trail(self, shown: ShownTrail) -> None:
-        """Keep the living trail for queries."""
-        self._last.keep_living(shown)
+    def _put_command(self, asked: CommandReceived) -> None:
+        self.put(topics.COMMAND, encode_json(command_document(asked.asked)))
 
 
 def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -221,141 +207,3 @@ class PublishGuard:
         """Return the failures since the last call; they are logged already."""
         faults, self._faults = self._faults, []
         return faults
-
-
-# Least period of the coverage [s].
-COVERAGE_PERIOD_S = 0.5
-# Least period of the swept floor [s], and limit on its squares: a large floor gets larger squares.
-FLOOR_PERIOD_S = 2.0
-MOST_SQUARES = 1_000_000
-# A raster of more pixels is looked at for unswept floor less often: 8 million take the loop 25 ms.
-PIXELS_PER_S = 1_000_000
-# Period at which floor and trail are published again unchanged [s]: a listener that comes while
-# others listen is not noticed.
-REPEAT_S = 10.0
-# Least period of the trail [s]; a large one, which takes the loop some milliseconds per 100,000
-# cells, is published less often.
-PERIOD_S = 0.5
-CELLS_PER_S = 200_000
-
-
-class CoveragePublisher:
-    """Publishes the coverage grid on change, at most twice a second."""
-
-    def __init__(self, outbox: Outbox) -> None:
-        self._outbox = outbox
-        self._published_at = float("-inf")
-        self._key: tuple[object, ...] = ()
-
-    def forget(self) -> None:
-        """Publish the next grid even if it has not changed."""
-        self._key = ()
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish the coverage if that is due."""
-        # An order may reset the coverage, and add keep-out cells.
-        key = (mission.covered.version, mission.map_revision, mission.order_state)
-        if key == self._key or now - self._published_at < COVERAGE_PERIOD_S:
-            return
-        lattice, grid = mission.lattice, mission.grid
-        if lattice is None or grid is None:
-            return
-        self._published_at, self._key = now, key
-        geometry = mission.rotation.cells(lattice.window, lattice.cell_m)
-        values = coverage_values(lattice.states, mission.covered.visits(lattice.window))
-        self._outbox.coverage(OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns))
-
-
-class FloorPublisher:
-    """Publishes the swept floor if it has subscribers: on change, every two seconds at most."""
-
-    def __init__(self, outbox: Outbox) -> None:
-        self._outbox = outbox
-        self._published_at = float("-inf")
-        self._key: tuple[object, ...] = ()
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish the swept floor if that is due."""
-        if not self._outbox.shows_floor:
-            self._key = ()  # the next listener has not received it
-            return
-        floor, grid = mission.floor, mission.grid
-        key = (floor, floor.changes)
-        least_s = REPEAT_S if key == self._key else FLOOR_PERIOD_S
-        if now - self._published_at < least_s or grid is None:
-            return
-        self._published_at, self._key = now, key
-        shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
-        if shown is not None:
-            self._outbox.floor(replace(shown, geometry=mission.rotation.geometry(shown.geometry)))
-
-
-class UnsweptPublisher:
-    """Publishes why floor is not swept while that has subscribers: on change, as the floor."""
-
-    def __init__(self, outbox: Outbox) -> None:
-        self._outbox = outbox
-        self._due = self._published_at = float("-inf")
-        self._key: tuple[object, ...] = ()
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish the unswept floor if that is due."""
-        if not self._outbox.shows_unswept:
-            self._key = ()  # the next listener has not received it
-            return
-        if now < self._due:
-            return
-        key = (mission.map_revision, mission.floor_to_sweep())
-        if key == self._key and now - self._published_at < REPEAT_S:
-            return
-        self._published_at, self._key = now, key
-        if (shown := mission.unswept()) is not None:
-            self._due = now + max(FLOOR_PERIOD_S, shown.cells.size / PIXELS_PER_S)
-            self._outbox.unswept(coarser(shown, MOST_SQUARES))
-
-
-class TrailPublisher:
-    """Publishes the trail on change, at most twice a second.
-
-    It is published while it has subscribers, and kept for queries.
-    """
-
-    def __init__(self, outbox: Outbox) -> None:
-        self._outbox = outbox
-        self._due = self._published_at = float("-inf")
-        # The trail kept last, and the trail published last.
-        self._kept: tuple[object, ...] = ()
-        self._published: tuple[object, ...] = ()
-
-    def publish(self, mission: Mission, now: float) -> None:
-        """Publish or keep the trail if due."""
-        has_subscribers = self._outbox.shows_pheromone
-        if not has_subscribers:
-            self._published = ()  # the next listener has not received it
-        trail, lattice, grid = mission.trail, mission.lattice, mission.grid
-        key = (trail, trail.changes)
-        is_published = key == self._published and now - self._published_at < REPEAT_S
-        is_known = key == self._kept and (not has_subscribers or is_published)
-        if is_known or now < self._due or grid is None or lattice is None:
-            return
-        held = trail.snapshot()
-        cells = held.window.rows * held.window.cols
-        if not cells:
-            return
-        self._due = now + max(PERIOD_S, cells / CELLS_PER_S)
-        steps = max(len(mission.route.path.ahead) - 1, 0)
-        of_path = mission.route.revision, steps
-        shown = ShownTrail(
-            held,
-            trail.ants,
-            lattice.cell_m,
-            grid.frame,
-            *of_path,
-            time.time_ns(),
-            mission.rotation.deg,
-        )
-        self._kept = key
-        self._outbox.keep_trail(shown)
-        if has_subscribers:
-            self._published, self._published_at = key, now
-            self._outbox.trail(shown)

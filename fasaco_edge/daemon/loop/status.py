@@ -28,9 +28,7 @@ from fasaco_edge.daemon.loop.mission_reports import (
 )
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.wire.documents.path_documents import PathReport
-from fasaco_edge.wire.documents.replies import (
-    Reply,
-)
+from fasaco_edge.wire.documents.replies import Reply
 from fasaco_edge.wire.documents.status import (
     ClaimReport,
     Latencies,

@@ -11,7 +11,6 @@ import logging
 import time
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fasaco_edge import __version__
@@ -66,16 +65,6 @@ EMBEDDED = (POSE, "battery")
 NO_SUBSCRIBER = "it has no subscriber"
 
 
-@dataclass(frozen=True, slots=True)
-class TurnNote:
-    """A cycle: its time [s, monotonic], inputs and decisions."""
-
-    now: float
-    batch: Batch
-    commands: Sequence[CommandReceived]
-    decision: Decision
-
-
 class TurnLog:
     """Publishes the log in batches.
 
@@ -108,13 +97,19 @@ class TurnLog:
         self._news = DecisionFilter()
         self._has_begun = self._kernels_named = False
 
-    def note(self, turn: TurnNote, mission: Mission | None) -> None:
-        """Add a cycle to the log; it is published some cycles later."""
+    def note(
+        self,
+        now: float,
+        batch: Batch,
+        commands: Sequence[CommandReceived],
+        decision: Decision,
+        mission: Mission | None,
+    ) -> None:
+        """Add a cycle at ``now`` [s, monotonic]; it is published some cycles later."""
         if not self._is_open:
             return
         if self._is_waiting and self._publisher.has_listeners():
             self._embed_until = time.monotonic() + MARGIN_S
-        batch = turn.batch
         if any(isinstance(plan, PlanBroken) for plan in batch.plans):
             self.end("a plan failed, which no replay can repeat")
             return
@@ -125,11 +120,11 @@ class TurnLog:
             if mission is not None or received.kind != FLEET.name
         ]
         plans = [plan for plan in batch.plans if isinstance(plan, PlanReady)]
-        decided = self._news.of(turn.decision, mission)
-        is_empty = not (samples or plans or turn.commands or batch.updates_lost or decided)
+        decided = self._news.of(decision, mission)
+        is_empty = not (samples or plans or commands or batch.updates_lost or decided)
         if is_empty and mission is None:
             return
-        self._times.append(turn.now)
+        self._times.append(now)
         if not is_empty or (mission is not None and not self._has_begun):
             self._turns.append(
                 Cycle(
@@ -137,9 +132,7 @@ class TurnLog:
                     is_begun=mission is not None,
                     samples=samples,
                     patches_lost=batch.updates_lost,
-                    commands=[
-                        (asked.number, command_document(asked.asked)) for asked in turn.commands
-                    ],
+                    commands=[(asked.number, command_document(asked.asked)) for asked in commands],
                     plan=_plan_taken(plans[-1]) if plans else None,
                     decided=decided,
                 )
@@ -147,8 +140,8 @@ class TurnLog:
         self._has_begun = mission is not None
         self._forget_early(batch.samples)
         is_full = self._samples.waiting_bytes > FULL_BYTES
-        if is_full or turn.now - self._published_at >= PERIOD_S:
-            self._published_at = turn.now
+        if is_full or now - self._published_at >= PERIOD_S:
+            self._published_at = now
             self.publish()
 
     def publish(self) -> None:

@@ -7,8 +7,7 @@ import struct
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
 from fasaco_edge.wire.schemas import BATTERY_STATE
 
 Power = Literal["unknown", "charging", "discharging", "not charging", "full"]
@@ -45,11 +44,7 @@ class BatteryState:
 
 
 def encode_battery(state: BatteryState) -> bytes:
-    """Return ``state`` as a sensor_msgs/BatteryState; other fields are NaN, for unknown.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_battery`` refuses.
-    """
+    """Return ``state`` as a sensor_msgs/BatteryState; other fields are NaN, for unknown."""
     writer = CdrWriter(BATTERY_STATE)
     write_header(writer, state.frame, state.stamp_ns)
     level = math.nan if state.level is None else state.level
@@ -64,11 +59,7 @@ def encode_battery(state: BatteryState) -> bytes:
 
 
 def decode_battery(payload: bytes) -> BatteryState:
-    """Return the battery's state in a sensor_msgs/BatteryState.
-
-    Raises:
-        MalformedMessage: it is no such message, or its charge is neither in 0..1 nor NaN.
-    """
+    """Return the battery's state in a sensor_msgs/BatteryState."""
     reader = CdrReader(payload, BATTERY_STATE)
     frame, stamp_ns = read_header(reader)
     level: float = reader.words(_FLOATS, _NAMES)[-1]

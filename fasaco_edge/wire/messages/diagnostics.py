@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.messages.cdr import CdrWriter
-from fasaco_edge.wire.messages.fields import clipped, write_header
+from fasaco_edge.wire.messages.cdr import CdrWriter, clipped, write_header
 from fasaco_edge.wire.schemas import DIAGNOSTIC_ARRAY
 
 OK, WARN, ERROR, STALE = range(4)

@@ -13,8 +13,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.messages.cdr import HEADER_SIZE, CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import write_header, write_pose
+from fasaco_edge.wire.messages.cdr import (
+    HEADER_SIZE,
+    CdrReader,
+    CdrWriter,
+    refuse,
+    write_header,
+    write_pose,
+)
 from fasaco_edge.wire.messages.follow_path import (
     ABORTED,
     CANCELED,
@@ -81,9 +87,6 @@ def encode_dock(
         frame: of the pose.
         dock_id: of a dock in the server's database, used in place of the pose; "" for none.
         dock_type: its plugin; "" for the only one there is.
-
-        Raises:
-            MalformedMessage: one of them is not allowed in a message.
     """
     writer = CdrWriter(DOCK)
     writer.octets(goal_id)
@@ -99,11 +102,7 @@ def encode_dock(
 
 
 def encode_undock(goal_id: bytes, dock_type: str) -> bytes:
-    """Return the request of UndockRobot's ``send_goal``.
-
-    Raises:
-        MalformedMessage: ``dock_type`` is not allowed in a message.
-    """
+    """Return the request of UndockRobot's ``send_goal``."""
     writer = CdrWriter(UNDOCK)
     writer.octets(goal_id)
     writer.string(dock_type, "dock_type")
@@ -112,20 +111,12 @@ def encode_undock(goal_id: bytes, dock_type: str) -> bytes:
 
 
 def decode_dock_ending(payload: bytes) -> DockEnding:
-    """Return how a goal of DockRobot ended.
-
-    Raises:
-        MalformedMessage: it is no response of its ``get_result``.
-    """
+    """Return how a goal of DockRobot ended."""
     return _ending(payload, DOCK_RESULT, has_retries=True)
 
 
 def decode_undock_ending(payload: bytes) -> DockEnding:
-    """Return how a goal of UndockRobot ended.
-
-    Raises:
-        MalformedMessage: it is no response of its ``get_result``.
-    """
+    """Return how a goal of UndockRobot ended."""
     return _ending(payload, UNDOCK_RESULT, has_retries=False)
 
 

@@ -14,8 +14,14 @@ from typing import Final
 
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.limits import MAX_PATH_POSES
-from fasaco_edge.wire.messages.cdr import HEADER_SIZE, CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import write_header, write_pose
+from fasaco_edge.wire.messages.cdr import (
+    HEADER_SIZE,
+    CdrReader,
+    CdrWriter,
+    refuse,
+    write_header,
+    write_pose,
+)
 
 SEND_GOAL: Final = "nav2_msgs/action/FollowPath_SendGoal"
 GET_RESULT: Final = "nav2_msgs/action/FollowPath_GetResult"
@@ -80,9 +86,6 @@ def encode_goal(
         plugins: as many names as the server's release has, see ``ros_keys.RELEASES``.
         end_yaw: heading of the last pose [rad]; None for that of the one before it.
         is_back: whether poses face away from the next one: the robot drives backward.
-
-        Raises:
-            MalformedMessage: one of them is not allowed in a message.
     """
     writer = CdrWriter(SEND_GOAL)
     writer.octets(goal_id)
@@ -106,11 +109,7 @@ def encode_goal(
 
 
 def decode_accepted(payload: bytes) -> bool:
-    """Return whether a goal was accepted, by the response of ``send_goal``.
-
-    Raises:
-        MalformedMessage: it is no such response.
-    """
+    """Return whether a goal was accepted, by the response of ``send_goal``."""
     reader = CdrReader(payload, SEND_GOAL)
     accepted = _truth(reader.octets(1, "accepted")[0])
     reader.words(_STAMP, ("stamp.sec", "stamp.nanosec"))
@@ -126,11 +125,7 @@ def encode_goal_id(goal_id: bytes) -> bytes:
 
 
 def decode_ending(payload: bytes) -> Ending:
-    """Return how a goal ended, by the response of ``get_result`` of any release.
-
-    Raises:
-        MalformedMessage: it is no such response.
-    """
+    """Return how a goal ended, by the response of ``get_result`` of any release."""
     reader = CdrReader(payload, GET_RESULT)
     status = reader.octets(1, "status")[0]
     reader.octets(1, "result")
@@ -156,11 +151,7 @@ def encode_cancel(goal_id: bytes) -> bytes:
 
 
 def decode_cancel(payload: bytes) -> int:
-    """Return the result of a request to cancel.
-
-    Raises:
-        MalformedMessage: it is no response of ``cancel_goal``.
-    """
+    """Return the result of a request to cancel."""
     reader = CdrReader(payload, CANCEL_GOAL)
     code = reader.octets(1, "return_code")[0]
     for index in range(reader.length("goals_canceling", GOAL_ID_BYTES + _STAMP.size)):

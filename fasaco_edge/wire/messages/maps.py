@@ -6,27 +6,30 @@ The coverage is also an occupancy grid, on the lattice: any map viewer shows it.
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge import kernels as cell
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.occupancy import OCCUPIED, UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
-from fasaco_edge.wire.messages.grid_fields import read_cells, write_cells
-from fasaco_edge.wire.messages.grid_info import (
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
+from fasaco_edge.wire.messages.grids import (
     PLACE,
     PLACE_NAMES,
     read_grid_geometry,
+    read_octets,
     write_grid_geometry,
 )
 from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE
 
 PATCH_CELLS = 4096
 """Up to this many cells are checked by calls that start quickly, but copy the cells."""
+
+
+_Cell = TypeVar("_Cell", np.int8, np.uint8)
 
 
 class CoverageValue(IntEnum):
@@ -40,11 +43,7 @@ class CoverageValue(IntEnum):
 
 
 def decode_occupancy_grid(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> OccupancyGrid:
-    """Return the map in a nav_msgs/OccupancyGrid; its cells are a view of ``payload``.
-
-    Raises:
-        MalformedMessage: it is no such message, or has no cells or over ``max_cells``.
-    """
+    """Return the map in a nav_msgs/OccupancyGrid; its cells are a view of ``payload``."""
     reader = CdrReader(payload, OCCUPANCY_GRID)
     frame, stamp_ns = read_header(reader)
     geometry = read_grid_geometry(reader)
@@ -57,9 +56,6 @@ def encode_occupancy_grid(grid: OccupancyGrid) -> bytes:
     """Return ``grid`` as a nav_msgs/OccupancyGrid.
 
     The resolution becomes a float32; ``map_load_time`` is the map's stamp.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_occupancy_grid`` refuses.
     """
     writer = CdrWriter(OCCUPANCY_GRID)
     write_header(writer, grid.frame, grid.stamp_ns)
@@ -73,9 +69,6 @@ def decode_map_update(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> MapPat
     """Return the patch in a map_msgs/OccupancyGridUpdate; its cells are a view of ``payload``.
 
     ``OccupancyGrid.patched`` checks whether it fits a map.
-
-    Raises:
-        MalformedMessage: it is no such message, or has no cells or over ``max_cells``.
     """
     reader = CdrReader(payload, OCCUPANCY_GRID_UPDATE)
     frame, stamp_ns = read_header(reader)
@@ -87,11 +80,7 @@ def decode_map_update(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> MapPat
 
 
 def encode_map_update(patch: MapPatch) -> bytes:
-    """Return ``patch`` as a map_msgs/OccupancyGridUpdate.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_map_update`` refuses.
-    """
+    """Return ``patch`` as a map_msgs/OccupancyGridUpdate."""
     writer = CdrWriter(OCCUPANCY_GRID_UPDATE)
     window = patch.window
     if patch.cells.shape != (window.rows, window.cols) or patch.cells.dtype != np.int8:
@@ -103,6 +92,30 @@ def encode_map_update(patch: MapPatch) -> bytes:
     writer.words(PLACE, PLACE_NAMES, *place)
     write_cells(writer, patch.cells)
     return writer.payload()
+
+
+def read_cells(
+    reader: CdrReader,
+    geometry: GridGeometry | Window,
+    dtype: type[_Cell],
+    max_cells: int,
+    field: str = "data",
+) -> NDArray[_Cell]:
+    """Read the last field, a byte for each of the cells of ``geometry``.
+
+    Returns a read-only view, (rows, cols), of type ``dtype``.
+    """
+    octets = read_octets(reader, geometry, max_cells, field)
+    cells: NDArray[_Cell] = np.ndarray((geometry.rows, geometry.cols), dtype, octets)
+    return cells
+
+
+def write_cells(writer: CdrWriter, cells: NDArray[np.generic], field: str = "data") -> None:
+    """Write cells of one byte each, (rows, cols), as the last field."""
+    if not cells.size:
+        refuse(writer.message, f"length of {field}", "at least 1", 0)
+    writer.uint32(cells.size, f"length of {field}")
+    writer.view(np.ascontiguousarray(cells).data)
 
 
 def _check_occupancy(cells: NDArray[np.int8], message: str) -> None:

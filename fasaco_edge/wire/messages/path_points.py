@@ -10,8 +10,7 @@ from collections.abc import Iterator
 
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.limits import MAX_PATH_POSES
-from fasaco_edge.wire.messages.cdr import CdrReader, refuse
-from fasaco_edge.wire.messages.fields import POSE, check_pose, read_header, yaw_of
+from fasaco_edge.wire.messages.cdr import POSE, CdrReader, check_pose, read_header, refuse, yaw_of
 from fasaco_edge.wire.schemas import PATH
 
 # Poses are read this many at a time.
@@ -28,8 +27,8 @@ class PathPoints:
         frame: name of the frame of all poses.
         left: number of points not read yet.
 
-        Raises:
-            MalformedMessage: the payload does not begin like a path, or is too short for its poses.
+    Raises:
+        MalformedMessage: the payload does not begin like a path, or is too short for its poses.
     """
 
     def __init__(self, payload: bytes) -> None:

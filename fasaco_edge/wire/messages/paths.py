@@ -14,12 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.wire.limits import MAX_COORDINATE_M, MAX_PATH_POSES, QUATERNION_TOLERANCE
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, encoded_string, refuse
-from fasaco_edge.wire.messages.fields import (
+from fasaco_edge.wire.messages.cdr import (
     POSE,
     SECOND_NS,
+    CdrReader,
+    CdrWriter,
     check_pose,
+    encoded_string,
     read_header,
+    refuse,
     write_header,
 )
 from fasaco_edge.wire.messages.path_points import read_path_pose, read_pose_count
@@ -59,9 +62,6 @@ def encode_path(
         yaw: float64 (n,), headings [rad].
         frame: name of the frame.
         stamp_ns: time [ns].
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_path`` refuses.
     """
     writer = CdrWriter(PATH)
     if xy.ndim != 2 or xy.shape[1] != 2 or yaw.shape != (len(xy),):
@@ -107,7 +107,8 @@ def decode_path(payload: bytes, max_poses: int = MAX_PATH_POSES) -> PathMessage:
 def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64] | None:
     """Read poses that all name ``frame``, float64 (count, 7); None, and nothing taken, otherwise.
 
-    That is also so for anything else unusual."""
+    That is also so for anything else unusual.
+    """
     text = np.frombuffer(encoded_string(frame, reader.message, "header.frame_id"), np.uint8)
     first, rest = _record(reader.position, len(text)), _record(0, len(text))
     size = first.itemsize + (count - 1) * rest.itemsize
@@ -155,8 +156,7 @@ def _check_poses(poses: NDArray[np.float64], message: str, field_of: Callable[[i
 
 
 def _yaw_of(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the yaw [rad], float64 (n,), of quaternions x, y, z, w, float64 (n, 4), as
-    ``fields.yaw_of`` has it."""
+    """Return the yaw [rad], float64 (n,), of quaternions x, y, z, w, float64 (n, 4)."""
     x, y, z, w = quaternions.T
     yaw: NDArray[np.float64] = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return yaw

@@ -17,15 +17,14 @@ from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.limits import MAX_GRID_CELLS
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
-from fasaco_edge.wire.messages.grid_fields import read_cells, write_cells
-from fasaco_edge.wire.messages.grid_info import (
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
+from fasaco_edge.wire.messages.grids import (
     COLONY,
     COLONY_NAMES,
     read_grid_geometry,
     write_grid_geometry,
 )
+from fasaco_edge.wire.messages.maps import read_cells, write_cells
 from fasaco_edge.wire.schemas import PHEROMONE_GRID
 
 TOP_STEP = 254
@@ -74,9 +73,6 @@ def encode_pheromone(
     """Return ``snapshot`` as a fasaco_msgs/PheromoneGrid.
 
     ``lattice_deg`` is the angle of its cells' rows to the x axis of the map frame [deg].
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_pheromone`` refuses.
     """
     writer = CdrWriter(PHEROMONE_GRID)
     levels, trail_min, trail_max = _quantised(snapshot.trail, writer.message)
@@ -101,11 +97,7 @@ def encode_pheromone(
 
 
 def decode_pheromone(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> PheromoneMessage:
-    """Return the pheromone field in a fasaco_msgs/PheromoneGrid.
-
-    Raises:
-        MalformedMessage: it is no such message, or has no cells or over ``max_cells``.
-    """
+    """Return the pheromone field in a fasaco_msgs/PheromoneGrid."""
     reader = CdrReader(payload, PHEROMONE_GRID)
     frame, stamp_ns = read_header(reader)
     geometry = read_grid_geometry(reader)

@@ -18,13 +18,15 @@ from fasaco_edge.wire.limits import (
     MAX_TRANSFORMS,
     QUATERNION_TOLERANCE,
 )
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import (
+from fasaco_edge.wire.messages.cdr import (
     IN_METRES,
     IN_QUATERNIONS,
     POSE,
+    CdrReader,
+    CdrWriter,
     read_header,
     read_pose,
+    refuse,
     write_header,
     write_pose,
     yaw_of,
@@ -70,11 +72,7 @@ def decode_pose(payload: bytes, schema: str) -> StampedPose:
 
 
 def encode_pose_stamped(stamped: StampedPose) -> bytes:
-    """Return ``stamped`` as a geometry_msgs/PoseStamped.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_pose`` refuses.
-    """
+    """Return ``stamped`` as a geometry_msgs/PoseStamped."""
     writer = CdrWriter(POSE_STAMPED)
     write_header(writer, stamped.frame, stamped.stamp_ns)
     write_pose(writer, stamped.pose, "pose")

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter
-from fasaco_edge.wire.messages.fields import clipped
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, clipped
 from fasaco_edge.wire.ros_keys import TRIGGER, attachment, attachment_of
 
 Triggered = Literal["start", "pause", "resume", "home", "cancel"]
@@ -18,11 +17,7 @@ TRIGGERED: Final[tuple[Triggered, ...]] = ("start", "pause", "resume", "home", "
 
 
 def check_request(payload: bytes) -> None:
-    """Check the request of a Trigger.
-
-    Raises:
-        MalformedMessage: it is no such request.
-    """
+    """Check the request of a Trigger."""
     reader = CdrReader(payload, TRIGGER)
     reader.octets(1, "request")
     reader.end()

@@ -11,8 +11,7 @@ import struct
 from dataclasses import dataclass
 
 from fasaco_edge.wire.limits import MAX_SCAN_BEAMS, MAX_SCAN_SPAN_RAD
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
 from fasaco_edge.wire.schemas import LASER_SCAN
 
 _FLOATS = struct.Struct("<7f")
@@ -49,11 +48,7 @@ class LaserScan:
 
 
 def encode_scan(scan: LaserScan) -> bytes:
-    """Return ``scan`` as a sensor_msgs/LaserScan, without times of beams and intensities.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_scan`` refuses.
-    """
+    """Return ``scan`` as a sensor_msgs/LaserScan, without times of beams and intensities."""
     writer = CdrWriter(LASER_SCAN)
     write_header(writer, scan.frame, scan.stamp_ns)
     count = len(scan.ranges)

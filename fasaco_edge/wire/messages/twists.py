@@ -7,8 +7,7 @@ import struct
 from dataclasses import dataclass
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import read_header, write_header
+from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
 from fasaco_edge.wire.schemas import TWIST, TWIST_SCHEMAS, TWIST_STAMPED
 
 _TWIST = struct.Struct("<6d")
@@ -33,11 +32,7 @@ class Velocity:
 
 
 def encode_velocity(velocity: Velocity, schema: str = TWIST) -> bytes:
-    """Return ``velocity`` as a message of type ``schema``, one of ``TWIST_SCHEMAS``.
-
-    Raises:
-        MalformedMessage: the message would be one that ``decode_velocity`` refuses.
-    """
+    """Return ``velocity`` as a message of type ``schema``, one of ``TWIST_SCHEMAS``."""
     _check_schema(schema)
     writer = CdrWriter(schema)
     if schema == TWIST_STAMPED:
@@ -49,11 +44,7 @@ def encode_velocity(velocity: Velocity, schema: str = TWIST) -> bytes:
 
 
 def decode_velocity(payload: bytes, schema: str = TWIST) -> Velocity:
-    """Return the velocity in a message of type ``schema``, one of ``TWIST_SCHEMAS``.
-
-    Raises:
-        MalformedMessage: it is no such message, or a number in it is not finite.
-    """
+    """Return the velocity in a message of type ``schema``, one of ``TWIST_SCHEMAS``."""
     _check_schema(schema)
     reader = CdrReader(payload, schema)
     frame, stamp_ns = read_header(reader) if schema == TWIST_STAMPED else ("", 0)

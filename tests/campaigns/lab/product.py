@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 
 from fasaco_edge.cli.follow import limits_of
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter
+from fasaco_edge.daemon.ledger.writer import LedgerKeeper, NoDisk
 from fasaco_edge.daemon.loop.inbox import blocked_of, make_mailbox
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.loop import TICK_S as LOOP_S
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
-from fasaco_edge.daemon.loop.outbox import MOST_SQUARES, headings
+from fasaco_edge.daemon.loop.outbox import headings
+from fasaco_edge.daemon.loop.periodic import MOST_SQUARES
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.follow.follower import Follower
@@ -62,7 +63,7 @@ class Product:
             mission_config(config, self._planning.planner), OrderState.autostart()
         )
         mailbox = make_mailbox(config.map.max_pixels)
-        keeper = LedgerKeeper(_NoDisk(), config.cell_m, autostart=True)
+        keeper = LedgerKeeper(NoDisk(), config.cell_m, autostart=True)
         self._runner = MissionRunner(config, keeper, mailbox)
         self._runner.mission = self._mission
         self._decoder = config.poses()
@@ -207,10 +208,3 @@ def _follower(config: DaemonConfig, sight: Sight | None) -> Follower:
     follower = Follower(limits_of(config.robot), sight=sight, radius=config.robot.radius_m)
     follower.take_planner(NAME)
     return follower
-
-
-class _NoDisk(LedgerWriter):
-    """A ledger that nothing is written to."""
-
-    def __init__(self) -> None:
-        self.restored = None

@@ -1,24 +1,34 @@
-"""Placement fields of grid messages, and the offset of the cells.
+"""Grids, a byte a cell: their placement, and their cells as octets.
 
-Without numpy, for small programs.
+Without numpy, for small programs that only pass grids on.
 """
 
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from functools import lru_cache
 
 from fasaco_edge.grid.geometry import GridGeometry, Window
-from fasaco_edge.wire.limits import MAX_GRID_TILT, MAX_RESOLUTION_M, MIN_RESOLUTION_M
-from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, refuse
-from fasaco_edge.wire.messages.fields import (
+from fasaco_edge.wire.limits import (
+    MAX_GRID_CELLS,
+    MAX_GRID_TILT,
+    MAX_RESOLUTION_M,
+    MIN_RESOLUTION_M,
+)
+from fasaco_edge.wire.messages.cdr import (
     POSE,
     SECOND_NS,
+    CdrReader,
+    CdrWriter,
     check_pose,
     planar,
+    read_header,
+    refuse,
     refuse_nanosec,
     write_pose,
 )
+from fasaco_edge.wire.schemas import OCCUPANCY_GRID, OCCUPANCY_GRID_UPDATE, PHEROMONE_GRID
 
 # Fields of a map update: its corner and its size.
 PLACE = struct.Struct("<iiII")
@@ -108,3 +118,53 @@ def _check_resolution(resolution: float, message: str) -> None:
         expected = f"{MIN_RESOLUTION_M}..{MAX_RESOLUTION_M:g} m"
         hint = "publish the edge of a pixel in metres, as 0.05"
         refuse(message, "info.resolution", expected, resolution, hint)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GridOctets:
+    """A grid received from the bus.
+
+    Attributes:
+        geometry: its size and place.
+        octets: row by row, the southernmost first; an int8 of a map as its byte. The range of
+            values is not checked.
+        frame: name of the map frame.
+    """
+
+    geometry: GridGeometry
+    octets: memoryview | bytearray
+    frame: str
+
+
+def read_grid(payload: bytes) -> GridOctets:
+    """Return the grid in a nav_msgs/OccupancyGrid."""
+    reader = CdrReader(payload, OCCUPANCY_GRID)
+    frame, _ = read_header(reader)
+    geometry = read_grid_geometry(reader)
+    return GridOctets(geometry, read_octets(reader, geometry, MAX_GRID_CELLS), frame)
+
+
+def read_field(payload: bytes) -> GridOctets:
+    """Return the levels in a fasaco_msgs/PheromoneGrid, 0 for none."""
+    reader = CdrReader(payload, PHEROMONE_GRID)
+    frame, _ = read_header(reader)
+    geometry = read_grid_geometry(reader)
+    reader.words(COLONY, COLONY_NAMES)
+    return GridOctets(geometry, read_octets(reader, geometry, MAX_GRID_CELLS, "levels"), frame)
+
+
+def with_update(grid: GridOctets, payload: bytes) -> GridOctets:
+    """Return a map with a map_msgs/OccupancyGridUpdate applied; the old map is consumed."""
+    reader = CdrReader(payload, OCCUPANCY_GRID_UPDATE)
+    frame, _ = read_header(reader)
+    col, row, cols, rows = reader.words(PLACE, PLACE_NAMES)
+    window = Window(row, col, row + rows, col + cols)
+    part = read_octets(reader, window, MAX_GRID_CELLS)
+    size = grid.geometry
+    if window.intersection(Window(0, 0, size.rows, size.cols)) != window or frame != grid.frame:
+        refuse(reader.message, "x, y, width, height", "a part of the map", (col, row, cols, rows))
+    cells = grid.octets if isinstance(grid.octets, bytearray) else bytearray(grid.octets)
+    for index in range(rows):
+        start = (row + index) * size.cols + col
+        cells[start : start + cols] = part[index * cols : (index + 1) * cols]
+    return GridOctets(size, cells, frame)

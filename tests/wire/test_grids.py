@@ -9,8 +9,7 @@ from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.planners.planner import ColonySnapshot
-from fasaco_edge.wire.messages.grid_info import _shortest_decimal
-from fasaco_edge.wire.messages.grid_octets import read_field, read_grid, with_update
+from fasaco_edge.wire.messages.grids import _shortest_decimal, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.maps import (
     decode_occupancy_grid,
     encode_map_update,

@@ -1,0 +1,278 @@
+"""Periodic messages: what changes as the robot drives, each published when it is due."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.daemon.loop.outbox import Outbox
+from fasaco_edge.grid.geometry import GridGeometry
+from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
+from fasaco_edge.grid.rotation import rotated_geometry
+from fasaco_edge.mission.map.room_book import Room, RoomBook
+from fasaco_edge.mission.orders.passes import passes_document
+from fasaco_edge.planners.living_trail import (
+    TrailSnapshot,
+    branching,
+    directions,
+    strongest_into,
+)
+from fasaco_edge.planners.planner import ColonySnapshot
+from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.path_documents import TrailAttachment
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
+from fasaco_edge.wire.messages.maps import coverage_values, direction_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.pheromone import encode_pheromone
+from fasaco_edge.wire.topics import COVERAGE, DIRECTIONS, FLOOR, PHEROMONE, ROOMS, UNSWEPT
+
+if TYPE_CHECKING:
+    from fasaco_edge.daemon.fleet_wing import PeriodicMessage
+    from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.coverage.progress import RoomProgress
+
+# Least period of the coverage [s].
+COVERAGE_PERIOD_S = 0.5
+# Least period of the swept floor [s], and limit on its squares: a large floor gets larger squares.
+FLOOR_PERIOD_S = 2.0
+MOST_SQUARES = 1_000_000
+# A raster of more pixels is looked at for unswept floor less often: 8 million take the loop 25 ms.
+PIXELS_PER_S = 1_000_000
+# Period at which a message is published again unchanged [s]: a listener that comes while others
+# listen is not noticed.
+REPEAT_S = 10.0
+# Least period of the trail [s]; a large one, which takes the loop some milliseconds per 100,000
+# cells, is published less often.
+TRAIL_PERIOD_S = 0.5
+CELLS_PER_S = 200_000
+# Least period of changed rooms, and of swept shares alone while the robot drives [s].
+ROOMS_PERIOD_S, SWEPT_PERIOD_S = 1.0, 5.0
+
+
+class Due:
+    """When a message is due: on change of a key, and again, with a least period.
+
+    Attributes:
+        next_at: earliest time of the next one [s, monotonic].
+    """
+
+    def __init__(self) -> None:
+        self.next_at = self._at = float("-inf")
+        self._key: tuple[object, ...] = ()
+
+    def is_due(self, key: tuple[object, ...], now: float, *, repeats: bool) -> bool:
+        """Return whether it is due now; ``repeats``: also if the key has not changed for long."""
+        is_new = key != self._key or (repeats and now - self._at >= REPEAT_S)
+        return is_new and now >= self.next_at
+
+    def note(self, key: tuple[object, ...], now: float, period_s: float) -> None:
+        """Note that it is published; the next one is due ``period_s`` [s] later at the earliest."""
+        self._key, self._at, self.next_at = key, now, now + period_s
+
+    def forget(self) -> None:
+        """Publish the next one even if the key has not changed."""
+        self._key = ()
+
+
+class CoveragePublisher:
+    """Publishes the coverage grid on change, at most twice a second."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox, self._due = outbox, Due()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the coverage if that is due."""
+        # An order may reset the coverage, and add keep-out cells.
+        key = (mission.covered.version, mission.map_revision, mission.order_state)
+        lattice, grid = mission.lattice, mission.grid
+        if lattice is None or grid is None or not self._due.is_due(key, now, repeats=False):
+            return
+        self._due.note(key, now, COVERAGE_PERIOD_S)
+        geometry = mission.rotation.cells(lattice.window, lattice.cell_m)
+        values = coverage_values(lattice.states, mission.covered.visits(lattice.window))
+        shown = OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns)
+        self._outbox.send(COVERAGE, encode_occupancy_grid(shown))
+
+
+class FloorPublisher:
+    """Publishes the swept floor if it has subscribers: on change, every two seconds at most."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox, self._due = outbox, Due()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the swept floor if that is due."""
+        if not self._outbox.has_listeners(FLOOR):
+            self._due.forget()  # the next listener has not received it
+            return
+        floor, grid = mission.floor, mission.grid
+        key = (floor, floor.changes)
+        if grid is None or not self._due.is_due(key, now, repeats=True):
+            return
+        self._due.note(key, now, FLOOR_PERIOD_S)
+        shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+        if shown is not None:
+            shown = replace(shown, geometry=mission.rotation.geometry(shown.geometry))
+            self._outbox.put(FLOOR, encode_occupancy_grid(shown))
+
+
+class UnsweptPublisher:
+    """Publishes why floor is not swept while that has subscribers: on change, as the floor."""
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox, self._due = outbox, Due()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish the unswept floor if that is due."""
+        if not self._outbox.has_listeners(UNSWEPT):
+            self._due.forget()  # the next listener has not received it
+            return
+        if now < self._due.next_at:
+            return
+        key = (mission.map_revision, mission.floor_to_sweep())
+        if self._due.is_due(key, now, repeats=True) and (shown := mission.unswept()) is not None:
+            self._due.note(key, now, max(FLOOR_PERIOD_S, shown.cells.size / PIXELS_PER_S))
+            self._outbox.put(UNSWEPT, encode_occupancy_grid(coarser(shown, MOST_SQUARES)))
+
+
+class TrailPublisher:
+    """Publishes the living trail and its directions on change, at most twice a second.
+
+    It is published while it has subscribers, and kept for queries.
+    """
+
+    def __init__(self, outbox: Outbox) -> None:
+        self._outbox, self._due = outbox, Due()
+
+    def publish(self, mission: Mission, now: float) -> None:
+        """Publish or keep the trail if due."""
+        is_heard = any(map(self._outbox.has_listeners, (PHEROMONE, DIRECTIONS)))
+        trail, lattice, grid = mission.trail, mission.lattice, mission.grid
+        key = (trail, trail.changes, is_heard)
+        if grid is None or lattice is None or not self._due.is_due(key, now, repeats=is_heard):
+            return
+        held = trail.snapshot()
+        cells = held.window.rows * held.window.cols
+        if not cells:
+            return
+        self._due.note(key, now, max(TRAIL_PERIOD_S, cells / CELLS_PER_S))
+        shown = ShownTrail(
+            held,
+            trail.ants,
+            lattice.cell_m,
+            grid.frame,
+            mission.route.revision,
+            max(len(mission.route.path.ahead) - 1, 0),
+            time.time_ns(),
+            mission.rotation.deg,
+        )
+        self._outbox.keep(PHEROMONE.name, shown.reply)
+        if is_heard:
+            self._outbox.put(PHEROMONE, *shown.field())
+            self._outbox.put(DIRECTIONS, shown.directions())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShownTrail:
+    """The living trail at a moment; encoded on any thread.
+
+    Attributes:
+        held: the trail.
+        ants: number of ants that have walked on it so far.
+        cell_m: edge of a cell [m].
+        frame: of the map.
+        revision: of the path in force.
+        steps: steps of the path still to drive.
+        stamp_ns: of the moment [ns].
+        lattice_deg: the angle of the cells to the map frame [deg].
+    """
+
+    held: TrailSnapshot
+    ants: int
+    cell_m: float
+    frame: str
+    revision: int
+    steps: int
+    stamp_ns: int
+    lattice_deg: float = 0.0
+
+    def field(self) -> tuple[bytes, bytes]:
+        """Return the field as payload and attachment."""
+        tau = self.held.tau
+        field = strongest_into(tau)
+        about = TrailAttachment(
+            revision=self.revision,
+            cells=int(np.count_nonzero(field)),
+            branching=round(branching(tau), 4),
+        )
+        seen = ColonySnapshot(self.held.window, self.cell_m, field, 0, 0, self.ants, self.steps)
+        payload = encode_pheromone(seen, self.frame, self.stamp_ns, self.lattice_deg)
+        return payload, encode_json(about)
+
+    def reply(self) -> Reply:
+        """Return the field as the reply to a query."""
+        payload, attachment = self.field()
+        return Reply(payload, PHEROMONE.schema, attachment)
+
+    def directions(self) -> bytes:
+        """Return its directions as a payload."""
+        plain = GridGeometry.of_cells(self.held.window, self.cell_m)
+        geometry = rotated_geometry(plain, self.lattice_deg)
+        values = direction_values(*directions(self.held.tau))
+        return encode_occupancy_grid(OccupancyGrid(geometry, values, self.frame, self.stamp_ns))
+
+
+OF_MISSION: dict[str, Callable[[Outbox], PeriodicMessage]] = {
+    "coverage": CoveragePublisher,
+    "floor": FloorPublisher,
+    "unswept": UnsweptPublisher,
+    "pheromone": TrailPublisher,
+}
+"""The messages of a mission; the names are those of failures in the log."""
+
+
+class RoomsPublisher:
+    """Publishes the rooms of a book: on change, and as they are swept; also without a mission."""
+
+    def __init__(self, outbox: Outbox, book: RoomBook) -> None:
+        self._outbox, self._book = outbox, book
+        self._published_at = float("-inf")
+        self._version = -1
+        self._covered: object = None
+
+    def publish(self, mission: Mission | None, now: float) -> None:
+        """Publish the rooms if that is due."""
+        book, covered = self._book, None if mission is None else mission.covered.version
+        is_new = book.version != self._version
+        if not is_new and (covered == self._covered or not book.rooms):
+            return
+        # Shares at the end of an order are not to be missed by who ends with it.
+        is_over = mission is not None and mission.state.is_at_rest
+        if now - self._published_at < (ROOMS_PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
+            return
+        self._published_at, self._version, self._covered = now, book.version, covered
+        progress = {} if mission is None else mission.room_progress()
+        rooms = tuple(_report(room, progress.get(room.id)) for room in book.rooms)
+        self._outbox.send(ROOMS, encode_json(Rooms(book.frame, book.version, rooms)))
+
+
+def _report(room: Room, progress: RoomProgress | None) -> RoomReport:
+    settings = room.settings
+    passes = None if settings.passes is None else passes_document(settings.passes, settings.kinds)
+    return RoomReport(
+        id=room.id,
+        name=room.name,
+        outline=room.outline,
+        area_m2=room.area_m2,
+        neighbours=room.neighbours,
+        encloses=room.encloses,
+        swept=None if progress is None else progress.share,
+        to_go_s=None if progress is None else progress.to_go_s,
+        passes=tuple(passes) if isinstance(passes, list) else passes,  # type: ignore[arg-type]
+        skip=settings.skip,
+        priority=settings.priority,
+    )

@@ -1,0 +1,109 @@
+"""When periodic messages are published: on change, again for late listeners, at once at an end."""
+
+from __future__ import annotations
+
+import itertools
+from types import SimpleNamespace
+
+from fasaco_edge.daemon.loop.periodic import (
+    FLOOR_PERIOD_S,
+    REPEAT_S,
+    ROOMS_PERIOD_S,
+    SWEPT_PERIOD_S,
+    TRAIL_PERIOD_S,
+    FloorPublisher,
+    RoomsPublisher,
+    TrailPublisher,
+)
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.mission.coverage.swept_floor import SweptFloor
+from fasaco_edge.wire.documents.json_text import decode_document
+from fasaco_edge.wire.documents.rooms import Rooms
+from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+from tests.mission.test_room_orders import BOTH, IN_EAST, room_at, settled, start
+
+
+class Sent:
+    """An outbox with or without listeners: what was sent, and what is kept for queries."""
+
+    def __init__(self, *, is_heard=True):
+        self.messages, self.kept, self.is_heard = [], [], is_heard
+
+    def has_listeners(self, topic):
+        return self.is_heard
+
+    def put(self, topic, payload, attachment=b""):
+        self.messages.append((topic.name, payload))
+
+    send = put
+
+    def keep(self, name, reply):
+        self.kept.append(reply)
+
+
+def test_an_unchanged_floor_is_published_again_after_a_while():
+    floor, sent = SweptFloor(0.3), Sent()
+    floor.record(Pose2D(1.0, 1.0))
+    mission = SimpleNamespace(
+        floor=floor,
+        grid=SimpleNamespace(frame="map", stamp_ns=1),
+        rotation=SimpleNamespace(geometry=lambda geometry: geometry),
+    )
+    publisher = FloorPublisher(sent)
+    # The mission is done: a recorder listens, and the floor no longer changes.
+    counts = []
+    for now in (0.0, FLOOR_PERIOD_S, REPEAT_S - 0.1, REPEAT_S, REPEAT_S + 0.1, 2 * REPEAT_S):
+        publisher.publish(mission, now)
+        counts.append(len(sent.messages))
+    assert counts == [1, 1, 1, 2, 2, 3]
+    floor.record(Pose2D(1.4, 1.0))
+    publisher.publish(mission, 2 * REPEAT_S + FLOOR_PERIOD_S)
+    assert len(sent.messages) == 4
+
+
+def test_the_trail_is_kept_without_listeners_and_sent_as_soon_as_there_is_one():
+    drive, sent = settled(*BOTH), Sent(is_heard=False)
+    start(drive, f"room {room_at(drive, *IN_EAST).id}")
+    drive.plan()
+    mission, publisher = drive.mission, TrailPublisher(sent)
+    for now in (0.0, REPEAT_S, 2 * REPEAT_S):
+        publisher.publish(mission, now)
+    assert (len(sent.kept), sent.messages) == (1, [])
+    sent.is_heard = True
+    publisher.publish(mission, 2 * REPEAT_S + TRAIL_PERIOD_S)
+    assert [name for name, _ in sent.messages] == ["pheromone", "directions"]
+    assert sent.kept[-1]().payload == sent.messages[0][1]
+    # The step from a cell that the path leaves once is where the trail points to, decidedly.
+    grid = decode_occupancy_grid(sent.messages[1][1])
+    ahead = [tuple(cell) for cell in mission.route.path.ahead.tolist()]
+    origin, cell_m = grid.geometry.origin, mission.lattice.cell_m
+    row0, col0 = round(origin.y / cell_m), round(origin.x / cell_m)
+    assert len(ahead) > 9
+    for (row, col), (then_row, then_col) in itertools.pairwise(ahead):
+        if ahead.count((row, col)) == 1:
+            direction = {(0, 1): 0, (1, 0): 1, (0, -1): 2, (-1, 0): 3}[
+                then_row - row, then_col - col
+            ]
+            value = int(grid.cells[row - row0, col - col0])
+            assert (value // 25, value % 25 > 6) == (direction, True)
+
+
+def test_the_last_shares_of_an_order_do_not_wait():
+    drive, sent = settled(*BOTH), Sent()
+    publisher = RoomsPublisher(sent, drive.mission.rooms)
+    publisher.publish(drive.mission, now=0.0)
+    number = room_at(drive, *IN_EAST).id
+    start(drive, f"room {number}")
+    drive.plan()
+    drive.go()
+    # While it drives, shares are not worth a message a second.
+    publisher.publish(drive.mission, now=ROOMS_PERIOD_S)
+    assert len(sent.messages) == 1
+    publisher.publish(drive.mission, now=SWEPT_PERIOD_S)
+    assert len(sent.messages) == 2
+    drive.finish()
+    publisher.publish(drive.mission, now=SWEPT_PERIOD_S + ROOMS_PERIOD_S)
+    rooms = decode_document(sent.messages[-1][1], Rooms).rooms
+    assert {room.id: room.swept for room in rooms}[number] == 1.0
+    publisher.publish(drive.mission, now=3 * SWEPT_PERIOD_S)
+    assert len(sent.messages) == 3
