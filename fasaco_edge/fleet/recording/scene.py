@@ -6,7 +6,6 @@ than the scene of one robot: the robots share the rate of each layer.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -15,7 +14,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.fleet.observer.cells import mask_of, window_of
 from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
-from fasaco_edge.fleet.observer.members import GONE, shares_of, swept_twice
+from fasaco_edge.fleet.observer.members import GONE
+from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.fleet.recording.layout import (
     RobotRow,
     build_layout,
@@ -37,7 +37,7 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 RATES = {
     "map": 3_000, "swept": 3_000, "path": 2_500, "trail": 2_000, "pose": 2_000, "metrics": 2_000,
 }  # fmt: skip
-FLEET_RATES = {entities.FLEET_SHARES: 1_000, entities.FLEET_TWICE: 1_000, entities.RUN_CARD: 800}
+FLEET_RATES = {entities.FLEET_SHARES: 2_000, entities.RUN_CARD: 800}
 CHUNK_BYTES = 1_200
 # Overhead of a layer of cells in four bytes each [bytes].
 GRID_BYTES = 1_200
@@ -80,8 +80,7 @@ class FleetScene:
         self._drawn: dict[str, _Drawn] = {}
         self._framed: Bounds | None = None
         self._shown: tuple[str, ...] = ()
-        self._shares: Counter[str] = Counter()
-        self._twice_m2, self._card = 0.0, ""
+        self._survey, self._card = Survey(), ""
         writer.log_static(entities.FLEET, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
     def join(self, member: RecordedMember) -> None:
@@ -182,11 +181,9 @@ class FleetScene:
 
     def add_division(self) -> None:
         """Draw the shares of the remaining cells, and the cells that two robots swept."""
-        layers, now_ns = self._layers, self._writer.wall_ns
         # The size of the ground also limits the time of this drawing.
-        size = CHUNK_BYTES + sum(member.ground.count for member in self._members) // 8
-        layers.draw(entities.FLEET_SHARES, size, self._draw_shares, now_ns)
-        layers.draw(entities.FLEET_TWICE, size, self._draw_twice, now_ns)
+        size = 2 * CHUNK_BYTES + sum(member.ground.count for member in self._members) // 4
+        self._layers.draw(entities.FLEET_SHARES, size, self._draw_survey, self._writer.wall_ns)
 
     def add_figures(self, member: RecordedMember, figures: dict[str, float]) -> None:
         """Plot changed figures of a robot, of METRICS."""
@@ -228,12 +225,12 @@ class FleetScene:
                 number=member.number,
                 state=self._drawn[member.name].state,
                 swept_m2=member.swept.count * cell_m2[member.name],
-                share_m2=self._shares[member.name] * cell_m2[member.name],
+                share_m2=self._survey.left[member.name] * cell_m2[member.name],
                 waits_for=member.newest.waits_for,
             )
             for member in self._members
         ]
-        card = card_of(title, rows, self._twice_m2)
+        card = card_of(title, rows, self._survey.twice_m2)
         if card == self._card:
             return
         self._card = card
@@ -290,26 +287,20 @@ class FleetScene:
         geometry = self._shifted(member.seat.geometry(window))
         self._log_grid(_world(member, "swept"), geometry, pixels, SWEPT_ORDER)
 
-    def _draw_shares(self) -> None:
-        shares = shares_of(self._members, self._writer.wall_ns)
-        if shares is None:
+    def _draw_survey(self) -> None:
+        self._survey = survey = survey_of(self._members, self._writer.wall_ns)
+        if survey.geometry is None:
             return
-        self._shares = shares.cells
-        pixels = np.zeros((*shares.owners.shape, 4), np.uint8)
-        for member in self._members:
-            pixels[shares.owners == member.number] = (*_colour(member), SHARE_ALPHA)
-        geometry = self._shifted(shares.geometry)
-        self._log_grid(entities.FLEET_SHARES, geometry, pixels, SHARE_ORDER)
-
-    def _draw_twice(self) -> None:
-        twice = swept_twice(self._members)
-        if twice is None:
-            return
-        geometry, mask = twice
-        self._twice_m2 = int(np.count_nonzero(mask)) * geometry.resolution**2
-        pixels = np.zeros((*mask.shape, 4), np.uint8)
-        pixels[mask] = TWICE_COLOUR
-        self._log_grid(entities.FLEET_TWICE, self._shifted(geometry), pixels, TWICE_ORDER)
+        geometry, shape = self._shifted(survey.geometry), (*survey.owners.shape, 4)
+        if survey.division:
+            pixels = np.zeros(shape, np.uint8)
+            for member in self._members:
+                pixels[survey.owners == member.number] = (*_colour(member), SHARE_ALPHA)
+            self._log_grid(entities.FLEET_SHARES, geometry, pixels, SHARE_ORDER)
+        if survey.twice.any():
+            pixels = np.zeros(shape, np.uint8)
+            pixels[survey.twice] = TWICE_COLOUR
+            self._log_grid(entities.FLEET_TWICE, geometry, pixels, TWICE_ORDER)
 
     def _log_grid(
         self, entity: str, geometry: GridGeometry, pixels: NDArray[np.uint8], order: float

@@ -14,8 +14,8 @@ from rich.text import Text
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.phrases import clock, percent
+from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.fleet.watch.feed import FleetFeed
-from fasaco_edge.fleet.watch.floor import FleetFloor
 from fasaco_edge.fleet.watch.robot import FleetRobot, short
 from fasaco_edge.fleet.watch.view import FleetView
 from fasaco_edge.text import one_line
@@ -75,9 +75,7 @@ def _doing(robot: FleetRobot) -> Text:
     return doing
 
 
-def total_rows(
-    floor: FleetFloor, unheard: Sequence[str], width: int, glyphs: GlyphSet
-) -> list[Text]:
+def total_rows(floor: Survey, unheard: Sequence[str], width: int, glyphs: GlyphSet) -> list[Text]:
     """Return lines with the total of all robots, and the names of silent robots."""
     silent = [Text(f"no messages: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
     if floor.fraction is None:
@@ -86,8 +84,8 @@ def total_rows(
     share = Text(phrases.percent(floor.fraction), "bold")
     share.append(f" swept: {swept_m2:.1f} of {area_m2:.1f} m2", "not bold")
     lines = [share, glyphs.bar(floor.fraction, min(width, LONGEST_BAR))]
-    if floor.twice:
-        lines.append(Text(f"{floor.twice * floor.cell_m2:.1f} m2 swept by two or more"))
+    if floor.twice_m2:
+        lines.append(Text(f"{floor.twice_m2:.1f} m2 swept by two or more"))
     if floor.division:
         by = f" by {short(floor.by)}" if floor.by else ""
         lines.append(Text(f"division {floor.division}{by}", FAINT))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fasaco_edge.fleet.watch.floor import FleetFloor
+from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.text import one_line
 
 # States of a robot that does something for its mission.
@@ -62,7 +62,7 @@ class FleetRobot:
 
 
 def document_of(
-    fleet: str, division: int, floor: FleetFloor, robots: Sequence[FleetRobot]
+    fleet: str, division: int, floor: Survey, robots: Sequence[FleetRobot]
 ) -> dict[str, object]:
     """Return a fleet as the object that ``--json`` prints."""
     return {
@@ -71,7 +71,7 @@ def document_of(
         "division": division,
         "cells": floor.area,
         "swept_cells": floor.swept,
-        "swept_twice_cells": floor.twice,
+        "swept_twice_cells": int(floor.twice.sum()),
         "swept_m2": round(floor.swept * floor.cell_m2, 2),
         "fraction": None if floor.fraction is None else round(floor.fraction, 4),
         "robots": [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
@@ -11,7 +12,7 @@ from fasaco_edge.client.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.observer.inbox import Received
 from fasaco_edge.fleet.observer.members import JOINED, MOST_MEMBERS, Member, Members
-from fasaco_edge.fleet.watch.floor import FleetFloor, FloorSurvey
+from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.fleet.watch.robot import FleetRobot, document_of, short
 from fasaco_edge.text import is_reported
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
@@ -22,6 +23,8 @@ from fasaco_edge.wire.reasons import plain
 
 # Least time between two notes of a robot's state [s]; time over which its rate is averaged [s].
 NOTED_EVERY_S, RATE_S = 1.0, 5
+# Least time between two surveys of the floor [s]; and as a multiple of the time that one takes.
+LEAST_AGE_S, LEAST_REST = 1.0, 10.0
 # Robots that others received messages from within this time are named, even if silent here [s].
 RECENT_S = 600.0
 # Number of robots and topics whose faults are counted apart; of other fleets that are named.
@@ -46,6 +49,7 @@ class FleetView:
         members: its robots.
         events: the latest events.
         trouble: why the bus cannot be reached; "" if it can.
+        floor: the cells of all robots.
         others: names of other fleets on the bus, one line each.
     """
 
@@ -56,14 +60,9 @@ class FleetView:
         self.trouble = ""
         self.others: set[str] = set()
         self._seen: dict[str, _Seen] = {}
-        self._survey = FloorSurvey()
+        self.floor, self._floor_key, self._floor_due_at = Survey(), object(), 0.0
         self._division = 0
         self._faults: Counter[tuple[str, str]] = Counter()
-
-    @property
-    def floor(self) -> FleetFloor:
-        """The cells of all robots."""
-        return self._survey.floor
 
     def take(self, received: Received) -> None:
         """Take in a sample. One that cannot be read is dropped and noted."""
@@ -80,14 +79,25 @@ class FleetView:
     def tick(self, now: float) -> None:
         """Note changes up to ``now``, since the epoch [s]; call it often."""
         now_ns = int(1e9 * now)
-        self._survey.update(self.members, now_ns)
         divider = self.members.dividing(now_ns)
+        self._look_at_floor(divider, now_ns)
         if divider is not None and divider.newest.division != self._division:
             self._division = divider.newest.division
             among = f", {len(divider.newest.parts)} parts" if divider.newest.parts else ""
             self.events.add(now, f"division {self._division} by {short(divider.newest.by)}{among}")
         for robot in self.robots(now):
             self._note_state(robot, now)
+
+    def _look_at_floor(self, divider: Member | None, now_ns: int) -> None:
+        """Survey the floor after changes, if that is due."""
+        division = None if divider is None else (divider.name, divider.newest.division)
+        key = division, *((member.name, member.changes) for member in self.members)
+        began = time.monotonic()
+        if key == self._floor_key or began < self._floor_due_at:
+            return
+        self._floor_key, self.floor = key, survey_of(self.members, now_ns)
+        took_s = time.monotonic() - began
+        self._floor_due_at = began + max(LEAST_AGE_S, (1.0 + LEAST_REST) * took_s)
 
     def note_rate(self, robot: str, kb_s: float) -> None:
         """Note a robot's rate of fleet messages in the last second [kB/s]."""
