@@ -16,17 +16,16 @@ from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.phrases import clock, percent
 from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.fleet.watch.feed import FleetFeed
-from fasaco_edge.fleet.watch.robot import FleetRobot, short
-from fasaco_edge.fleet.watch.view import FleetView
+from fasaco_edge.fleet.watch.view import FleetRobot, FleetView, short
 from fasaco_edge.text import one_line
 from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
 
-# Largest width of names, besides a third of the table; least width of a table with units and rates;
-# largest width of a table [characters].
-LEAST_NAME, UNITS, RATES, WIDEST = 12, 40, 47, 80
+# Largest width of names, besides a third of the table; least width of a table with units; largest
+# width of a table [characters].
+LEAST_NAME, UNITS, WIDEST = 12, 40, 80
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
 
 
@@ -41,26 +40,25 @@ def robot_table(robots: Sequence[FleetRobot], width: int, lines: int) -> Table:
     table.add_column(width=name, no_wrap=True, overflow="ellipsis")
     table.add_column(ratio=1, no_wrap=not is_folded, overflow="fold" if is_folded else "ellipsis")
     unit = " m2" if width >= UNITS else ""
-    heads = [f"swept{unit}", f"left{unit}", *(["kB/s"] if width >= RATES else [])]
+    heads = (f"swept{unit}", f"left{unit}")
     for head in heads:
         table.add_column(width=max(len(head), 6 if unit else 5), justify="right", no_wrap=True)
     table.add_row(*(Text(head, FAINT) for head in ("robot", "does", *heads)))
     shown = robots if len(robots) < lines else robots[: max(lines - 2, 0)]
     for robot in shown:
-        table.add_row(*_row(robot)[: 2 + len(heads)])
+        table.add_row(*_row(robot))
     if more := len(robots) - len(shown):
         table.add_row("", Text(f"{more} more", FAINT))
     return table
 
 
 def _row(robot: FleetRobot) -> list[Text]:
-    left = "-" if robot.left_m2 is None else f"{robot.left_m2:.1f}"
+    left = "-" if robot.left_cells is None else f"{robot.left_cells * robot.cell_m2:.1f}"
     return [
         Text(robot.name, FAINT if robot.silent_s is not None else ""),
         _doing(robot),
-        Text(f"{robot.swept_m2:.1f}"),
+        Text(f"{robot.swept_cells * robot.cell_m2:.1f}"),
         Text(left),
-        Text(f"{robot.kb_s:.1f}", FAINT),
     ]
 
 
@@ -156,7 +154,7 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: i
 # Time to wait for the other robots after the first message [s]. Each robot sends its place and its
 # swept cells once a second.
 REST_S, SENT_S = 4.0, 1.3
-# Period of counting rates and of printing JSON [s].
+# Period of printing JSON [s].
 EVERY_S = 1.0
 
 
@@ -168,7 +166,7 @@ class FleetWatch:
     def __init__(self, feed: FleetFeed, view: FleetView, console: Console) -> None:
         self._feed, self._view = feed, view
         self._page = FleetPage(console)
-        self._known_at = self._counted_at = phrases.steady_now()
+        self._known_at = phrases.steady_now()
         self._printed_at = float("-inf")
         self._printed: dict[str, object] = {}
 
@@ -197,7 +195,6 @@ class FleetWatch:
             self._known_at = now
         view.trouble = feed.trouble
         feed.attend(view.names())
-        self._count(now)
         view.tick(now)
         return bool(items)
 
@@ -244,11 +241,3 @@ class FleetWatch:
         view = self._view
         is_complete = phrases.steady_now() - self._known_at > SENT_S
         return is_complete and view.floor.robots >= set(view.names())
-
-    def _count(self, now: float) -> None:
-        passed_s = now - self._counted_at
-        if passed_s < EVERY_S:
-            return
-        self._counted_at = now
-        for name in self._view.names():
-            self._view.note_rate(name, 1e-3 * self._feed.traffic(name).bytes / passed_s)

@@ -15,8 +15,7 @@ from fasaco_edge.client.events import KEPT
 from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS, REPLACED_NS
 from fasaco_edge.fleet.observer.survey import MOST_STEPS
 from fasaco_edge.fleet.watch import view as fleet_view
-from fasaco_edge.fleet.watch.robot import LONGEST
-from fasaco_edge.fleet.watch.view import MOST_FAULTS, MOST_FLEETS, FleetView
+from fasaco_edge.fleet.watch.view import LONGEST, MOST_FAULTS, MOST_FLEETS, FleetView
 from fasaco_edge.wire.documents.fleet import CellTile, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import (
@@ -54,7 +53,7 @@ def test_it_tells_who_does_what():
     assert doing(view) == {"a": "covering", "b": "waits for a"}
     assert (a.x, a.y) == (1.0, 1.0)
     assert (a.swept_cells, b.swept_cells) == (4, 3)
-    assert a.swept_m2 == pytest.approx(4 * CELL_M**2)
+    assert a.cell_m2 == pytest.approx(CELL_M**2)
     # Each cell counts once, and cells that are swept are no part of what is left.
     assert view.floor.area == HALL
     assert (view.floor.swept, view.floor.twice.sum()) == (6, 1)
