@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
 
 from fasaco_edge.errors import FleetError
 from fasaco_edge.fleet.mission.frames import placed_point
 from fasaco_edge.fleet.observer.cells import Seat, TileSet
-from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
@@ -34,7 +32,7 @@ class Member:
         received_ns: time of its newest message.
         swept, ground: cells it has swept, and can reach.
         changes: how often these cells have changed, or their seat.
-        pose: its newest pose in its map frame.
+        news: tiles of ``swept`` and of ``ground`` that its newest message changed.
     """
 
     name: str
@@ -45,11 +43,7 @@ class Member:
     swept: TileSet = field(default_factory=TileSet)
     ground: TileSet = field(default_factory=TileSet)
     changes: int = 0
-    pose: Pose2D | None = None
-
-    def is_due(self, at_ns: int) -> bool:
-        """Return whether a message that arrived then is read."""
-        return at_ns - self.received_ns >= LEAST_SPACING_NS
+    news: tuple[Sequence[CellTile], Sequence[CellTile]] = (), ()
 
     def receive(self, said: FleetMember, at_ns: int) -> str:
         """Take in a message; return what has changed of its frame, "" for nothing."""
@@ -59,7 +53,6 @@ class Member:
             for tiles in (self.swept, self.ground):
                 tiles.clear()
             self.changes += 1
-            self._forget()
             moved = f"its frame has changed: {said.frame!r}, {self.seat}"
         elif said.epoch != self.newest.epoch:
             self.swept.clear()
@@ -67,9 +60,7 @@ class Member:
         self.newest, self.received_ns = said, at_ns
         swept = self.swept.take(said.swept, grows=True)
         ground = self.ground.take(said.ground, grows=False)
-        if swept or ground:
-            self.changes += 1
-            self._note_cells(swept, ground)
+        self.news, self.changes = (swept, ground), self.changes + bool(swept or ground)
         return moved
 
     def is_moved_by(self, said: FleetMember) -> bool:
@@ -90,27 +81,14 @@ class Member:
         """Return a point of its map frame in the fleet's frame [m]."""
         return placed_point(self.seat.frame, x, y)
 
-    def _note_cells(self, swept: Sequence[CellTile], ground: Sequence[CellTile]) -> None:
-        """Note the tiles that have changed."""
 
-    def _forget(self) -> None:
-        """Forget the notes of its cells: they lie elsewhere."""
+class Members:
+    """The robots of one fleet, in order of joining."""
 
+    def __init__(self) -> None:
+        self._by_name: dict[str, Member] = {}
 
-M = TypeVar("M", bound=Member)
-
-
-class Members(Generic[M]):
-    """The robots of one fleet, in order of joining.
-
-    ``make`` returns a robot by its name, number, seat, first message and the time of that [ns].
-    """
-
-    def __init__(self, make: Callable[[str, int, Seat, FleetMember, int], M]) -> None:
-        self._make = make
-        self._by_name: dict[str, M] = {}
-
-    def receive(self, robot: str, said: FleetMember, at_ns: int) -> tuple[M, str]:
+    def receive(self, robot: str, said: FleetMember, at_ns: int) -> tuple[Member, str]:
         """Take in a message; return its robot, and the change: JOINED, what moved, or "".
 
         Raises:
@@ -118,11 +96,12 @@ class Members(Generic[M]):
         """
         member = self._by_name.get(robot)
         if member is None:
-            member = self._make(robot, self._number(robot, at_ns), Seat.of(said), said, at_ns)
+            member = Member(robot, self._number(robot, at_ns), Seat.of(said), said, at_ns)
             self._by_name[robot] = member
             member.receive(said, at_ns)
             return member, JOINED
-        if not member.is_due(at_ns):
+        if at_ns - member.received_ns < LEAST_SPACING_NS:
+            member.news = (), ()
             return member, ""
         return member, member.receive(said, at_ns)
 
@@ -136,17 +115,17 @@ class Members(Generic[M]):
         del self._by_name[longest.name]
         return longest.number
 
-    def get(self, robot: str) -> M | None:
+    def get(self, robot: str) -> Member | None:
         """Return a robot; None if it has not joined."""
         return self._by_name.get(robot)
 
-    def __iter__(self) -> Iterator[M]:
+    def __iter__(self) -> Iterator[Member]:
         return iter(sorted(self._by_name.values(), key=lambda member: member.number))
 
     def __len__(self) -> int:
         return len(self._by_name)
 
-    def dividing(self, now_ns: int) -> M | None:
+    def dividing(self, now_ns: int) -> Member | None:
         """Return a robot that sends the division in force; None if none sends one.
 
         A single remaining robot sends a new number without parts: all cells left are its own. The

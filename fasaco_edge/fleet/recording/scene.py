@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.fleet.observer.cells import mask_of, window_of
 from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
-from fasaco_edge.fleet.observer.members import GONE
+from fasaco_edge.fleet.observer.members import GONE, Member, Members
 from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.fleet.recording.layout import (
     RobotRow,
@@ -23,7 +23,6 @@ from fasaco_edge.fleet.recording.layout import (
     colour_of,
     robot_entity,
 )
-from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser, known_bounds
 from fasaco_edge.recording import entities
@@ -72,7 +71,7 @@ class _Drawn:
 class FleetScene:
     """Draws a fleet into a writer; the caller sets the time."""
 
-    def __init__(self, writer: RecordingWriter, members: RecordedMembers) -> None:
+    def __init__(self, writer: RecordingWriter, members: Members) -> None:
         self._writer = writer
         self._members = members
         self._layers = Layers(FLEET_RATES)
@@ -83,7 +82,7 @@ class FleetScene:
         self._survey, self._card = Survey(), ""
         writer.log_static(entities.FLEET, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
-    def join(self, member: RecordedMember) -> None:
+    def join(self, member: Member) -> None:
         """Draw a robot from now on."""
         self._drawn[member.name] = _Drawn()
         self._limit()
@@ -114,7 +113,7 @@ class FleetScene:
         """Stop drawing a robot: another robot has its number."""
         self._drawn.pop(robot, None)
 
-    def add_pose(self, member: RecordedMember, pose: Pose2D) -> None:
+    def add_pose(self, member: Member, pose: Pose2D) -> None:
         """Move a robot, and add to its trail."""
         x, y = self._here(member, pose.x, pose.y)
         placed = Pose2D(x, y, pose.yaw + member.seat.frame.yaw)
@@ -141,7 +140,7 @@ class FleetScene:
 
         self._draw(member, "trail", 24 * len(drawn.trail), draw_trail)
 
-    def add_path(self, member: RecordedMember, xy: NDArray[np.float64]) -> None:
+    def add_path(self, member: Member, xy: NDArray[np.float64]) -> None:
         """Draw the path ahead of a robot."""
         points = np.array([self._here(member, x, y) for x, y in draw.corners(xy).tolist()])
         points = points.reshape(-1, 2)
@@ -152,7 +151,7 @@ class FleetScene:
 
         self._draw(member, "path", 12 * len(points), draw_path)
 
-    def add_map(self, member: RecordedMember, grid: OccupancyGrid) -> None:
+    def add_map(self, member: Member, grid: OccupancyGrid) -> None:
         """Draw a robot's map; unknown pixels are transparent, so that the others' maps show."""
         grid = coarser(grid, MOST_PIXELS // max(len(self._drawn), LEAST_SHARING))
         x, y = self._here(member, grid.geometry.origin.x, grid.geometry.origin.y)
@@ -173,7 +172,7 @@ class FleetScene:
 
         self._draw(member, "map", 2 * size_in_file(grid.cells), draw_map)
 
-    def add_cells(self, member: RecordedMember) -> None:
+    def add_cells(self, member: Member) -> None:
         """Draw the cells a robot has swept."""
         self._draw(
             member, "swept", GRID_BYTES + member.swept.count // 8, lambda: self._draw_swept(member)
@@ -185,7 +184,7 @@ class FleetScene:
         size = 2 * CHUNK_BYTES + sum(member.ground.count for member in self._members) // 4
         self._layers.draw(entities.FLEET_SHARES, size, self._draw_survey, self._writer.wall_ns)
 
-    def add_figures(self, member: RecordedMember, figures: dict[str, float]) -> None:
+    def add_figures(self, member: Member, figures: dict[str, float]) -> None:
         """Plot changed figures of a robot, of METRICS."""
         drawn = self._drawn[member.name]
         drawn.figures |= figures
@@ -198,7 +197,7 @@ class FleetScene:
 
         self._draw(member, "metrics", CHUNK_BYTES * (len(drawn.figures) - 1), draw_figures)
 
-    def enter(self, member: RecordedMember, state: str, why: str = "") -> None:
+    def enter(self, member: Member, state: str, why: str = "") -> None:
         """Show that a robot is in a state from now on; log it."""
         drawn = self._drawn[member.name]
         if not state or drawn.state == state:
@@ -251,9 +250,7 @@ class FleetScene:
         self._framed = None
         self._show()
 
-    def _draw(
-        self, member: RecordedMember, layer: str, size: int, make: Callable[[], None]
-    ) -> None:
+    def _draw(self, member: Member, layer: str, size: int, make: Callable[[], None]) -> None:
         name = f"{layer}/{member.name}"
         self._layers.draw(name, CHUNK_BYTES + size, make, self._writer.wall_ns)
 
@@ -271,13 +268,13 @@ class FleetScene:
             self._anchor = Anchor.near(x, y)
         return self._anchor
 
-    def _here(self, member: RecordedMember, x: float, y: float) -> tuple[float, float]:
+    def _here(self, member: Member, x: float, y: float) -> tuple[float, float]:
         """Return where a point of a robot's map frame is drawn."""
         x, y = member.placed(x, y)
         anchor = self._anchored(x, y)
         return x - anchor.x, y - anchor.y
 
-    def _draw_swept(self, member: RecordedMember) -> None:
+    def _draw_swept(self, member: Member) -> None:
         cells = member.swept.cells()
         window = window_of(cells)
         if window is None:
@@ -325,11 +322,11 @@ class FleetScene:
             self._writer.show(build_layout(robots, known or NO_MAP))
 
 
-def _world(member: RecordedMember, name: str) -> str:
+def _world(member: Member, name: str) -> str:
     return robot_entity(member.name, f"world/{name}")
 
 
-def _colour(member: RecordedMember) -> tuple[int, int, int]:
+def _colour(member: Member) -> tuple[int, int, int]:
     return colour_of(member.number)
 
 

@@ -125,7 +125,7 @@ class FleetView:
 
     def __init__(self, fleet: str) -> None:
         self.fleet = fleet
-        self.members: Members[Member] = Members(Member)
+        self.members = Members()
         self.events = EventLog()
         self.trouble = ""
         self.others: set[str] = set()

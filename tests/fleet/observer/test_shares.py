@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.fleet.observer.members import GONE_NS, Member, Members
+from fasaco_edge.fleet.observer.members import GONE_NS, Members
 from fasaco_edge.fleet.observer.survey import NOBODY, owners_of, survey_of
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.wire.documents.fleet import FleetPart
@@ -19,7 +19,7 @@ PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (0, 0)),
 @pytest.fixture
 def halved():
     """Two robots that have divided a hall."""
-    members = Members(Member)
+    members = Members()
     assert survey_of(members, 0).geometry is None
     for name in ("a", "b"):
         members.receive(name, member(division=7, by="a", parts=PARTS), SECOND)
