@@ -23,43 +23,24 @@ from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
 
-# Largest width of names, besides a third of the table; least width of a table with units; largest
-# width of a table [characters].
-LEAST_NAME, UNITS, WIDEST = 12, 40, 80
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
+# Largest width of the table [characters].
+WIDEST = 80
 
 
-def robot_table(robots: Sequence[FleetRobot], width: int, lines: int) -> Table:
-    """Return a table of robots of a given width, in at most ``lines`` >= 1 lines."""
-    table = Table.grid(padding=(0, 1), pad_edge=False)
-    table.width = width = min(width, WIDEST)
-    longest = max([len(robot.name) for robot in robots], default=5)
-    # If each robot has room for a second line, its activity is shown in full.
-    is_folded = 2 * len(robots) < lines
-    name = min(max(longest, 5), max(LEAST_NAME, width // 3))
-    table.add_column(width=name, no_wrap=True, overflow="ellipsis")
-    table.add_column(ratio=1, no_wrap=not is_folded, overflow="fold" if is_folded else "ellipsis")
-    unit = " m2" if width >= UNITS else ""
-    heads = (f"swept{unit}", f"left{unit}")
-    for head in heads:
-        table.add_column(width=max(len(head), 6 if unit else 5), justify="right", no_wrap=True)
-    table.add_row(*(Text(head, FAINT) for head in ("robot", "does", *heads)))
-    shown = robots if len(robots) < lines else robots[: max(lines - 2, 0)]
-    for robot in shown:
-        table.add_row(*_row(robot))
-    if more := len(robots) - len(shown):
-        table.add_row("", Text(f"{more} more", FAINT))
+def robot_table(robots: Sequence[FleetRobot], width: int) -> Table:
+    """Return a table of robots of a given width, a line each."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style=FAINT)
+    table.width = min(width, WIDEST)
+    table.add_column("robot", no_wrap=True, overflow="ellipsis", max_width=max(width // 3, 5))
+    table.add_column("does", ratio=1, no_wrap=True, overflow="ellipsis")
+    table.add_column("swept m2", justify="right", no_wrap=True)
+    table.add_column("left m2", justify="right", no_wrap=True)
+    for robot in robots:
+        name = Text(robot.name, FAINT if robot.silent_s is not None else "")
+        left = "-" if robot.left_cells is None else f"{robot.left_cells * robot.cell_m2:.1f}"
+        table.add_row(name, _doing(robot), f"{robot.swept_cells * robot.cell_m2:.1f}", left)
     return table
-
-
-def _row(robot: FleetRobot) -> list[Text]:
-    left = "-" if robot.left_cells is None else f"{robot.left_cells * robot.cell_m2:.1f}"
-    return [
-        Text(robot.name, FAINT if robot.silent_s is not None else ""),
-        _doing(robot),
-        Text(f"{robot.swept_cells * robot.cell_m2:.1f}"),
-        Text(left),
-    ]
 
 
 def _doing(robot: FleetRobot) -> Text:
@@ -107,26 +88,18 @@ class FleetPage:
         blocks, robots, layout = self._blocks, view.robots(now), Layout.of(width, height)
         page = blocks.block(headline(view, robots, now, width), width, 1)
         # The table takes the line of the legend.
-        page += self._table(view, robots, now, width, min(layout.lines + 1, height - 1))
+        room = min(layout.lines + 1, height - 1)
+        totals = total_rows(view.floor, view.unheard(now), width, blocks.glyphs)
+        if len(robots) + 2 + len(totals) > room:
+            totals = []
+        shown = Group(robot_table(robots, width), "", *totals) if robots else Text("")
+        page += blocks.block(shown, width, room)
         if layout.entries:
             key = (view.events.count, width, layout)
             page += blocks.keep(
                 "log", key, lambda: blocks.log(view.events, width, layout.entries, None)
             )
         return page + [" " * width] * (height - len(page))
-
-    def _table(
-        self, view: FleetView, robots: Sequence[FleetRobot], now: float, width: int, lines: int
-    ) -> list[str]:
-        if not robots or not lines:
-            return self._blocks.block(Text(""), width, lines)
-        totals = total_rows(view.floor, view.unheard(now), width, self._blocks.glyphs)
-        room = lines - len(totals) - 1
-        if room <= len(robots):
-            return self._blocks.block(robot_table(robots, width, lines), width, lines)
-        return self._blocks.block(
-            Group(robot_table(robots, width, room), "", *totals), width, lines
-        )
 
 
 def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: int) -> Text:
