@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -19,8 +19,8 @@ from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.mission.division import Robot, balanced_handicaps_s, middles
 from fasaco_edge.fleet.mission.division import divide as divide_floor
 from fasaco_edge.fleet.mission.travel import Travel
-from fasaco_edge.fleet.planning.bound import longest_bound
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.planners.bound import lower_bound_steps
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
@@ -98,7 +98,7 @@ def divide(lattice: CoverageLattice, fleet: Fleet, stop: StoppingCriterion) -> D
         starts = [fleet.starts[robot] for robot in robots]
         travel = Travel(lattice, np.flatnonzero(ground), 1)
         away = travel.times_s(starts, np.ones(len(starts))).min(axis=0).round().astype(np.int64)
-        least = longest_bound(lattice, starts, ground, away, returns=fleet.returns)
+        least = _least_steps(lattice, starts, ground, away, returns=fleet.returns)
         cells, bound = cells + len(travel.cells), max(bound, least)
         search.divide(travel, robots)
     search.go_on()
@@ -111,6 +111,43 @@ def _reached(lattice: CoverageLattice, start: Cell, number: int) -> NDArray[np.b
         return CoverageProblem.of(lattice, start).to_cover
     except FasacoError as error:
         raise type(error)(f"robot {number}: {error}") from error
+
+
+def _least_steps(
+    lattice: CoverageLattice,
+    starts: Sequence[Cell],
+    reached: NDArray[np.bool_],
+    away: NDArray[np.int64],
+    *,
+    returns: bool,
+) -> int:
+    """Return a lower bound on the steps of the longest walk, for any division of the cells.
+
+    Walks of k robots that return, joined at neighbouring cells by at most 2 (k - 1) further steps,
+    are one tour over everything: together they have at least as many steps as that tour's bound,
+    less the further steps. An even share of that is a bound, and so is an even share of the visits
+    of one colour of a chessboard, and the way to the farthest cell and back.
+
+    Args:
+        lattice: the cells where robots fit.
+        starts: where they start.
+        reached: bool (rows, cols), the cells to cover: connected, with the starts in them.
+        away: int64 (n,), from the nearest start to each cell [steps].
+        returns: whether each robot returns to its start.
+    """
+    cells, robots = int(np.count_nonzero(reached)), len(starts)
+    if not returns:
+        return max(int(away.max()), -(-(cells - robots) // robots))
+    least = 2 * int(away.max())
+    if cells <= robots:
+        return least
+    # If robots stay at their starts, which they cover without a step, the others have longer walks.
+    rows, cols = np.nonzero(reached)
+    odd = int(np.count_nonzero((rows + cols) & 1))
+    problem = CoverageProblem.of(lattice, starts[0], end=starts[0], reachable=reached)
+    tour = lower_bound_steps(replace(problem, to_cover=reached))
+    share = -(-max(2 * max(odd, cells - odd), tour - 2 * (robots - 1)) // robots)
+    return max(least, share + share % 2)
 
 
 class _Search:
