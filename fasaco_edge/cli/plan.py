@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     )
     _check_together(args)
     if args.robots or args.robots_xy:
-        from fasaco_edge.fleet.cli.plan import plan_fleet
+        from fasaco_edge.cli.fleet_wing import plan_fleet
 
         return plan_fleet(args, request)
     if args.passes is not None:
