@@ -9,8 +9,7 @@ A robot without a part stands while the others make progress: it would be in the
 Numbers of divisions: which division is the newest, of those made here and those received.
 
 The higher number is newer; between equal numbers the author's name that sorts first wins. Numbers
-too far ahead are errors of their sender, unless a robot keeps sending them: it then has numbered
-further divisions while out of range.
+too far ahead are errors of their sender.
 """
 
 from __future__ import annotations
@@ -77,9 +76,8 @@ class Remainder:
 
 
 # Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
-MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
-# How long a number ahead, but below the last limit, is sent until it is accepted [s].
-BELIEVED_S = 10.0
+# A robot out of range for a day is not that far behind.
+MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 
 
 class DivisionNumbers:
@@ -94,8 +92,6 @@ class DivisionNumbers:
         self.number = 0
         self.by = ""
         self._robot, self._others = robot, others
-        # Times of the first message of each robot whose number is too far ahead [s].
-        self._too_far: dict[str, float] = {}
 
     def newer(self) -> MemberReceived | None:
         """Return the newest division received above ``number`` that has a part for this robot.
@@ -128,12 +124,7 @@ class DivisionNumbers:
         """Return the highest number that is no error."""
         numbers = self._others.division_numbers()
         first = min((number for number in numbers.values() if number), default=0)
-        most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-        too_far = {name for name, number in numbers.items() if most < number <= MOST_FIRST}
-        newest = {name: self._others.known[name].received_at for name in too_far}
-        self._too_far = {name: self._too_far.get(name, at) for name, at in newest.items()}
-        is_long = {name for name in too_far if newest[name] - self._too_far[name] >= BELIEVED_S}
-        return max([most, *(numbers[name] for name in is_long)])
+        return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
 
 
 class AtWork:
