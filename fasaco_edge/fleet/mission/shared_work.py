@@ -154,18 +154,11 @@ class AtWork:
         divided_at: float,
         now: float,
     ) -> list[Robot]:
-        """Return robots of the last division that take part, but are out of this robot's reach.
+        """Return robots of the last division that take part, but not among those in reach.
 
-        Its map shows no way to them, or their messages no longer arrive, but the robot that made
-        the division still reaches them. If left out, they would make a division of their own, and
-        leave out the robots that they do not reach.
-
-        Args:
-            division: the last division.
-            lattice: the cells to divide.
-            robots: the robots that this one reaches.
-            divided_at: when the last division was made or taken over [s].
-            now: time [s].
+        This robot's map shows no way to them, or their messages no longer arrive, but the robot
+        that made the division still reaches them. If left out, they would make a division of their
+        own, and leave out the robots that they do not reach.
         """
         found, seen = [], {robot.name for robot in robots}
         last = () if division is None else zip(division.robots, division.seeds, strict=True)

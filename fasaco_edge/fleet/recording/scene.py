@@ -17,7 +17,6 @@ from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
 from fasaco_edge.fleet.observer.members import GONE, Member, Members
 from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.fleet.recording.layout import (
-    RobotRow,
     build_layout,
     card_of,
     colour_of,
@@ -217,19 +216,8 @@ class FleetScene:
 
     def describe(self, title: str) -> None:
         """Show the card: each robot's activity."""
-        cell_m2 = {member.name: member.seat.cell_m**2 for member in self._members}
-        rows = [
-            RobotRow(
-                name=member.name,
-                number=member.number,
-                state=self._drawn[member.name].state,
-                swept_m2=member.swept.count * cell_m2[member.name],
-                share_m2=self._survey.left[member.name] * cell_m2[member.name],
-                waits_for=member.newest.waits_for,
-            )
-            for member in self._members
-        ]
-        card = card_of(title, rows, self._survey.twice_m2)
+        states = {name: drawn.state for name, drawn in self._drawn.items()}
+        card = card_of(title, self._members, states, self._survey)
         if card == self._card:
             return
         self._card = card
