@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.kind import fleet_of
-from fasaco_edge.fleet.mission.shared import SweptQueue
+from fasaco_edge.fleet.mission.tiles import SweptQueue
 from fasaco_edge.mission.core.events import MemberReceived
 
 if TYPE_CHECKING:

@@ -17,10 +17,9 @@ from fasaco_edge.fleet.mission.shared import (
     MOST_ROBOTS,
     MOST_TILES,
     SharedProgress,
-    SweptQueue,
 )
 from fasaco_edge.fleet.mission.shared_work import MOST_AHEAD
-from fasaco_edge.fleet.mission.tiles import TILE_BYTES
+from fasaco_edge.fleet.mission.tiles import TILE_BYTES, SweptQueue
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
