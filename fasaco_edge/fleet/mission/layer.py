@@ -234,7 +234,7 @@ class FleetLayer(Company):
             # Other robots refuse messages with more parts.
             robots = robots[: MOST_ROBOTS + 1]
             divided = divide(joint.lattice, left, robots, before, self._turn_steps)
-            if before is None or not divided.is_like(before):
+            if divided != before:
                 self.numbers.count_on()
                 self._division = divided if len(robots) > 1 else None
         self._divided_at, self._owners = now, (None, self._owners[1])
@@ -286,7 +286,7 @@ class FleetLayer(Company):
     ) -> str:
         """Return why the parts should change, or ""; ``names``: the robots that it can reach."""
         owners = self._owners_on(division, joint)
-        cells = np.bincount(owners[left], minlength=len(division.robots))
+        cells = np.bincount(owners[left], minlength=len(division.parts))
         if not cells[division.names.index(self._robot)]:
             # A division that gave this robot no part would give it none again soon after.
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
@@ -295,7 +295,7 @@ class FleetLayer(Company):
         # Only a robot that can reach all of them knows all cells left to each.
         if not names.issuperset(division.names):
             return ""
-        steps_s = np.array([robot.step_s for robot in division.robots])
+        steps_s = np.array([part.step_s for part in division.parts])
         even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
         is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
         return "parts have become uneven" if is_uneven else ""

@@ -161,18 +161,17 @@ class AtWork:
         own, and leave out the robots that they do not reach.
         """
         found, seen = [], {robot.name for robot in robots}
-        last = () if division is None else zip(division.robots, division.seeds, strict=True)
-        for robot, seed in last:
-            if robot.name in seen or self.is_gone(robot.name, divided_at, now):
+        for part in () if division is None else division.parts:
+            if part.robot in seen or self.is_gone(part.robot, divided_at, now):
                 continue
-            member = self._others.known.get(robot.name)
+            member = self._others.known.get(part.robot)
             if member is None or member.absence(now):
-                found.append(Robot(robot.name, seed, robot.step_s))
+                found.append(Robot(part.robot, part.seed, part.step_s))
                 continue
             row, col = lattice.cell_at(member.newest.x, member.newest.y)
             # A seed farther away does not fit into a message.
             if max(abs(row), abs(col)) <= MOST_INDEX:
-                found.append(Robot(robot.name, (row, col), member.newest.step_s))
+                found.append(Robot(part.robot, (row, col), member.newest.step_s))
         return found
 
     def is_gone(self, name: str, divided_at: float, now: float) -> bool:

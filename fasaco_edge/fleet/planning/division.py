@@ -174,7 +174,8 @@ class _Search:
         turn_steps = cost.quarter_turn_s / cost.step_s
         first = divide_floor(self._lattice, wanted, named, turn_steps=turn_steps)
         steps_s = np.full(len(robots), cost.step_s)
-        seeds, handicaps_s = list(first.seeds), np.array(first.handicaps_s, np.float32)
+        seeds = [part.seed for part in first.parts]
+        handicaps_s = np.array([part.handicap_s for part in first.parts], np.float32)
         times_s = travel.times_s(seeds, steps_s)
         owner = (times_s + handicaps_s[:, None]).argmin(axis=0)
         has_gained = self._offer(travel, robots, owner)
