@@ -9,11 +9,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fasaco_edge.fleet.cli.demo import apart
     from fasaco_edge.fleet.cli.mission import command_fleet
     from fasaco_edge.fleet.cli.plan import plan_fleet
     from fasaco_edge.fleet.cli.review import print_fleet
     from fasaco_edge.fleet.cli.watch import fleet_on_bus
+    from fasaco_edge.fleet.mission.travel import apart
     from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
     from fasaco_edge.fleet.review.drawing import draw_fleet_mission
 
@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "apart": "cli.demo",
+    "apart": "mission.travel",
     "command_fleet": "cli.mission",
     "draw_fleet_mission": "review.drawing",
     "file_name": "recording.recorder",

@@ -20,8 +20,15 @@ from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
 from fasaco_edge.fleet.observer.members import JOINED, Member, Members
 from fasaco_edge.fleet.recording.layout import build_layout
-from fasaco_edge.fleet.recording.members import Unnoted, in_force, noted
-from fasaco_edge.fleet.recording.notes import NOTES_VERSION, Note, NoteBatch, encode_notes
+from fasaco_edge.fleet.recording.notes import (
+    NOTES_VERSION,
+    Note,
+    NoteBatch,
+    Unnoted,
+    encode_notes,
+    in_force,
+    noted,
+)
 from fasaco_edge.fleet.recording.scene import FleetScene
 from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
