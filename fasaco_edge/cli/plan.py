@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     )
     _check_together(args, request)
     if args.robots or args.robots_xy:
-        from fasaco_edge.fleet.cli.plan import plan_fleet
+        from fasaco_edge.cli.fleet_wing import plan_fleet
 
         return plan_fleet(args, request)
     stages = stages_of_plan(search.planner, has_curves=robot.turn_radius_m > 0.0)

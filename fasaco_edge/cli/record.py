@@ -98,7 +98,7 @@ def _record(args: argparse.Namespace) -> int:
     else:
         config, bus = read_config(args.config)
     if args.fleet is not None:
-        from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
+        from fasaco_edge.cli.fleet_wing import file_name, run_fleet_recorder
 
         budget = budget_of(config, file_name(args.fleet))
         return run_fleet_recorder(config, bus, args.fleet, Output(args.out, budget))

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         if args.fleet is None:
             _watch_robot(args, keys, bus)
         else:
-            from fasaco_edge.fleet.cli.watch import fleet_on_bus
+            from fasaco_edge.cli.fleet_wing import fleet_on_bus
 
             with fleet_on_bus(args.fleet, keys, bus, out()) as (watched, no_answer):
                 _watch(args, watched, no_answer)

@@ -5,6 +5,7 @@ mission/layer        the other robots, and this one's part of the remaining area
 mission/giving_way   when the robot waits for other robots, and makes way for them
 mission/shared       cells that the others have swept
 mission/division     who sweeps what, while a mission goes on
+mission/message      what this robot sends to the others
 
 planning             one walk for each of several robots on a known map
 daemon/exchange      the messages of a fleet, received and sent

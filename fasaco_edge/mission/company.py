@@ -20,9 +20,9 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 if TYPE_CHECKING:
     # For types only: an idle daemon loads no kernels.
     from fasaco_edge.grid.lattice import Cell
-    from fasaco_edge.mission.core.events import MemberReceived, PathUpdate
+    from fasaco_edge.mission.core.doing import Doing
+    from fasaco_edge.mission.core.events import MemberReceived, State
     from fasaco_edge.mission.map.reachable_area import ReachableArea
-    from fasaco_edge.mission.orders.order import Errand
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
 Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
@@ -163,11 +163,10 @@ class Waiting:
 
     Attributes:
         waits_for: name of the robot that it waits for; "" for none.
-        reason: the wait as text.
         is_near: whether another robot is near.
     """
 
-    waits_for = reason = ""
+    waits_for = ""
     is_near = False
 
     def succeed(self, before: Waiting) -> None:
@@ -177,15 +176,15 @@ class Waiting:
         """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
         return np.zeros((0, 2))
 
-    def look_around(self, now: float) -> None:
-        """Note whether another robot is near."""
+    def decide(self, state: State, now: float, *, may_drive: bool) -> Doing | None:
+        """Return what the robot does while it waits or makes way; None if it need not.
 
-    def look(self, now: float, *, has_work: bool = True, errand: Errand = "") -> PathUpdate | None:
-        """Decide again after ``look_around``; return the path to publish, if any."""
+        Args:
+            state: of the mission so far.
+            now: time [s].
+            may_drive: whether inputs, map and dock let the robot drive.
+        """
         return None
-
-    def end(self) -> None:
-        """End the wait."""
 
     def why_stuck(self, now: float) -> str:
         """Return why the robot seems stuck for good, or ""."""

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.route import Route
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
     from fasaco_edge.mission.map.map_state import MapState
+    from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
 class CompanyKind:
@@ -26,7 +27,12 @@ class CompanyKind:
         return Company()
 
     def waiting(
-        self, config: MissionConfig, map_state: MapState, route: Route, company: Company
+        self,
+        config: MissionConfig,
+        map_state: MapState,
+        orders: Sequencer,
+        route: Route,
+        company: Company,
     ) -> Waiting:
         """Return the part that decides when the robot waits for others."""
         return Waiting()

@@ -8,7 +8,7 @@ import math
 import statistics
 import time
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.random import PCG64
@@ -22,12 +22,11 @@ from fasaco_edge.bench.benchmark import (
     add_grid_options,
     positive,
 )
-from fasaco_edge.fleet.planning.division import Division, Fleet, divide
+from fasaco_edge.fleet.planning.division import Fleet, divide
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.grids import NamedGrid, read_grid
-from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
 from tests.benchmarks.buildings import building
 from tests.benchmarks.harness import WrongWalkError, check_names, grid_name
 from tests.benchmarks.judge import check_walk, reachable
@@ -50,61 +49,65 @@ MEAN = "mean"
 
 @dataclass(frozen=True, slots=True)
 class SharedWalks:
-    """A building that robots share, each on a walk that returns to its start.
+    """Walks over a building that robots share, each back to its start; legal and complete.
 
     Attributes:
-        building, robots: the question.
+        building, robots, starts, seed: the question; ``starts`` is spread or together.
         cells: to cover.
         longest_steps: steps of the longest walk.
         steps: of all walks.
         bound_steps: the lower bound of the longest walk.
+        ratio: the longest walk's steps over an even share of the cells.
         passed_twice: share of the cells that two or more robots pass.
         cpu_s: processor time [s].
     """
 
     building: str
     robots: int
+    starts: str
+    seed: int
     cells: int
     longest_steps: int
     steps: int
     bound_steps: int
+    ratio: float
     passed_twice: float
     cpu_s: float
 
-    @property
-    def ratio(self) -> float:
-        """The longest walk's steps over an even share of the cells."""
-        return self.longest_steps * self.robots / self.cells
-
-    @property
-    def bound_ratio(self) -> float:
-        """Its lower bound over an even share of the cells."""
-        return self.bound_steps * self.robots / self.cells
-
 
 def plan_shared(
-    grid: NamedGrid, fleet: Fleet, stop: StoppingCriterion
-) -> tuple[SharedWalks, Division]:
-    """Plan one walk for each robot; return the figures, and the walks."""
+    grid: NamedGrid, reached: NDArray[np.bool_], fleet: Fleet, how: str, budget_s: float
+) -> SharedWalks:
+    """Plan one walk for each robot, within a processor time [s], and judge all.
+
+    Raises:
+        WrongWalkError: a walk is not legal, or together they leave cells out.
+    """
     began = time.process_time()
-    division = divide(grid.lattice, fleet, stop)
+    # Other programs do not take of processor time.
+    division = divide(grid.lattice, fleet, lambda _: time.process_time() - began >= budget_s)
     cpu_s = time.process_time() - began
-    window = grid.lattice.window
+    corner = grid.lattice.window.row0, grid.lattice.window.col0
+    walks = [walk - corner for walk in division.walks]
+    starts = [grid.lattice.local(start) for start in fleet.starts]
+    judge_walks(grid.lattice.steps, reached, walks, starts)
     times = np.zeros(grid.lattice.states.shape, np.int64)
-    for walk in division.walks:
-        times[tuple((np.unique(walk, axis=0) - (window.row0, window.col0)).T)] += 1
-    steps = [len(walk) - 1 for walk in division.walks]
-    shared = SharedWalks(
+    for walk in walks:
+        times[tuple(np.unique(walk, axis=0).T)] += 1
+    steps = [len(walk) - 1 for walk in walks]
+    return SharedWalks(
         building=grid.name,
         robots=len(steps),
+        starts=how,
+        seed=fleet.seed,
         cells=division.cells,
         longest_steps=max(steps),
         steps=sum(steps),
         bound_steps=division.lower_bound_steps,
+        ratio=round(max(steps) * len(steps) / division.cells, 4),
         passed_twice=round(np.count_nonzero(times > 1) / division.cells, 4),
         cpu_s=round(cpu_s, 3),
     )
-    return shared, division
 
 
 def drawn_starts(cells: NDArray[np.int64], count: int, seed: int) -> list[Cell]:
@@ -112,41 +115,6 @@ def drawn_starts(cells: NDArray[np.int64], count: int, seed: int) -> list[Cell]:
     random = Random(PCG64((seed, count)))
     chosen = random.choice(cells, min(count, len(cells)), replace=False)
     return [(row, col) for row, col in chosen.tolist()]
-
-
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """Walks over a building that robots share, found legal and complete.
-
-    Attributes:
-        starts, seed: the question; ``starts`` is spread or together.
-        walks: their figures.
-    """
-
-    starts: str
-    seed: int
-    walks: SharedWalks
-
-    @property
-    def steps_ratio(self) -> float:
-        """The steps of all walks over the cells."""
-        return self.walks.steps / self.walks.cells
-
-    @property
-    def gap(self) -> float:
-        """How far the longest walk is above its bound."""
-        return self.walks.longest_steps / self.walks.bound_steps - 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class ProcessorTime:
-    """Stops after some seconds of processor time, which other programs do not take."""
-
-    seconds: float
-    began: float = field(default_factory=time.process_time)
-
-    def __call__(self, progress: SearchProgress) -> bool:
-        return time.process_time() - self.began >= self.seconds
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -183,7 +151,7 @@ def _generated(args: argparse.Namespace) -> int:
     return 0 if _names(args) else 3
 
 
-def _measure(args: argparse.Namespace, say: Say) -> Generator[Judged, None, None]:
+def _measure(args: argparse.Namespace, say: Say) -> Generator[SharedWalks, None, None]:
     check_names(_names(args))
     warm_up()
     cost = CoverageCost(STEP_S, QUARTER_TURN_S if args.cost == "turns" else 0.0)
@@ -195,10 +163,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Judged, None, None
             starts = starts_of(reached, robots, how, seed)
             placed = [(row + window.row0, col + window.col0) for row, col in starts]
             fleet = Fleet(placed, cost, seed=seed, threads=args.threads)
-            shared, division = plan_shared(grid, fleet, ProcessorTime(args.budget))
-            walks = [walk - (window.row0, window.col0) for walk in division.walks]
-            judge_walks(grid.lattice.steps, reached, walks, starts)
-            yield Judged(how, seed, shared)
+            yield plan_shared(grid, reached, fleet, how, args.budget)
 
 
 def starts_of(reached: NDArray[np.bool_], robots: int, how: str, seed: int) -> list[Cell]:
@@ -241,55 +206,37 @@ def judge_walks(
         raise WrongWalkError(f"{len(walks)} robots leave {left} cells out")
 
 
-def _row(plans: Sequence[Judged]) -> tuple[str, ...]:
+def _row(plans: Sequence[SharedWalks]) -> tuple[str, ...]:
     """Return means over plans of one question, from the robots on."""
     figures = [
         (
-            plan.walks.ratio,
-            plan.walks.bound_ratio,
-            plan.gap,
-            plan.steps_ratio,
-            plan.walks.passed_twice,
+            plan.ratio,
+            plan.bound_steps * plan.robots / plan.cells,
+            plan.longest_steps / plan.bound_steps - 1.0,
+            plan.steps / plan.cells,
+            plan.passed_twice,
         )
         for plan in plans
     ]
     longest, bound, gap, steps, twice = map(statistics.mean, zip(*figures, strict=True))
-    return (
-        str(plans[0].walks.robots),
-        plans[0].starts,
-        f"{longest:.3f}",
-        f"{bound:.3f}",
-        f"{gap:.1%}",
-        f"{steps:.3f}",
-        f"{twice:.1%}",
-    )
+    ratios = f"{longest:.3f}", f"{bound:.3f}", f"{gap:.1%}", f"{steps:.3f}", f"{twice:.1%}"
+    return str(plans[0].robots), plans[0].starts, *ratios
 
 
-def _report(args: argparse.Namespace, plans: Sequence[Judged]) -> Report:
+def _report(args: argparse.Namespace, plans: Sequence[SharedWalks]) -> Report:
     rows = [
-        (plan.walks.building, str(plan.walks.cells), *_row([plan]))
-        for plan in sorted(plans, key=lambda plan: (plan.walks.robots, plan.starts))
+        (plan.building, str(plan.cells), *_row([plan]))
+        for plan in sorted(plans, key=lambda plan: (plan.robots, plan.starts))
     ]
     for robots, how in itertools.product(args.robots, args.starts):
-        some = [plan for plan in plans if (plan.walks.robots, plan.starts) == (robots, how)]
+        some = [plan for plan in plans if (plan.robots, plan.starts) == (robots, how)]
         if len(some) > 1:
             rows.append((MEAN, "", *_row(some)))
     return Report(
         title=f"buildings shared by robots that return, {args.budget:g} s, {args.cost}",
         header=HEADER,
         rows=tuple(rows),
-        figures={
-            "budget_s": args.budget,
-            "plans": [
-                {
-                    "starts": plan.starts,
-                    "seed": plan.seed,
-                    **asdict(plan.walks),
-                    "ratio": round(plan.walks.ratio, 4),
-                }
-                for plan in plans
-            ],
-        },
+        figures={"budget_s": args.budget, "plans": [asdict(plan) for plan in plans]},
         goals=(),
         remarks=(
             "longest: steps of the longest walk, over an even share of the cells. bound: no "

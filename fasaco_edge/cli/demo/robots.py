@@ -105,7 +105,7 @@ def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
     first = start_point(file, truth, args.robot_radius)
     if args.robots == 1:
         return [DemoRobot(Keys().robot, first, out)]
-    from fasaco_edge.fleet.cli.demo import apart
+    from fasaco_edge.cli.fleet_wing import apart
 
     lattice = CoverageLattice.from_map(truth, Footprint(args.cell, args.robot_radius))
     starts = [first, *apart(lattice, first, args.robots - 1)]

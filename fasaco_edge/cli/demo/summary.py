@@ -222,7 +222,7 @@ def _draw(args: argparse.Namespace, truth: _Truth, summary: Summary) -> None:
     lattice = CoverageLattice.from_map(truth.grid, Footprint(args.cell, args.robot_radius))
     unswept = MapLayer(geometry, truth.floor.unswept)
     if len(truth.trails) > 1:
-        from fasaco_edge.fleet.review.drawing import draw_fleet_mission
+        from fasaco_edge.cli.fleet_wing import draw_fleet_mission
 
         swept = [MapLayer(geometry, floor.swept) for floor in truth.floors]
         names = [robot.name for robot in summary.robots]

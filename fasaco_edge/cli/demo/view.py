@@ -136,7 +136,7 @@ class LiveView:
     def _watched(self, stack: ExitStack) -> Watched:
         keys = Keys(self._robots[0])
         if len(self._robots) > 1:
-            from fasaco_edge.fleet.cli.watch import fleet_on_bus
+            from fasaco_edge.cli.fleet_wing import fleet_on_bus
 
             watched, _ = stack.enter_context(fleet_on_bus(FLEET, keys, self._bus, err()))
             return watched

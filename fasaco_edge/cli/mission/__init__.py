@@ -184,7 +184,7 @@ def run(args: argparse.Namespace) -> int:
         asked["discard"] = True
     is_list = args.mission_command == "keep-out" and args.keep_out_action == "list"
     if args.fleet is not None:
-        from fasaco_edge.fleet.cli.mission import command_fleet
+        from fasaco_edge.cli.fleet_wing import command_fleet
 
         return command_fleet(args, asked, names_of if is_list else None)
     reply = _answer(args, asked)

@@ -73,8 +73,7 @@ figures of several robots:
   swept_twice      cells that two or more robots pass, driving through included
   unreachable_cells
                    cells that none of the robots can come to
-  rounds           pieces of the search, of all areas: of its annealing and, where turns
-                   take time, of sharing two robots' walks anew
+  rounds           divisions tried, and further searches for the longest walk
 
 colony-search searches until its budget ends, the walk is proven optimal, or nothing is
 gained for long: a complete walk within milliseconds, then better ones by local search.

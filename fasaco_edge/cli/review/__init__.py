@@ -135,7 +135,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.recording.read.frames import is_fleet_recording
 
     if is_fleet_recording(args.recordings[0]):
-        from fasaco_edge.fleet.cli.review import print_fleet
+        from fasaco_edge.cli.fleet_wing import print_fleet
 
         return print_fleet(args)
     import msgspec

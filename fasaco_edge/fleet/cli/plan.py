@@ -73,38 +73,25 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
 
 
 def _check(args: argparse.Namespace, request: PlanRequest) -> None:
-    search = request.search
-    if args.end not in (ANYWHERE, HOME):
-        raise BadConfiguration(
-            f"--end {args.end[0]},{args.end[1]}: several robots cannot end in one cell",
-            hint="choose --end anywhere or --end home",
-        )
-    if not search.has_local_search:
-        raise BadConfiguration(
-            "several robots are planned for by colony-search", hint="leave --planner out"
-        )
-    if request.line != CELLS:
-        raise BadConfiguration(
-            f"--line {request.line}: a line over the floor is for one robot",
-            hint="leave --line out",
-        )
-    if args.pheromone_png is not None:
-        raise BadConfiguration(
-            "--pheromone-png: is of one robot's colony; several robots' walks are cut from one",
-            hint="leave --pheromone-png out, or plan for one robot",
-        )
-    of_lines = {
-        "--align": args.align,
-        "--overlap": args.overlap,
-        "--clearance": args.clearance,
-    }
-    for option, value in of_lines.items():
-        if value is not None:
-            raise BadConfiguration(
-                f"{option}: is of a line over the floor, which is for one robot",
-                hint=f"leave {option} out",
-            )
-    count = len(args.robots or args.robots_xy)
+    """Refuse what is not for several robots."""
+    search, count = request.search, len(args.robots or args.robots_xy)
+    line = "a line over the floor is for one robot"
+    refused = (
+        (args.end not in (ANYWHERE, HOME), "--end", "several robots cannot end in one cell"),
+        (
+            not search.has_local_search,
+            "--planner",
+            "several robots are planned for by colony-search",
+        ),
+        (request.line != CELLS, "--line", line),
+        (args.pheromone_png is not None, "--pheromone-png", "it is of one robot's colony"),
+        (args.align is not None, "--align", line),
+        (args.overlap is not None, "--overlap", line),
+        (args.clearance is not None, "--clearance", line),
+    )
+    for is_given, option, why in refused:
+        if is_given:
+            raise BadConfiguration(f"{option}: {why}", hint=f"leave {option} out")
     if count > MAX_FLEET_PARTS:
         raise BadConfiguration(f"at most {MAX_FLEET_PARTS} robots share a floor, got {count}")
 

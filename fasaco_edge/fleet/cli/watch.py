@@ -24,17 +24,15 @@ def fleet_on_bus(
     """Yield the watch of a fleet, and a function that returns the error for no robots."""
     view = FleetView(fleet)
     with FleetFeed(bus, keys) as feed:
-        yield FleetWatch(feed, view, console), lambda: _no_robot(keys, feed, view)
+        yield FleetWatch(feed, view, console), lambda: _no_robot(keys, view)
 
 
-def _no_robot(keys: Keys, feed: FleetFeed, view: FleetView) -> NobodyAnswersError:
+def _no_robot(keys: Keys, view: FleetView) -> NobodyAnswersError:
     """Return the error that no robot of a fleet sends messages."""
-    robots = len(feed.robots())
-    if not robots and not view.others:
+    if not view.others:
         return nobody_answers(f"{keys.base}/{VERSION}/*", ())
-    fleets = ", ".join(sorted(view.others)) or "none"
     return NobodyAnswersError(
         f"no robot of a fleet {one_line(view.fleet)!r} answers",
-        hint=f"{robots} robots are on this bus, of these fleets: {fleets}; "
+        hint=f"there are robots of these fleets: {', '.join(sorted(view.others))}; "
         "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
     )

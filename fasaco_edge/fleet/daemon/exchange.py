@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,10 +19,11 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.errors import FasacoError, FleetError
 from fasaco_edge.fleet.daemon.arrivals import FleetArrivals
 from fasaco_edge.fleet.mission.frames import FleetFrames
-from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of
-from fasaco_edge.fleet.mission.shared import MapPlace, SweptQueue
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.fleet.mission.message import Messages
+from fasaco_edge.fleet.mission.shared import MapPlace
+from fasaco_edge.fleet.mission.tiles import Placed
+from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.mission.core.events import MemberReceived, Part
 from fasaco_edge.wire.documents.fleet import (
     FLEET_VERSION,
@@ -37,7 +38,6 @@ from fasaco_edge.wire.limits import MAX_FLEET_POINTS
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
-    from fasaco_edge.fleet.mission.traffic import Points
     from fasaco_edge.mission.core.mission import Mission
 
 
@@ -158,63 +158,53 @@ class FleetSender:
     def __init__(self, publisher: Publisher, config: DaemonConfig) -> None:
         assert config.fleet
         self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
-        self._radius_m = config.robot.radius_m
         self._frame, self._origin = config.fleet.frame, _origin(config.fleet)
-        self._swept, self._ground = SweptQueue(), GroundQueue()
+        self._messages = Messages(config.robot.name, config.robot.radius_m)
         self._said: tuple[object, ...] = ()
-        self._epoch = 0
         # When a message was published, and one with tiles in turn.
         self._said_at = self._tiles_at = float("-inf")
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish a message if due; the caller catches failures."""
-        stamped = mission.pose
-        is_too_soon = now - self._said_at < LEAST_PERIOD_S
-        if is_too_soon or stamped is None or not mission.ledger.frame:
+        if now - self._said_at < LEAST_PERIOD_S:
             return
-        others = fleet_of(mission)
-        is_near, waits_for = mission.giving_way.is_near, mission.waits_for
-        key = mission.state, others.numbers.number, others.shared.epoch, waits_for
+        others, giving_way = fleet_of(mission), mission.giving_way
+        key = mission.state, others.numbers.number, others.shared.epoch, mission.waits_for
         is_news, is_due = key != self._said, now - self._tiles_at >= PERIOD_S
-        if not (is_news or is_due or is_near):
+        if not (is_news or is_due or giving_way.is_near):
+            return
+        most = TILES if is_due else FEW_TILES if is_news else 0
+        message = self._messages.next(mission, most, TILES)
+        if message is None:
             return
         self._said, self._said_at = key, now
-        most = FEW_TILES if is_news else 0
         if is_due:
-            self._tiles_at, most = now, TILES
-        tiles = mission.ledger.snapshot().tiles
-        if others.shared.epoch != self._epoch:
-            # Published changes are forgotten. Cells swept before a restart are not known.
-            before = tiles if self._epoch else None
-            self._epoch, self._swept, most = others.shared.epoch, SweptQueue(before), TILES
-        swept = self._swept.next(tiles, most)
-        kept = self._swept.kept(swept)
-        ground = self._ground.next(mission.area, most)
+            self._tiles_at = now
         member = FleetMember(
             version=FLEET_VERSION,
             fleet=self._fleet,
             cell_m=self._cell_m,
             lattice_deg=mission.rotation.deg,
             frame=self._frame_sent(mission),
-            state=str(mission.state),
-            x=round(stamped.pose.x, 3),
-            y=round(stamped.pose.y, 3),
-            step_s=others.step_s,
-            epoch=others.shared.epoch,
-            division=others.numbers.number,
+            state=message.state,
+            x=message.x,
+            y=message.y,
+            step_s=message.step_s,
+            epoch=message.epoch,
+            division=message.division,
             open_cells=mission.open_cells(),
-            swept=tuple(CellTile(*place, bits) for place, bits in swept),
-            ground=tuple(CellTile(*place, bits) for place, bits in ground),
-            by=others.numbers.by,
+            swept=_tiles(message.tiles),
+            ground=_tiles(message.ground),
+            by=message.by,
             parts=tuple(
                 FleetPart(part.robot, *part.seed, part.handicap_s, part.step_s)
-                for part in others.parts
+                for part in message.parts
             ),
-            radius_m=self._radius_m,
-            ahead=tuple((round(x, 3), round(y, 3)) for x, y in _thinned(mission.next_metres())),
-            waits_for=waits_for,
+            radius_m=message.radius_m,
+            ahead=tuple((round(x, 3), round(y, 3)) for x, y in _thinned(message.ahead)),
+            waits_for=message.waits_for,
             origin=self._origin,
-            kept=None if kept is None else tuple(CellTile(*place, bits) for place, bits in kept),
+            kept=None if message.kept is None else _tiles(message.kept),
         )
         self._publisher.put(encode_json(member))
 
@@ -227,16 +217,19 @@ class FleetSender:
         return frame if self._frame not in ("", frame) else f"{frame} of another map"
 
 
-def _thinned(points: Points) -> list[list[float]]:
+def _thinned(points: Sequence[Point]) -> Sequence[Point]:
     """Return at most as many points of a line as a message holds, evenly, with both ends [m].
 
     Cells of less than 3.2 cm have more centres in the next 2 m.
     """
-    count = len(points)
-    if count > MAX_FLEET_POINTS:
-        points = points[np.linspace(0, count - 1, MAX_FLEET_POINTS).round().astype(np.intp)]
-    found: list[list[float]] = points.tolist()
-    return found
+    if len(points) <= MAX_FLEET_POINTS:
+        return points
+    chosen = np.linspace(0, len(points) - 1, MAX_FLEET_POINTS).round().astype(int)
+    return [points[at] for at in chosen.tolist()]
+
+
+def _tiles(tiles: Iterable[Placed]) -> tuple[CellTile, ...]:
+    return tuple(CellTile(*place, bits) for place, bits in tiles)
 
 
 def _origin(fleet: FleetConfig) -> tuple[float, float, float]:
@@ -247,7 +240,7 @@ def _pose(x: float, y: float, deg: float) -> Pose2D:
     return Pose2D(x, y, math.radians(deg))
 
 
-def _placed(tiles: tuple[CellTile, ...]) -> tuple[tuple[tuple[int, int], bytes], ...]:
+def _placed(tiles: Iterable[CellTile]) -> tuple[Placed, ...]:
     return tuple(((tile.row, tile.col), tile.cells) for tile in tiles)
 
 

@@ -49,41 +49,23 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Division:
-    """Assignment of cells to robots.
+    """Assignment of cells to robots, as it is sent to other robots.
 
     Attributes:
-        robots: the robots at work, sorted by name.
-        seeds: a cell for each.
-        handicaps_s: added to the travel times from the seeds [s].
+        parts: one for each robot at work, sorted by their names.
     """
 
-    robots: tuple[Robot, ...]
-    seeds: tuple[Cell, ...]
-    handicaps_s: tuple[float, ...]
+    parts: tuple[Part, ...]
+
+    @classmethod
+    def of(cls, parts: Iterable[Part]) -> Division:
+        """Return the division of parts in any order."""
+        return cls(tuple(sorted(parts, key=lambda part: part.robot)))
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the robots."""
-        return tuple(robot.name for robot in self.robots)
-
-    @classmethod
-    def of(cls, parts: Iterable[Part]) -> Division:
-        """Return the division that another robot sent."""
-        parts = sorted(parts, key=lambda part: part.robot)
-        robots = tuple(Robot(part.robot, part.seed, part.step_s) for part in parts)
-        seeds, handicaps_s = (part.seed for part in parts), (part.handicap_s for part in parts)
-        return cls(robots, tuple(seeds), tuple(handicaps_s))
-
-    @property
-    def parts(self) -> tuple[Part, ...]:
-        """The division as it is sent to other robots."""
-        made = zip(self.robots, self.seeds, self.handicaps_s, strict=True)
-        return tuple(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in made)
-
-    def is_like(self, other: Division) -> bool:
-        """Return whether it assigns all cells as another one; places of robots do not matter."""
-        mine, theirs = ((one.names, one.seeds, one.handicaps_s) for one in (self, other))
-        return mine == theirs
+        return tuple(part.robot for part in self.parts)
 
     def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
         """Return the robot other than ``robot`` that owns most of some cells; "" for none.
@@ -92,7 +74,7 @@ class Division:
             owners: int8 (n,), the index of each cell's robot.
             robot: a name.
         """
-        cells = np.bincount(owners, minlength=len(self.robots)).tolist()
+        cells = np.bincount(owners, minlength=len(self.parts)).tolist()
         others = {name: n for name, n in zip(self.names, cells, strict=True) if n and name != robot}
         return max(others, key=lambda name: others[name], default="")
 
@@ -101,9 +83,9 @@ class Division:
         first = np.full(lattice.steps.size, np.float32(np.inf))
         owners = np.zeros(lattice.steps.size, np.int8)
         # One robot at a time: all at once would take much memory on large lattices.
-        for index, (robot, seed) in enumerate(zip(self.robots, self.seeds, strict=True)):
-            times_s = times_of(ways(lattice, seed), np.float32(robot.step_s))
-            times_s += np.float32(self.handicaps_s[index])
+        for index, part in enumerate(self.parts):
+            times_s = times_of(ways(lattice, part.seed), np.float32(part.step_s))
+            times_s += np.float32(part.handicap_s)
             is_earlier = times_s < first
             owners[is_earlier] = index
             np.minimum(first, times_s, out=first)
@@ -132,13 +114,13 @@ def divide(
     every = -(-len(cells) // MOST_CELLS) or 1
     travel = Travel(lattice, cells[::every], every)
     reached = [robot for robot in robots if travel.has_ways_from(robot.cell)]
-    divided = {robot.name: (robot, robot.cell, 0.0) for robot in robots}
+    divided = {robot.name: Part(robot.name, robot.cell, 0.0, robot.step_s) for robot in robots}
     if len(reached) > 1:
         reached.sort(key=lambda robot: robot.name)
         seeds, handicaps_s = _divided(travel, reached, before, turn_steps)
-        found = zip(reached, seeds, handicaps_s, strict=True)
-        divided |= {robot.name: (robot, seed, s) for robot, seed, s in found}
-    return Division(*zip(*(divided[name] for name in sorted(divided)), strict=True))
+        for robot, seed, handicap_s in zip(reached, seeds, handicaps_s, strict=True):
+            divided[robot.name] = Part(robot.name, seed, handicap_s, robot.step_s)
+    return Division.of(divided.values())
 
 
 def _divided(
@@ -151,9 +133,7 @@ def _divided(
     choice = _Choice(travel, starts, steps_s, _owners_before(before, robots, travel), turn_steps)
     names = [robot.name for robot in robots]
     if before is not None and set(before.names) & set(names):
-        kept = dict(
-            zip(before.names, zip(before.seeds, before.handicaps_s, strict=True), strict=True)
-        )
+        kept = {part.robot: (part.seed, part.handicap_s) for part in before.parts}
         # A seed that is out of reach on this robot's map would need a huge handicap.
         kept = {name: pair for name, pair in kept.items() if travel.has_ways_from(pair[0])}
         pairs = [kept.get(robot.name, (robot.cell, 0.0)) for robot in robots]
@@ -260,8 +240,9 @@ def _owners_before(
         return np.full(len(travel.cells), -1)
     index = {robot.name: number for number, robot in enumerate(robots)}
     numbers = np.array([index.get(name, -1) for name in before.names])
-    times_s = travel.times_s(before.seeds, np.array([robot.step_s for robot in before.robots]))
-    handicaps_s = np.array(before.handicaps_s, np.float32)
+    steps_s = np.array([part.step_s for part in before.parts])
+    times_s = travel.times_s([part.seed for part in before.parts], steps_s)
+    handicaps_s = np.array([part.handicap_s for part in before.parts], np.float32)
     owners: NDArray[np.int64] = numbers[(times_s + handicaps_s[:, None]).argmin(axis=0)]
     return owners
 

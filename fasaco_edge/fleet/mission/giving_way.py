@@ -1,7 +1,7 @@
 """Giving way: the robot waits for others of its fleet, and makes way for them.
 
 Meanwhile its path is set aside, and it resumes the path afterwards; a way home is planned again.
-``fleet.traffic`` decides what obstructs the robot.
+``fleet.mission.traffic`` decides what obstructs the robot.
 """
 
 from __future__ import annotations
@@ -31,12 +31,15 @@ from fasaco_edge.fleet.mission.traffic import (
 )
 from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.mission.company import Waiting
-from fasaco_edge.mission.core.events import PathUpdate
+from fasaco_edge.mission.core.doing import Doing
+from fasaco_edge.mission.core.events import PathUpdate, State
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.line.way import sees_on
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Errand
+from fasaco_edge.mission.orders.order_state import Stage
+from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # A robot that stands on its path within the first distance of another robot is blocked by it; least
 # motion [m].
@@ -60,7 +63,6 @@ class GivingWay(Waiting):
 
     Attributes:
         waits_for: name of the robot that it waits for; "" for none.
-        reason: the wait as text.
         is_near: whether another robot is near.
     """
 
@@ -69,15 +71,17 @@ class GivingWay(Waiting):
         robot: str,
         footprint: Footprint,
         map_state: MapState,
+        orders: Sequencer,
         route: Route,
         fleet: FleetLayer,
     ) -> None:
-        self.waits_for = self.reason = ""
+        self.waits_for = self._reason = ""
         self.is_near = False
         self._neighbours: Mapping[str, Neighbour] = {}
         self._robot, self._radius_m = robot, footprint.robot_radius_m
         self._cell_m = footprint.cell_m
-        self._map, self._route, self._fleet = map_state, route, fleet
+        self._map, self._orders = map_state, orders
+        self._route, self._fleet = route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
         # Distances of the way from other robots when it was chosen [m].
@@ -120,27 +124,48 @@ class GivingWay(Waiting):
         is_held = self.waits_for and self._route.aside is not None
         return self._held if is_held else self._route.path.ahead
 
-    def look_around(self, now: float) -> None:
-        """Note whether another robot is near: then all publish more often, even at rest."""
-        pose = self._map.pose
-        here = None if pose is None else (pose.pose.x, pose.pose.y)
+    def decide(self, state: State, now: float, *, may_drive: bool) -> Doing | None:
+        """Return what the robot does while it waits or makes way; None if it need not.
+
+        A robot whose order is over makes way, too.
+        """
+        order, pose = self._orders.order_state, self._map.pose
         self._neighbours = self._fleet.others.neighbours(now)
+        # Near another robot all publish more often, even at rest.
+        here = None if pose is None else (pose.pose.x, pose.pose.y)
         self.is_near = here is not None and _is_near(here, self._neighbours)
+        is_going = (order.order is not None or order.errand) and not order.paused
+        if not (is_going and self._fleet.has_members and may_drive):
+            self._end()
+            return None
+        # Meanwhile others may have swept the cells ahead of this waiting robot.
+        is_homing = order.stage is Stage.RETURNING
+        is_vain = bool(self.waits_for) and not is_homing and not self._orders.cells.left()
+        self._has_work = bool(order.errand) or (order.is_open and not is_vain)
+        update = self._look(now, order.errand)
+        if not self.waits_for:
+            return None
+        cell = self._map.robot_cell()
+        if order.errand or is_homing:
+            state = State.RETURNING
+        elif state is not State.DONE and cell is not None:
+            state = State.COVERING if order.is_open else State.DONE
+            if why := self._fleet.share(self._orders.cells.open_cells, cell, now):
+                self._route.want(why)
+        return Doing(state, self._reason, update)
 
     def why_stuck(self, now: float) -> str:
         """Return why the robot seems stuck for good, or ""."""
         is_stuck = now - self._waited_at <= STANDS_S and now - self._stays_since > TOO_LONG_S
         return f"{self._waited} for more than a minute" if is_stuck else ""
 
-    def end(self) -> None:
+    def _end(self) -> None:
         """End the wait."""
-        self.waits_for = self.reason = ""
+        self.waits_for = self._reason = ""
         self._refuge = None
 
-    def look(self, now: float, *, has_work: bool = True, errand: Errand = "") -> PathUpdate | None:
-        """Decide again after ``look_around``; return the path to publish, if any.
-
-        ``waits_for`` holds the result.
+    def _look(self, now: float, errand: Errand) -> PathUpdate | None:
+        """Decide whether to wait; return the path to publish, if any.
 
         A robot without work left only has paths to a refuge: it makes way, but does not wait.
         Another errand ends the wait: its way may not lead past the other robot.
@@ -155,24 +180,23 @@ class GivingWay(Waiting):
         | it was free to drive, and stood for PATIENCE_S beside another robot | is blocked by that |
         | none of these | goes on |
         """
-        self._has_work = has_work
         if errand != self._errand:
             self._errand = errand
-            self.end()
+            self._end()
         # The search for a refuge starts at the robot, which on a short cut is far from its path.
         area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
         neighbours = self._neighbours
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
         self._note_place(here, now)
         if area is None or cell is None or not self.is_near:
-            self.end()
+            self._end()
             return None
         if self._is_underway(here, neighbours, now):
             return None
         self._refuge = None
         if found := self._obstruction(here, neighbours, now):
             return self._hold(found, neighbours, area, cell, here, now)
-        self.end()
+        self._end()
         return None
 
     def _note_place(self, here: tuple[float, float], now: float) -> None:
@@ -180,7 +204,7 @@ class GivingWay(Waiting):
         if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
             self._place, self._free_since = here, now
         if self.waits_for:
-            self._waited, self._waited_at = self.reason, now
+            self._waited, self._waited_at = self._reason, now
         # A moment without an obstruction is no progress.
         has_waited = now - self._waited_at <= STANDS_S
         if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
@@ -271,7 +295,7 @@ class GivingWay(Waiting):
             # A moment without an obstruction, or another obstructing robot, is no progress.
             self._since = self._stays_since
         was_waiting = bool(self.waits_for)
-        self.waits_for, self.reason = found.robot, found.reason
+        self.waits_for, self._reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
         ahead = route.path.ahead
         # A new order has a new path.
@@ -292,13 +316,13 @@ class GivingWay(Waiting):
             if way is not None and to is not None and not self._is_in(to, here):
                 self._refuge = to
                 beside = discs(self._radius_m, neighbours)
-                update = route.publish(way, self.reason, now, beside=beside)
+                update = route.publish(way, self._reason, now, beside=beside)
                 self._apart_m = self._apart_of(spaced(self.line()), neighbours)
                 return update
             if self._fleet.others.is_avoided(found.robot):
-                self.end()
+                self._end()
                 return None
-        return route.publish(NO_CELLS, self.reason, now) if has_path else None
+        return route.publish(NO_CELLS, self._reason, now) if has_path else None
 
 
 def _is_near(here: tuple[float, float], neighbours: Mapping[str, Neighbour]) -> bool:

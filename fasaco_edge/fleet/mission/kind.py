@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.route import Route
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
     from fasaco_edge.mission.map.map_state import MapState
+    from fasaco_edge.mission.orders.sequencer import Sequencer
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +44,16 @@ class FleetKind(CompanyKind):
         return FleetLayer(self.robot, config.cost, cell_m, map_state, ledger)
 
     def waiting(
-        self, config: MissionConfig, map_state: MapState, route: Route, company: Company
+        self,
+        config: MissionConfig,
+        map_state: MapState,
+        orders: Sequencer,
+        route: Route,
+        company: Company,
     ) -> GivingWay:
         """Return the part that decides when the robot waits for others."""
         assert isinstance(company, FleetLayer)
-        return GivingWay(self.robot, config.footprint, map_state, route, company)
+        return GivingWay(self.robot, config.footprint, map_state, orders, route, company)
 
 
 def fleet_of(mission: Mission) -> FleetLayer:

@@ -36,6 +36,7 @@ UNEVEN, UNEVEN_S = 1.25, 40.0
 # Number of cells of this robot's part that another robot sweeps before a new plan: more than by
 # merely passing through. In unknown buildings a value of 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
+Mask = NDArray[np.bool_]
 LATER = "another robot has a newer division"
 
 
@@ -72,7 +73,7 @@ class FleetLayer(Company):
         # Cells that this robot tried in vain while others are at work; and those of an area that
         # it cannot reach, though another map may show a way.
         self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
-        self._shut: tuple[ReachableArea | None, NDArray[np.bool_]]
+        self._shut: tuple[ReachableArea | None, Mask]
         self._shut = None, np.zeros((0, 0), np.bool_)
         # Number of own cells that others had swept at the last plan; version of the shared progress
         # at the last check.
@@ -135,9 +136,7 @@ class FleetLayer(Company):
         if at := viewpoint(area, beyond, open_cells(beyond.lattice.window), cell):
             yield at
 
-    def _left(
-        self, open_cells: OpenCells, area: ReachableArea
-    ) -> tuple[ReachableArea, NDArray[np.bool_]]:
+    def _left(self, open_cells: OpenCells, area: ReachableArea) -> tuple[ReachableArea, Mask]:
         """Return the joint area, and which of its cells are left and untried, bool (rows, cols)."""
         joint = self._joint(area)
         left = open_cells(joint.lattice.window) & joint.reachable
@@ -156,7 +155,7 @@ class FleetLayer(Company):
         """Whether only parts of other robots are left, and these make progress."""
         return self._division is not None and self._remainder.others_go_on
 
-    def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+    def mine(self, cells: Mask, area: ReachableArea) -> Mask:
         """Return which cells are this robot's to sweep.
 
         These are all cells if none is in its part and the others make no progress. Cells that it
@@ -168,9 +167,7 @@ class FleetLayer(Company):
         part = cells & self._is_own(self._division, area)
         return part if self.others_go_on or (part & area.reachable).any() else cells
 
-    def mine_to_sweep(
-        self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
-    ) -> NDArray[np.bool_]:
+    def mine_to_sweep(self, cells: Mask, unvisited: Mask, area: ReachableArea) -> Mask:
         """Return the cells on which this robot sweeps the floor, visited or not.
 
         These are the cells of its part; or all, if its part is visited and the others make no
@@ -184,11 +181,11 @@ class FleetLayer(Company):
         has_work = (self.untried(unvisited, area) & own & area.reachable).any()
         return cells & own if has_work else cells
 
-    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+    def give_up(self, cells: Mask, area: ReachableArea) -> None:
         """Leave cells that this robot tried in vain to the others, also after new maps."""
         self._tried = area.lattice.window, cells | self._tried_on(area)
 
-    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
+    def pass_over(self, cells: Mask, area: ReachableArea) -> None:
         """Leave cells that this robot cannot reach to the others, until the next map."""
         self._shut = area, cells | (self._shut[1] if self._shut[0] is area else np.False_)
 
@@ -237,7 +234,7 @@ class FleetLayer(Company):
             # Other robots refuse messages with more parts.
             robots = robots[: MOST_ROBOTS + 1]
             divided = divide(joint.lattice, left, robots, before, self._turn_steps)
-            if before is None or not divided.is_like(before):
+            if divided != before:
                 self.numbers.count_on()
                 self._division = divided if len(robots) > 1 else None
         self._divided_at, self._owners = now, (None, self._owners[1])
@@ -259,13 +256,7 @@ class FleetLayer(Company):
         return int(np.count_nonzero(self._is_own(self._division, area) & area.reachable))
 
     def _why_anew(
-        self,
-        joint: ReachableArea,
-        left: NDArray[np.bool_],
-        robots: list[Robot],
-        now: float,
-        *,
-        at_once: bool,
+        self, joint: ReachableArea, left: Mask, robots: list[Robot], now: float, *, at_once: bool
     ) -> str:
         """Return why to divide again, or ""."""
         division = self._division
@@ -273,7 +264,12 @@ class FleetLayer(Company):
         known = set() if division is None else set(division.names)
         if len(names) == 1 and division is None:
             return ""
-        if gone := sorted(name for name in known - names if self._is_gone(name, now)):
+        gone = sorted(
+            name
+            for name in known - names - {self._robot}
+            if self._at_work.is_gone(name, self._divided_at, now)
+        )
+        if gone:
             if now - self._divided_at < EVEN_S:
                 self.others.note_left(set(gone), now)
             return f"{', '.join(gone)} no longer at work"
@@ -285,21 +281,12 @@ class FleetLayer(Company):
             return f"shared with {', '.join(more)}"
         return "" if division is None else self._why_by_parts(division, joint, left, names, now)
 
-    def _is_gone(self, name: str, now: float) -> bool:
-        """Return whether a robot of the division takes no part any more."""
-        return name != self._robot and self._at_work.is_gone(name, self._divided_at, now)
-
     def _why_by_parts(
-        self,
-        division: Division,
-        joint: ReachableArea,
-        left: NDArray[np.bool_],
-        names: set[str],
-        now: float,
+        self, division: Division, joint: ReachableArea, left: Mask, names: set[str], now: float
     ) -> str:
         """Return why the parts should change, or ""; ``names``: the robots that it can reach."""
         owners = self._owners_on(division, joint)
-        cells = np.bincount(owners[left], minlength=len(division.robots))
+        cells = np.bincount(owners[left], minlength=len(division.parts))
         if not cells[division.names.index(self._robot)]:
             # A division that gave this robot no part would give it none again soon after.
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
@@ -308,30 +295,28 @@ class FleetLayer(Company):
         # Only a robot that can reach all of them knows all cells left to each.
         if not names.issuperset(division.names):
             return ""
-        steps_s = np.array([robot.step_s for robot in division.robots])
+        steps_s = np.array([part.step_s for part in division.parts])
         even_s = UNEVEN * cells.sum() / (1.0 / steps_s).sum() + UNEVEN_S
         is_uneven = (cells * steps_s).max() > even_s and now - self._divided_at >= EVEN_S
         return "parts have become uneven" if is_uneven else ""
 
-    def untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
+    def untried(self, cells: Mask, area: ReachableArea) -> Mask:
         """Return the cells that this robot has not given up."""
         cells = cells & ~self._tried_on(area)
         return cells & ~self._shut[1] if self._shut[0] is area else cells
 
-    def _tried_on(self, area: ReachableArea) -> NDArray[np.bool_]:
+    def _tried_on(self, area: ReachableArea) -> Mask:
         return carried(self._tried[1], self._tried[0], area.lattice.window)
 
-    def _is_own(self, division: Division, area: ReachableArea) -> NDArray[np.bool_]:
+    def _is_own(self, division: Division, area: ReachableArea) -> Mask:
         """Return which cells of this robot's area are in its part."""
         joint = self._joint(area)
         return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
 
-    def _of_me(self, division: Division, joint: ReachableArea) -> NDArray[np.bool_]:
+    def _of_me(self, division: Division, joint: ReachableArea) -> Mask:
         """Return which cells of a joint area are in this robot's part."""
-        own: NDArray[np.bool_] = self._owners_on(division, joint) == division.names.index(
-            self._robot
-        )
-        return own
+        mine = division.names.index(self._robot)
+        return np.equal(self._owners_on(division, joint), mine)
 
     def _owners_on(self, division: Division, joint: ReachableArea) -> NDArray[np.int8]:
         if division is not self._division:

@@ -96,14 +96,7 @@ def _nearest(
     ends: NDArray[np.int64],
     corner: NDArray[np.int64],
 ) -> NDArray[np.int32] | None:
-    """Return the shortest way from any of ``begins`` to any of ``ends``, int32 (n, 2), or None.
-
-    Args:
-        steps: step masks, uint8 (rows, cols).
-        begins: cells in these, and how far the robot is from each [steps].
-        ends: cells in these, int64 (k, 2).
-        corner: the cell at the origin of ``steps``, int64 (2,).
-    """
+    """Return the shortest way from any of ``begins``, each with its distance from the robot."""
     best, way = float(FAR), None
     for far, begin in begins:
         away = ways_from(steps, begin[0] * steps.shape[1] + begin[1]).reshape(steps.shape)

@@ -9,8 +9,7 @@ A robot without a part stands while the others make progress: it would be in the
 Numbers of divisions: which division is the newest, of those made here and those received.
 
 The higher number is newer; between equal numbers the author's name that sorts first wins. Numbers
-too far ahead are errors of their sender, unless a robot keeps sending them: it then has numbered
-further divisions while out of range.
+too far ahead are errors of their sender.
 """
 
 from __future__ import annotations
@@ -77,9 +76,8 @@ class Remainder:
 
 
 # Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
-MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**10, 2**24
-# How long a number ahead, but below the last limit, is sent until it is accepted [s].
-BELIEVED_S = 10.0
+# A robot out of range for a day is not that far behind.
+MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 
 
 class DivisionNumbers:
@@ -94,8 +92,6 @@ class DivisionNumbers:
         self.number = 0
         self.by = ""
         self._robot, self._others = robot, others
-        # Times of the first message of each robot whose number is too far ahead [s].
-        self._too_far: dict[str, float] = {}
 
     def newer(self) -> MemberReceived | None:
         """Return the newest division received above ``number`` that has a part for this robot.
@@ -128,12 +124,7 @@ class DivisionNumbers:
         """Return the highest number that is no error."""
         numbers = self._others.division_numbers()
         first = min((number for number in numbers.values() if number), default=0)
-        most = (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-        too_far = {name for name, number in numbers.items() if most < number <= MOST_FIRST}
-        newest = {name: self._others.known[name].received_at for name in too_far}
-        self._too_far = {name: self._too_far.get(name, at) for name, at in newest.items()}
-        is_long = {name for name in too_far if newest[name] - self._too_far[name] >= BELIEVED_S}
-        return max([most, *(numbers[name] for name in is_long)])
+        return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
 
 
 class AtWork:
@@ -163,32 +154,24 @@ class AtWork:
         divided_at: float,
         now: float,
     ) -> list[Robot]:
-        """Return robots of the last division that take part, but are out of this robot's reach.
+        """Return robots of the last division that take part, but not among those in reach.
 
-        Its map shows no way to them, or their messages no longer arrive, but the robot that made
-        the division still reaches them. If left out, they would make a division of their own, and
-        leave out the robots that they do not reach.
-
-        Args:
-            division: the last division.
-            lattice: the cells to divide.
-            robots: the robots that this one reaches.
-            divided_at: when the last division was made or taken over [s].
-            now: time [s].
+        This robot's map shows no way to them, or their messages no longer arrive, but the robot
+        that made the division still reaches them. If left out, they would make a division of their
+        own, and leave out the robots that they do not reach.
         """
         found, seen = [], {robot.name for robot in robots}
-        last = () if division is None else zip(division.robots, division.seeds, strict=True)
-        for robot, seed in last:
-            if robot.name in seen or self.is_gone(robot.name, divided_at, now):
+        for part in () if division is None else division.parts:
+            if part.robot in seen or self.is_gone(part.robot, divided_at, now):
                 continue
-            member = self._others.known.get(robot.name)
+            member = self._others.known.get(part.robot)
             if member is None or member.absence(now):
-                found.append(Robot(robot.name, seed, robot.step_s))
+                found.append(Robot(part.robot, part.seed, part.step_s))
                 continue
             row, col = lattice.cell_at(member.newest.x, member.newest.y)
             # A seed farther away does not fit into a message.
             if max(abs(row), abs(col)) <= MOST_INDEX:
-                found.append(Robot(robot.name, (row, col), member.newest.step_s))
+                found.append(Robot(part.robot, (row, col), member.newest.step_s))
         return found
 
     def is_gone(self, name: str, divided_at: float, now: float) -> bool:

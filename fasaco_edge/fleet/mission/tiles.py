@@ -5,7 +5,8 @@ A tile has TILE x TILE cells; that of place (row, col) begins at cell (TILE * ro
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import operator
+from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
@@ -75,3 +76,32 @@ class TileQueue(Generic[Tile]):
             self.sent.pop(place, None)
             self.sent[place] = tiles[place]
         return chosen
+
+
+class SweptQueue:
+    """Selects the tiles of the next message, see ``TileQueue``.
+
+    Args:
+        kept: the ledger's tiles when the epoch began; None if not known.
+    """
+
+    def __init__(self, kept: Mapping[Cell, NDArray[np.uint16]] | None = None) -> None:
+        self._kept = None
+        if kept is not None:
+            self._kept = {place: tile_bits(tile) for place, tile in kept.items()}
+        self._queue = TileQueue[NDArray[np.uint16]](operator.is_)
+
+    def next(self, tiles: Mapping[Cell, NDArray[np.uint16]], most: int) -> tuple[Placed, ...]:
+        """Return places and bits of a limited number of tiles of a ledger's snapshot."""
+        chosen = self._queue.next(tiles, most)
+        return tuple((place, tile_bits(tiles[place])) for place in chosen)
+
+    def kept(self, sent: Iterable[Placed]) -> tuple[Placed, ...] | None:
+        """Return which cells of tiles were swept before this epoch; None if not known."""
+        kept = self._kept
+        return None if kept is None else tuple((at, kept[at]) for at, _ in sent if at in kept)
+
+
+def tile_bits(tile: NDArray[np.uint16]) -> bytes:
+    """Return the visited cells of a ledger's tile as TILE_BYTES of bits."""
+    return packed(tile > 0)

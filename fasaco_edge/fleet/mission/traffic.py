@@ -168,12 +168,7 @@ class _Meeting(NamedTuple):
 
 
 def _is_over(apart_m: Points, clear_m: float) -> bool:
-    """Return whether the first OVER_M of the other's path lead over this robot.
-
-    Args:
-        apart_m: distances of the points of this robot's path to those of the other's, (n, m).
-        clear_m: least distance that robots keep.
-    """
+    """Return whether the first OVER_M of the other's path lead over this robot."""
     first = apart_m[0, : int(OVER_M / SPACING_M) + 1]
     return apart_m.shape[1] > 1 and bool((first < clear_m).any())
 

@@ -185,9 +185,7 @@ def _count(bits: bytes) -> int:
     return int.from_bytes(bits, "big").bit_count()
 
 
-def distances(
-    ground: NDArray[np.bool_], start: Place, most_steps: int | None = None
-) -> NDArray[np.int32]:
+def distances(ground: NDArray[np.bool_], start: Place, most_steps: int = FAR) -> NDArray[np.int32]:
     """Return the steps from a cell to each cell of the ground, int32 (rows, cols); FAR beyond,
     and beyond ``most_steps``.
 
@@ -202,7 +200,7 @@ def distances(
     inside = 0 <= start[0] < ground.shape[0] and 0 <= start[1] < ground.shape[1]
     frontier = np.array([at] if inside and free[at] else [], np.int64)
     steps = 0
-    while len(frontier) and (most_steps is None or steps <= most_steps):
+    while len(frontier) and steps <= most_steps:
         found[frontier] = steps
         free[frontier] = False
         reached = (frontier[:, None] + np.array((1, -1, cols, -cols))).reshape(-1)

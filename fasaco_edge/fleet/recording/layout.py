@@ -5,10 +5,11 @@ A card beside the map names each robot's activity and colour.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 from fasaco_edge.drawing import palette
+from fasaco_edge.fleet.observer.members import Members
+from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import (
@@ -81,39 +82,28 @@ LEGEND = """\
 - **Line** bright its path, dark where it drove"""
 
 
-@dataclass(frozen=True, slots=True)
-class RobotRow:
-    """Activity of a robot.
-
-    Attributes:
-        name, number: of the robot.
-        state: of its mission.
-        swept_m2: area of the cells it has swept.
-        share_m2: area of the cells left to it.
-        waits_for: name of the robot it waits for.
-    """
-
-    name: str
-    number: int
-    state: str
-    swept_m2: float
-    share_m2: float
-    waits_for: str
-
-
 def colour_of(number: int) -> tuple[int, int, int]:
     """Return the colour of the robot with a number."""
     return palette.ROBOTS[number % len(palette.ROBOTS)][1]
 
 
-def card_of(title: str, rows: Sequence[RobotRow], twice_m2: float) -> str:
-    """Return the card as Markdown."""
-    swept_m2 = sum(row.swept_m2 for row in rows) - twice_m2
-    lines = [f"**{markdown_cell(title)}**: {swept_m2:.1f} m2 swept, {twice_m2:.1f} by two", ""]
-    lines += ["| robot | colour | state | swept m2 | left to it m2 |", "|---|---|---|---|---|"]
-    for row in rows:
-        state = f"waits for {row.waits_for}" if row.waits_for else row.state
-        colour, _ = palette.ROBOTS[row.number % len(palette.ROBOTS)]
-        cells = (row.name, colour, state, f"{row.swept_m2:.1f}", f"{row.share_m2:.1f}")
-        lines.append(f"| {' | '.join(map(markdown_cell, cells))} |")
+def card_of(title: str, members: Members, states: Mapping[str, str], survey: Survey) -> str:
+    """Return the card as Markdown; ``states``: of the robots, by their names."""
+    twice_m2, rows, swept_m2 = survey.twice_m2, [], 0.0
+    for member in members:
+        cell_m2, waits_for = member.seat.cell_m**2, member.newest.waits_for
+        robot_m2 = member.swept.count * cell_m2
+        swept_m2 += robot_m2
+        state = f"waits for {waits_for}" if waits_for else states[member.name]
+        colour, _ = palette.ROBOTS[member.number % len(palette.ROBOTS)]
+        left_m2 = survey.left[member.name] * cell_m2
+        rows.append((member.name, colour, state, f"{robot_m2:.1f}", f"{left_m2:.1f}"))
+    heading = (
+        f"**{markdown_cell(title)}**: {swept_m2 - twice_m2:.1f} m2 swept, {twice_m2:.1f} by two"
+    )
+    lines = [heading, "", "| robot | colour | state | swept m2 | left to it m2 |"]
+    lines += [
+        "|---|---|---|---|---|",
+        *(f"| {' | '.join(map(markdown_cell, row))} |" for row in rows),
+    ]
     return "\n".join(lines) + f"\n\n{LEGEND}\n"

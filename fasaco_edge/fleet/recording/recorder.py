@@ -18,10 +18,17 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
-from fasaco_edge.fleet.observer.members import JOINED
+from fasaco_edge.fleet.observer.members import JOINED, Member, Members
 from fasaco_edge.fleet.recording.layout import build_layout
-from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
-from fasaco_edge.fleet.recording.notes import NOTES_VERSION, Note, NoteBatch, encode_notes
+from fasaco_edge.fleet.recording.notes import (
+    NOTES_VERSION,
+    Note,
+    NoteBatch,
+    Unnoted,
+    encode_notes,
+    in_force,
+    noted,
+)
 from fasaco_edge.fleet.recording.scene import FleetScene
 from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
@@ -76,7 +83,7 @@ class FleetRecorder:
         self._began_ns = recording.began_ns
         self._title = f"fleet {fleet} {recording.began} UTC"
         self._writer.describe(self._title)
-        self._members = RecordedMembers()
+        self._members = Members()
         self._scene = FleetScene(self._writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
         self._subscriptions = FleetSubscriptions(
@@ -85,6 +92,7 @@ class FleetRecorder:
         self._first: list[Received] = []
         self._gathers = True
         self._poses: dict[str, PoseDecoder] = {}
+        self._unnoted: dict[str, Unnoted] = {}
         self._notes: list[Note] = []
         self._rates: dict[str, list[int]] = {}
         self._next_note_ns = self._next_write_ns = self._began_ns
@@ -192,8 +200,10 @@ class FleetRecorder:
         if arrival.topic == POSE.name:
             stamped = self._poses[robot].decode(sample.payload, sample.schema)
             if stamped is not None:
-                member.move(stamped.pose, self._ms(arrival.wall_ns))
-                self._scene.add_pose(member, stamped.pose)
+                pose, seat = stamped.pose, member.seat
+                cell = seat.cell_at(pose.x, pose.y)
+                self._unnoted[robot].move(cell, pose, self._ms(arrival.wall_ns))
+                self._scene.add_pose(member, pose)
         elif arrival.topic == PATH.name:
             self._scene.add_path(member, decode_path(sample.payload).xy)
         elif arrival.topic == MAP.name:
@@ -203,7 +213,7 @@ class FleetRecorder:
             status = decode_tolerant(sample.payload, Status)
             # A second daemon of the robot's name does not plan.
             if status.claim.stand == "plans":
-                member.note_status(status)
+                self._unnoted[robot].note_status(status)
 
     def _take_fleet(self, robot: str, arrival: Arrival) -> None:
         said = decode_member(arrival.sample.payload, self._fleet)
@@ -222,10 +232,12 @@ class FleetRecorder:
             self._join(member)
         elif news:
             self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
+        self._unnoted[robot].note_cells(member, has_moved=bool(news))
 
-    def _join(self, member: RecordedMember) -> None:
+    def _join(self, member: Member) -> None:
         """Record a robot from now on."""
         self._poses[member.name] = PoseDecoder(self._schema)
+        self._unnoted[member.name] = Unnoted()
         self._subscriptions.subscribe(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
         self._scene.join(member)
@@ -234,7 +246,7 @@ class FleetRecorder:
         self._subscriptions.leave(robot)
         self._inbox.forget(robot)
         self._scene.leave(robot)
-        for kept in (self._poses, self._rates):
+        for kept in (self._poses, self._rates, self._unnoted):
             kept.pop(robot, None)
         for fault in [fault for fault in self._faults if fault[0] == robot]:
             del self._faults[fault]
@@ -249,7 +261,8 @@ class FleetRecorder:
                 self._warn_once(member.name, TOO_LARGE)
             if member.swept.refused or member.ground.refused:
                 self._warn_once(member.name, TOO_WIDE)
-            note = member.note(self._ms(now_ns), now_ns, (traffic.messages, traffic.bytes))
+            counts = traffic.messages, traffic.bytes
+            note = self._unnoted[member.name].note(member, self._ms(now_ns), now_ns, counts)
             self._notes.append(note)
             rates = self._rates.setdefault(member.name, [])
             rates.append(traffic.bytes)
@@ -274,10 +287,10 @@ class FleetRecorder:
         if self._part != self._writer.part_number:
             self._part = self._writer.part_number
             at_ms = self._notes[0].at_ms if self._notes else self._ms(self._writer.wall_ns)
-            self._notes = [*(member.in_force(at_ms) for member in self._members), *self._notes]
+            self._notes = [*(in_force(member, at_ms) for member in self._members), *self._notes]
         if not self._notes:
             return
-        robots = [member.noted() for member in self._members]
+        robots = [noted(member) for member in self._members]
         batch = NoteBatch(NOTES_VERSION, self._began_ns, self._fleet, robots, self._notes)
         self._notes = []
         if not self._writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
@@ -288,7 +301,7 @@ class FleetRecorder:
         return max(wall_ns - self._began_ns, 0) // 1_000_000
 
 
-def _why(member: RecordedMember) -> str:
+def _why(member: Member) -> str:
     return f"for {member.newest.waits_for}" if member.newest.waits_for else ""
 
 

@@ -6,7 +6,6 @@ than the scene of one robot: the robots share the rate of each layer.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
@@ -15,15 +14,14 @@ from numpy.typing import NDArray
 
 from fasaco_edge.fleet.observer.cells import mask_of, window_of
 from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
-from fasaco_edge.fleet.observer.members import GONE, shares_of, swept_twice
+from fasaco_edge.fleet.observer.members import GONE, Member, Members
+from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.fleet.recording.layout import (
-    RobotRow,
     build_layout,
     card_of,
     colour_of,
     robot_entity,
 )
-from fasaco_edge.fleet.recording.members import RecordedMember, RecordedMembers
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser, known_bounds
 from fasaco_edge.recording import entities
@@ -37,7 +35,7 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 RATES = {
     "map": 3_000, "swept": 3_000, "path": 2_500, "trail": 2_000, "pose": 2_000, "metrics": 2_000,
 }  # fmt: skip
-FLEET_RATES = {entities.FLEET_SHARES: 1_000, entities.FLEET_TWICE: 1_000, entities.RUN_CARD: 800}
+FLEET_RATES = {entities.FLEET_SHARES: 2_000, entities.RUN_CARD: 800}
 CHUNK_BYTES = 1_200
 # Overhead of a layer of cells in four bytes each [bytes].
 GRID_BYTES = 1_200
@@ -72,7 +70,7 @@ class _Drawn:
 class FleetScene:
     """Draws a fleet into a writer; the caller sets the time."""
 
-    def __init__(self, writer: RecordingWriter, members: RecordedMembers) -> None:
+    def __init__(self, writer: RecordingWriter, members: Members) -> None:
         self._writer = writer
         self._members = members
         self._layers = Layers(FLEET_RATES)
@@ -80,11 +78,10 @@ class FleetScene:
         self._drawn: dict[str, _Drawn] = {}
         self._framed: Bounds | None = None
         self._shown: tuple[str, ...] = ()
-        self._shares: Counter[str] = Counter()
-        self._twice_m2, self._card = 0.0, ""
+        self._survey, self._card = Survey(), ""
         writer.log_static(entities.FLEET, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
-    def join(self, member: RecordedMember) -> None:
+    def join(self, member: Member) -> None:
         """Draw a robot from now on."""
         self._drawn[member.name] = _Drawn()
         self._limit()
@@ -115,7 +112,7 @@ class FleetScene:
         """Stop drawing a robot: another robot has its number."""
         self._drawn.pop(robot, None)
 
-    def add_pose(self, member: RecordedMember, pose: Pose2D) -> None:
+    def add_pose(self, member: Member, pose: Pose2D) -> None:
         """Move a robot, and add to its trail."""
         x, y = self._here(member, pose.x, pose.y)
         placed = Pose2D(x, y, pose.yaw + member.seat.frame.yaw)
@@ -142,7 +139,7 @@ class FleetScene:
 
         self._draw(member, "trail", 24 * len(drawn.trail), draw_trail)
 
-    def add_path(self, member: RecordedMember, xy: NDArray[np.float64]) -> None:
+    def add_path(self, member: Member, xy: NDArray[np.float64]) -> None:
         """Draw the path ahead of a robot."""
         points = np.array([self._here(member, x, y) for x, y in draw.corners(xy).tolist()])
         points = points.reshape(-1, 2)
@@ -153,7 +150,7 @@ class FleetScene:
 
         self._draw(member, "path", 12 * len(points), draw_path)
 
-    def add_map(self, member: RecordedMember, grid: OccupancyGrid) -> None:
+    def add_map(self, member: Member, grid: OccupancyGrid) -> None:
         """Draw a robot's map; unknown pixels are transparent, so that the others' maps show."""
         grid = coarser(grid, MOST_PIXELS // max(len(self._drawn), LEAST_SHARING))
         x, y = self._here(member, grid.geometry.origin.x, grid.geometry.origin.y)
@@ -174,7 +171,7 @@ class FleetScene:
 
         self._draw(member, "map", 2 * size_in_file(grid.cells), draw_map)
 
-    def add_cells(self, member: RecordedMember) -> None:
+    def add_cells(self, member: Member) -> None:
         """Draw the cells a robot has swept."""
         self._draw(
             member, "swept", GRID_BYTES + member.swept.count // 8, lambda: self._draw_swept(member)
@@ -182,13 +179,11 @@ class FleetScene:
 
     def add_division(self) -> None:
         """Draw the shares of the remaining cells, and the cells that two robots swept."""
-        layers, now_ns = self._layers, self._writer.wall_ns
         # The size of the ground also limits the time of this drawing.
-        size = CHUNK_BYTES + sum(member.ground.count for member in self._members) // 8
-        layers.draw(entities.FLEET_SHARES, size, self._draw_shares, now_ns)
-        layers.draw(entities.FLEET_TWICE, size, self._draw_twice, now_ns)
+        size = 2 * CHUNK_BYTES + sum(member.ground.count for member in self._members) // 4
+        self._layers.draw(entities.FLEET_SHARES, size, self._draw_survey, self._writer.wall_ns)
 
-    def add_figures(self, member: RecordedMember, figures: dict[str, float]) -> None:
+    def add_figures(self, member: Member, figures: dict[str, float]) -> None:
         """Plot changed figures of a robot, of METRICS."""
         drawn = self._drawn[member.name]
         drawn.figures |= figures
@@ -201,7 +196,7 @@ class FleetScene:
 
         self._draw(member, "metrics", CHUNK_BYTES * (len(drawn.figures) - 1), draw_figures)
 
-    def enter(self, member: RecordedMember, state: str, why: str = "") -> None:
+    def enter(self, member: Member, state: str, why: str = "") -> None:
         """Show that a robot is in a state from now on; log it."""
         drawn = self._drawn[member.name]
         if not state or drawn.state == state:
@@ -221,19 +216,8 @@ class FleetScene:
 
     def describe(self, title: str) -> None:
         """Show the card: each robot's activity."""
-        cell_m2 = {member.name: member.seat.cell_m**2 for member in self._members}
-        rows = [
-            RobotRow(
-                name=member.name,
-                number=member.number,
-                state=self._drawn[member.name].state,
-                swept_m2=member.swept.count * cell_m2[member.name],
-                share_m2=self._shares[member.name] * cell_m2[member.name],
-                waits_for=member.newest.waits_for,
-            )
-            for member in self._members
-        ]
-        card = card_of(title, rows, self._twice_m2)
+        states = {name: drawn.state for name, drawn in self._drawn.items()}
+        card = card_of(title, self._members, states, self._survey)
         if card == self._card:
             return
         self._card = card
@@ -254,9 +238,7 @@ class FleetScene:
         self._framed = None
         self._show()
 
-    def _draw(
-        self, member: RecordedMember, layer: str, size: int, make: Callable[[], None]
-    ) -> None:
+    def _draw(self, member: Member, layer: str, size: int, make: Callable[[], None]) -> None:
         name = f"{layer}/{member.name}"
         self._layers.draw(name, CHUNK_BYTES + size, make, self._writer.wall_ns)
 
@@ -274,13 +256,13 @@ class FleetScene:
             self._anchor = Anchor.near(x, y)
         return self._anchor
 
-    def _here(self, member: RecordedMember, x: float, y: float) -> tuple[float, float]:
+    def _here(self, member: Member, x: float, y: float) -> tuple[float, float]:
         """Return where a point of a robot's map frame is drawn."""
         x, y = member.placed(x, y)
         anchor = self._anchored(x, y)
         return x - anchor.x, y - anchor.y
 
-    def _draw_swept(self, member: RecordedMember) -> None:
+    def _draw_swept(self, member: Member) -> None:
         cells = member.swept.cells()
         window = window_of(cells)
         if window is None:
@@ -290,26 +272,20 @@ class FleetScene:
         geometry = self._shifted(member.seat.geometry(window))
         self._log_grid(_world(member, "swept"), geometry, pixels, SWEPT_ORDER)
 
-    def _draw_shares(self) -> None:
-        shares = shares_of(self._members, self._writer.wall_ns)
-        if shares is None:
+    def _draw_survey(self) -> None:
+        self._survey = survey = survey_of(self._members, self._writer.wall_ns)
+        if survey.geometry is None:
             return
-        self._shares = shares.cells
-        pixels = np.zeros((*shares.owners.shape, 4), np.uint8)
-        for member in self._members:
-            pixels[shares.owners == member.number] = (*_colour(member), SHARE_ALPHA)
-        geometry = self._shifted(shares.geometry)
-        self._log_grid(entities.FLEET_SHARES, geometry, pixels, SHARE_ORDER)
-
-    def _draw_twice(self) -> None:
-        twice = swept_twice(self._members)
-        if twice is None:
-            return
-        geometry, mask = twice
-        self._twice_m2 = int(np.count_nonzero(mask)) * geometry.resolution**2
-        pixels = np.zeros((*mask.shape, 4), np.uint8)
-        pixels[mask] = TWICE_COLOUR
-        self._log_grid(entities.FLEET_TWICE, self._shifted(geometry), pixels, TWICE_ORDER)
+        geometry, shape = self._shifted(survey.geometry), (*survey.owners.shape, 4)
+        if survey.division:
+            pixels = np.zeros(shape, np.uint8)
+            for member in self._members:
+                pixels[survey.owners == member.number] = (*_colour(member), SHARE_ALPHA)
+            self._log_grid(entities.FLEET_SHARES, geometry, pixels, SHARE_ORDER)
+        if survey.twice.any():
+            pixels = np.zeros(shape, np.uint8)
+            pixels[survey.twice] = TWICE_COLOUR
+            self._log_grid(entities.FLEET_TWICE, geometry, pixels, TWICE_ORDER)
 
     def _log_grid(
         self, entity: str, geometry: GridGeometry, pixels: NDArray[np.uint8], order: float
@@ -334,11 +310,11 @@ class FleetScene:
             self._writer.show(build_layout(robots, known or NO_MAP))
 
 
-def _world(member: RecordedMember, name: str) -> str:
+def _world(member: Member, name: str) -> str:
     return robot_entity(member.name, f"world/{name}")
 
 
-def _colour(member: RecordedMember) -> tuple[int, int, int]:
+def _colour(member: Member) -> tuple[int, int, int]:
     return colour_of(member.number)
 
 

@@ -1,8 +1,7 @@
-"""The feed of samples of all robots of a fleet from the bus, and the names of all robots on it."""
+"""The feed of samples of all robots of a fleet from the bus."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Collection
 
 from fasaco_edge.bus.arrival import Arrival, Sample
@@ -10,14 +9,12 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client.feed import Joining
 from fasaco_edge.client.phrases import steady_now
-from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received, Traffic
-from fasaco_edge.wire.keys import VERSION, Keys
+from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import STATUS
 
 # Largest size of all waiting samples; a quarter of it for each robot [bytes].
 CAPACITY_BYTES = 128_000_000
-# Names of robots that are kept.
-MOST_ROBOTS = 256
 
 
 class FleetFeed(Joining):
@@ -32,9 +29,6 @@ class FleetFeed(Joining):
         self._keys = keys
         self._inbox = FleetInbox(CAPACITY_BYTES, _stamped)
         self._subscriptions: FleetSubscriptions | None = None
-        self._here: set[str] = set()
-        # A lock of its own, not the session's: tokens may arrive during ``listen``.
-        self._naming = threading.Lock()
 
     def take(self, timeout_s: float) -> list[Received]:
         """Return what has arrived, robot by robot; wait up to ``timeout_s`` [s] for a sample."""
@@ -55,28 +49,10 @@ class FleetFeed(Joining):
         """Drop the queues of a robot of another fleet."""
         self._inbox.forget(robot)
 
-    def traffic(self, robot: str) -> Traffic:
-        """Return the traffic of a robot to its fleet since the last call."""
-        return self._inbox.traffic(robot)
-
-    def robots(self) -> set[str]:
-        """Return the names of the robots on the bus."""
-        with self._naming:
-            return set(self._here)
-
     def _listen(self, bus: Bus) -> None:
-        bus.watch_tokens(f"{self._keys.base}/{VERSION}/*/alive", self._note_token)
         subscriptions = FleetSubscriptions(bus, self._keys, (STATUS,), self._inbox.post)
         subscriptions.listen()
         self._subscriptions = subscriptions
-
-    def _note_token(self, key: str, here: bool) -> None:
-        robot = self._keys.robot_of(key)
-        with self._naming:
-            if not here:
-                self._here.discard(robot)
-            elif robot and len(self._here) < MOST_ROBOTS:
-                self._here.add(robot)
 
 
 def _stamped(topic: str, sample: Sample) -> Arrival:

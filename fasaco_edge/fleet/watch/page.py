@@ -14,54 +14,33 @@ from rich.text import Text
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.phrases import clock, percent
+from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.fleet.watch.feed import FleetFeed
-from fasaco_edge.fleet.watch.floor import FleetFloor
-from fasaco_edge.fleet.watch.robot import FleetRobot, short
-from fasaco_edge.fleet.watch.view import FleetView
+from fasaco_edge.fleet.watch.view import FleetRobot, FleetView, short
 from fasaco_edge.text import one_line
 from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
 
-# Largest width of names, besides a third of the table; least width of a table with units and rates;
-# largest width of a table [characters].
-LEAST_NAME, UNITS, RATES, WIDEST = 12, 40, 47, 80
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
+# Largest width of the table [characters].
+WIDEST = 80
 
 
-def robot_table(robots: Sequence[FleetRobot], width: int, lines: int) -> Table:
-    """Return a table of robots of a given width, in at most ``lines`` >= 1 lines."""
-    table = Table.grid(padding=(0, 1), pad_edge=False)
-    table.width = width = min(width, WIDEST)
-    longest = max([len(robot.name) for robot in robots], default=5)
-    # If each robot has room for a second line, its activity is shown in full.
-    is_folded = 2 * len(robots) < lines
-    name = min(max(longest, 5), max(LEAST_NAME, width // 3))
-    table.add_column(width=name, no_wrap=True, overflow="ellipsis")
-    table.add_column(ratio=1, no_wrap=not is_folded, overflow="fold" if is_folded else "ellipsis")
-    unit = " m2" if width >= UNITS else ""
-    heads = [f"swept{unit}", f"left{unit}", *(["kB/s"] if width >= RATES else [])]
-    for head in heads:
-        table.add_column(width=max(len(head), 6 if unit else 5), justify="right", no_wrap=True)
-    table.add_row(*(Text(head, FAINT) for head in ("robot", "does", *heads)))
-    shown = robots if len(robots) < lines else robots[: max(lines - 2, 0)]
-    for robot in shown:
-        table.add_row(*_row(robot)[: 2 + len(heads)])
-    if more := len(robots) - len(shown):
-        table.add_row("", Text(f"{more} more", FAINT))
+def robot_table(robots: Sequence[FleetRobot], width: int) -> Table:
+    """Return a table of robots of a given width, a line each."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style=FAINT)
+    table.width = min(width, WIDEST)
+    table.add_column("robot", no_wrap=True, overflow="ellipsis", max_width=max(width // 3, 5))
+    table.add_column("does", ratio=1, no_wrap=True, overflow="ellipsis")
+    table.add_column("swept m2", justify="right", no_wrap=True)
+    table.add_column("left m2", justify="right", no_wrap=True)
+    for robot in robots:
+        name = Text(robot.name, FAINT if robot.silent_s is not None else "")
+        left = "-" if robot.left_cells is None else f"{robot.left_cells * robot.cell_m2:.1f}"
+        table.add_row(name, _doing(robot), f"{robot.swept_cells * robot.cell_m2:.1f}", left)
     return table
-
-
-def _row(robot: FleetRobot) -> list[Text]:
-    left = "-" if robot.left_m2 is None else f"{robot.left_m2:.1f}"
-    return [
-        Text(robot.name, FAINT if robot.silent_s is not None else ""),
-        _doing(robot),
-        Text(f"{robot.swept_m2:.1f}"),
-        Text(left),
-        Text(f"{robot.kb_s:.1f}", FAINT),
-    ]
 
 
 def _doing(robot: FleetRobot) -> Text:
@@ -75,9 +54,7 @@ def _doing(robot: FleetRobot) -> Text:
     return doing
 
 
-def total_rows(
-    floor: FleetFloor, unheard: Sequence[str], width: int, glyphs: GlyphSet
-) -> list[Text]:
+def total_rows(floor: Survey, unheard: Sequence[str], width: int, glyphs: GlyphSet) -> list[Text]:
     """Return lines with the total of all robots, and the names of silent robots."""
     silent = [Text(f"no messages: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
     if floor.fraction is None:
@@ -86,8 +63,8 @@ def total_rows(
     share = Text(phrases.percent(floor.fraction), "bold")
     share.append(f" swept: {swept_m2:.1f} of {area_m2:.1f} m2", "not bold")
     lines = [share, glyphs.bar(floor.fraction, min(width, LONGEST_BAR))]
-    if floor.twice:
-        lines.append(Text(f"{floor.twice * floor.cell_m2:.1f} m2 swept by two or more"))
+    if floor.twice_m2:
+        lines.append(Text(f"{floor.twice_m2:.1f} m2 swept by two or more"))
     if floor.division:
         by = f" by {short(floor.by)}" if floor.by else ""
         lines.append(Text(f"division {floor.division}{by}", FAINT))
@@ -111,26 +88,18 @@ class FleetPage:
         blocks, robots, layout = self._blocks, view.robots(now), Layout.of(width, height)
         page = blocks.block(headline(view, robots, now, width), width, 1)
         # The table takes the line of the legend.
-        page += self._table(view, robots, now, width, min(layout.lines + 1, height - 1))
+        room = min(layout.lines + 1, height - 1)
+        totals = total_rows(view.floor, view.unheard(now), width, blocks.glyphs)
+        if len(robots) + 2 + len(totals) > room:
+            totals = []
+        shown = Group(robot_table(robots, width), "", *totals) if robots else Text("")
+        page += blocks.block(shown, width, room)
         if layout.entries:
             key = (view.events.count, width, layout)
             page += blocks.keep(
                 "log", key, lambda: blocks.log(view.events, width, layout.entries, None)
             )
         return page + [" " * width] * (height - len(page))
-
-    def _table(
-        self, view: FleetView, robots: Sequence[FleetRobot], now: float, width: int, lines: int
-    ) -> list[str]:
-        if not robots or not lines:
-            return self._blocks.block(Text(""), width, lines)
-        totals = total_rows(view.floor, view.unheard(now), width, self._blocks.glyphs)
-        room = lines - len(totals) - 1
-        if room <= len(robots):
-            return self._blocks.block(robot_table(robots, width, lines), width, lines)
-        return self._blocks.block(
-            Group(robot_table(robots, width, room), "", *totals), width, lines
-        )
 
 
 def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: int) -> Text:
@@ -158,7 +127,7 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: i
 # Time to wait for the other robots after the first message [s]. Each robot sends its place and its
 # swept cells once a second.
 REST_S, SENT_S = 4.0, 1.3
-# Period of counting rates and of printing JSON [s].
+# Period of printing JSON [s].
 EVERY_S = 1.0
 
 
@@ -170,7 +139,7 @@ class FleetWatch:
     def __init__(self, feed: FleetFeed, view: FleetView, console: Console) -> None:
         self._feed, self._view = feed, view
         self._page = FleetPage(console)
-        self._known_at = self._counted_at = phrases.steady_now()
+        self._known_at = phrases.steady_now()
         self._printed_at = float("-inf")
         self._printed: dict[str, object] = {}
 
@@ -199,7 +168,6 @@ class FleetWatch:
             self._known_at = now
         view.trouble = feed.trouble
         feed.attend(view.names())
-        self._count(now)
         view.tick(now)
         return bool(items)
 
@@ -246,11 +214,3 @@ class FleetWatch:
         view = self._view
         is_complete = phrases.steady_now() - self._known_at > SENT_S
         return is_complete and view.floor.robots >= set(view.names())
-
-    def _count(self, now: float) -> None:
-        passed_s = now - self._counted_at
-        if passed_s < EVERY_S:
-            return
-        self._counted_at = now
-        for name in self._view.names():
-            self._view.note_rate(name, 1e-3 * self._feed.traffic(name).bytes / passed_s)

@@ -3,29 +3,103 @@
 from __future__ import annotations
 
 import math
-from collections import Counter, deque
-from dataclasses import dataclass, field
+import time
+from collections import Counter
+from dataclasses import dataclass
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.observer.inbox import Received
 from fasaco_edge.fleet.observer.members import JOINED, MOST_MEMBERS, Member, Members
-from fasaco_edge.fleet.watch.floor import FleetFloor, FloorSurvey
-from fasaco_edge.fleet.watch.robot import FleetRobot, document_of, short
-from fasaco_edge.text import is_reported
+from fasaco_edge.fleet.observer.survey import Survey, survey_of
+from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.status import FleetReport, Status
 from fasaco_edge.wire.keys import is_chunk
 from fasaco_edge.wire.reasons import plain
 
-# Least time between two notes of a robot's state [s]; time over which its rate is averaged [s].
-NOTED_EVERY_S, RATE_S = 1.0, 5
+# Least time between two notes of a robot's state [s].
+NOTED_EVERY_S = 1.0
+# Least time between two surveys of the floor [s]; and as a multiple of the time that one takes.
+LEAST_AGE_S, LEAST_REST = 1.0, 10.0
 # Robots that others received messages from within this time are named, even if silent here [s].
 RECENT_S = 600.0
 # Number of robots and topics whose faults are counted apart; of other fleets that are named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
+
+
+# States of a robot that does something for its mission.
+AT_WORK = ("planning", "covering", "returning", "degraded")
+# Longest text of a robot that shares a line with other texts [characters].
+LONGEST = 40
+
+
+@dataclass(frozen=True, slots=True)
+class FleetRobot:
+    """A robot of the fleet at a time.
+
+    Attributes:
+        name: of the robot.
+        state: of its mission, in its last message; one line.
+        waits_for: name of the robot it waits for; "" for none.
+        silent_s: time since its last message if it counts as gone; else None.
+        away: why others give it no part of the remaining cells; "" if they do.
+        x, y: its position in the fleet's frame, in its last message [m].
+        swept_cells: number of cells it has swept.
+        left_cells: number of cells left to it by the division in force; None without a division.
+        cell_m2: area of its cells [m2].
+        division: number of its division.
+        revision: number of its path; None if not known.
+    """
+
+    name: str
+    state: str
+    waits_for: str
+    silent_s: float | None
+    away: str
+    x: float
+    y: float
+    swept_cells: int
+    left_cells: int | None
+    cell_m2: float
+    division: int
+    revision: int | None
+
+    @property
+    def is_at_work(self) -> bool:
+        """Whether it does something for its mission."""
+        return self.silent_s is None and self.state in AT_WORK
+
+    @property
+    def doing(self) -> str:
+        """Its activity in a few words."""
+        if self.silent_s is not None:
+            return "gone"
+        return f"waits for {self.waits_for}" if self.waits_for else self.state or "no state"
+
+    def document(self) -> dict[str, object]:
+        """Return it as ``--json`` prints it."""
+        return {
+            "name": self.name,
+            "state": "gone" if self.silent_s is not None else self.state,
+            "x": round(self.x, 3),
+            "y": round(self.y, 3),
+            "waits_for": self.waits_for,
+            "away": self.away or None,
+            "division": self.division,
+            "swept_cells": self.swept_cells,
+            "swept_m2": round(self.swept_cells * self.cell_m2, 2),
+            "part_cells": self.left_cells,
+            "path": self.revision,
+        }
+
+
+def short(text: str) -> str:
+    """Return a robot's text as one short line."""
+    line = one_line(text)
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."
 
 
 @dataclass(slots=True)
@@ -35,7 +109,6 @@ class _Seen:
     status: Status | None = None
     noted: str = ""
     noted_at: float = -math.inf
-    rates: deque[float] = field(default_factory=lambda: deque(maxlen=RATE_S))
 
 
 class FleetView:
@@ -46,24 +119,20 @@ class FleetView:
         members: its robots.
         events: the latest events.
         trouble: why the bus cannot be reached; "" if it can.
+        floor: the cells of all robots.
         others: names of other fleets on the bus, one line each.
     """
 
     def __init__(self, fleet: str) -> None:
         self.fleet = fleet
-        self.members: Members[Member] = Members(Member)
+        self.members = Members()
         self.events = EventLog()
         self.trouble = ""
         self.others: set[str] = set()
         self._seen: dict[str, _Seen] = {}
-        self._survey = FloorSurvey()
+        self.floor, self._floor_key, self._floor_due_at = Survey(), object(), 0.0
         self._division = 0
         self._faults: Counter[tuple[str, str]] = Counter()
-
-    @property
-    def floor(self) -> FleetFloor:
-        """The cells of all robots."""
-        return self._survey.floor
 
     def take(self, received: Received) -> None:
         """Take in a sample. One that cannot be read is dropped and noted."""
@@ -80,8 +149,8 @@ class FleetView:
     def tick(self, now: float) -> None:
         """Note changes up to ``now``, since the epoch [s]; call it often."""
         now_ns = int(1e9 * now)
-        self._survey.update(self.members, now_ns)
         divider = self.members.dividing(now_ns)
+        self._look_at_floor(divider, now_ns)
         if divider is not None and divider.newest.division != self._division:
             self._division = divider.newest.division
             among = f", {len(divider.newest.parts)} parts" if divider.newest.parts else ""
@@ -89,10 +158,16 @@ class FleetView:
         for robot in self.robots(now):
             self._note_state(robot, now)
 
-    def note_rate(self, robot: str, kb_s: float) -> None:
-        """Note a robot's rate of fleet messages in the last second [kB/s]."""
-        if robot in self._seen:
-            self._seen[robot].rates.append(kb_s)
+    def _look_at_floor(self, divider: Member | None, now_ns: int) -> None:
+        """Survey the floor after changes, if that is due."""
+        division = None if divider is None else (divider.name, divider.newest.division)
+        key = division, *((member.name, member.changes) for member in self.members)
+        began = time.monotonic()
+        if key == self._floor_key or began < self._floor_due_at:
+            return
+        self._floor_key, self.floor = key, survey_of(self.members, now_ns)
+        took_s = time.monotonic() - began
+        self._floor_due_at = began + max(LEAST_AGE_S, (1.0 + LEAST_REST) * took_s)
 
     def names(self) -> list[str]:
         """Return the names of the robots."""
@@ -117,15 +192,24 @@ class FleetView:
 
     def document(self, now: float) -> dict[str, object]:
         """Return the document that ``--json`` prints."""
-        document = document_of(self.fleet, self._division, self.floor, self.robots(now))
-        return document | {"unheard": self.unheard(now)}
+        floor, robots = self.floor, self.robots(now)
+        return {
+            "fleet": self.fleet,
+            "at_work": sum(robot.is_at_work for robot in robots),
+            "division": self._division,
+            "cells": floor.area,
+            "swept_cells": floor.swept,
+            "swept_twice_cells": int(floor.twice.sum()),
+            "swept_m2": round(floor.swept * floor.cell_m2, 2),
+            "fraction": None if floor.fraction is None else round(floor.fraction, 4),
+            "robots": [robot.document() for robot in robots],
+            "unheard": self.unheard(now),
+        }
 
     def _robot(self, member: Member, away: str, now: float) -> FleetRobot:
-        said, seen, cell_m2 = member.newest, self._seen[member.name], member.seat.cell_m**2
+        said, status = member.newest, self._seen[member.name].status
         x, y = member.placed(said.x, said.y)
-        floor, is_gone = self.floor, member.is_gone(int(1e9 * now))
-        left = floor.left.get(member.name) if floor.division else None
-        path = seen.status.path if seen.status is not None else None
+        is_gone = member.is_gone(int(1e9 * now))
         return FleetRobot(
             name=member.name,
             state=short(said.state),
@@ -135,12 +219,10 @@ class FleetView:
             x=x,
             y=y,
             swept_cells=member.swept.count,
-            swept_m2=member.swept.count * cell_m2,
-            left_cells=left,
-            left_m2=None if left is None else left * floor.cell_m2,
+            left_cells=self.floor.left.get(member.name) if self.floor.division else None,
+            cell_m2=member.seat.cell_m**2,
             division=said.division,
-            revision=None if path is None else path.revision,
-            kb_s=sum(seen.rates) / len(seen.rates) if seen.rates else 0.0,
+            revision=status.path.revision if status and status.path else None,
         )
 
     def _reports(self, now_ns: int) -> dict[str, FleetReport]:

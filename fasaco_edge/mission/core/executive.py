@@ -141,36 +141,15 @@ class Executive:
         self.orders.run_out_of_time(self.time_limit.minutes)
 
     def _give_way(self) -> Doing | None:
-        """Wait or make way for another robot.
-
-        A robot whose order is over makes way, too, but not a robot in its dock.
-        """
-        order, way, resting = self.orders.order_state, self.giving_way, self._resting
-        way.look_around(self._now)
-        is_going = (order.order is not None or order.errand) and not order.paused
+        """Wait or make way for another robot, but not in the dock."""
+        resting, state, now = self._resting, self._state, self._now
         is_docked = (
-            order.errand == "charge" and resting.why_in_dock(self._state, self._now) is not None
+            self.orders.order_state.errand == "charge"
+            and resting.why_in_dock(state, now) is not None
         )
         lacks_map = self.map.building.why or resting.why_no_mask()
-        may_drive = self.monitor.is_sound(self._now) and not lacks_map
-        if not (is_going and self.company.has_members and may_drive) or is_docked:
-            way.end()
-            return None
-        # Meanwhile others may have swept the cells ahead of this waiting robot.
-        is_homing = order.stage is Stage.RETURNING
-        is_vain = bool(way.waits_for) and not is_homing and not self.orders.cells.left()
-        has_work = bool(order.errand) or (order.is_open and not is_vain)
-        update = way.look(self._now, has_work=has_work, errand=order.errand)
-        if not way.waits_for:
-            return None
-        cell, state = self.map.robot_cell(), self._state
-        if order.errand or is_homing:
-            state = State.RETURNING
-        elif state is not State.DONE and cell is not None:
-            state = State.COVERING if order.is_open else State.DONE
-            if reason := self._work.share(cell, self._now):
-                self.route.want(reason)
-        return Doing(state, way.reason, update)
+        may_drive = self.monitor.is_sound(now) and not lacks_map and not is_docked
+        return self.giving_way.decide(state, now, may_drive=may_drive)
 
     def _rest(self) -> Doing | None:
         """Rest if a command, the battery or a missing input requires it."""

@@ -140,7 +140,9 @@ class Mission:
         self._handler = EventHandler(
             *owners, self._line, self._trail, *measured, self._changes, self._rooms
         )
-        self.giving_way = self._kind.waiting(config, self._map, self.route, self.company)
+        self.giving_way = self._kind.waiting(
+            config, self._map, self._orders, self.route, self.company
+        )
         decided_by = self._line, self.company, self.charging, self.time_limit, self.giving_way
         in_dock = InDock(self._map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)

@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
-from fasaco_edge.fleet.cli.demo import apart
 from fasaco_edge.fleet.mission.kind import fleet_of
+from fasaco_edge.fleet.mission.travel import apart
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -220,7 +220,7 @@ FLEET_ONLINE = Benchmark(
     summary="fleets in buildings that no robot knows, against one robot",
     description="Let simulated robots with scanners, discs and messages share a building that "
     "none of them knows, each with its own mission, in simulated time and one process, so that "
-    "the same options give the same run. Of real daemons it is `fasaco-edge bench fleet --online`.",
+    "the same options give the same run. Of real daemons it is `fasaco-edge demo --robots N`.",
     add_options=_add_options,
     count=_count,
     measure=_measure,

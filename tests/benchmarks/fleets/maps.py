@@ -1,7 +1,7 @@
-"""Generated buildings as maps, for real daemons: ``bench fleet --online`` takes them.
+"""Generated buildings as maps, for real daemons.
 
-    python -m tests.benchmarks.fleets.maps DIR --generated 3 --cells 1000
-fasaco-edge bench fleet --online --maps DIR/*.yaml --robots 1 2 4 --robot-radius 0.135
+python -m tests.benchmarks.fleets.maps DIR --generated 3 --cells 1000
+fasaco-edge demo --map DIR/building0.yaml --robots 4 --robot-radius 0.135
 """
 
 from __future__ import annotations

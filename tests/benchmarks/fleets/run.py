@@ -15,9 +15,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from fasaco_edge.fleet.mission.ground import GroundQueue
-from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of
-from fasaco_edge.fleet.mission.shared import SweptQueue
+from fasaco_edge.fleet.mission.kind import FleetKind
+from fasaco_edge.fleet.mission.message import Messages
 from fasaco_edge.fleet.review.report import RobotTrack, find_again
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell, Footprint
@@ -119,9 +118,7 @@ class FleetRobot:
     mission: Mission
     world: World
     ledger: CoverageLedger
-    telling: SweptQueue = field(default_factory=SweptQueue)
-    telling_ground: GroundQueue = field(default_factory=GroundQueue)
-    epoch: int = 0
+    messages: Messages
     done_s: float = 0.0
     plans: int = 0
     is_dead: bool = False
@@ -133,32 +130,7 @@ class FleetRobot:
 
     def report(self) -> MemberReceived | None:
         """Return what it tells the others."""
-        mission = self.mission
-        if mission.pose is None or not mission.ledger.frame:
-            return None
-        swept = mission.ledger.snapshot().tiles
-        if mission.shared.epoch != self.epoch:
-            before = swept if self.epoch else None
-            self.epoch, self.telling = mission.shared.epoch, SweptQueue(before)
-        tiles = self.telling.next(swept, MOST_TILES)
-        return MemberReceived(
-            robot=self.name,
-            frame=mission.ledger.frame,
-            state=str(mission.state),
-            x=round(mission.pose.pose.x, 3),
-            y=round(mission.pose.pose.y, 3),
-            step_s=fleet_of(mission).step_s,
-            epoch=mission.shared.epoch,
-            division=fleet_of(mission).numbers.number,
-            tiles=tiles,
-            ground=self.telling_ground.next(mission.area, MOST_TILES),
-            by=fleet_of(mission).numbers.by,
-            parts=fleet_of(mission).parts,
-            radius_m=self.world.config.robot_radius_m,
-            ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
-            waits_for=mission.waits_for,
-            kept=self.telling.kept(tiles),
-        )
+        return self.messages.next(self.mission, MOST_TILES, MOST_TILES)
 
 
 class FleetRun:
@@ -182,7 +154,8 @@ class FleetRun:
             mission = Mission(fleet.config(), kind=FleetKind(name))
             mission.shared.begin(1)
             world = World(fleet.truth, Pose2D(x, y), simulated)
-            self.robots.append(FleetRobot(name, mission, world, CoverageLedger(fleet.cell_m)))
+            ledger, messages = CoverageLedger(fleet.cell_m), Messages(name, fleet.radius_m)
+            self.robots.append(FleetRobot(name, mission, world, ledger, messages))
         self.now = 0.0
         self.hears: Callable[[str, str], bool] = lambda speaker, listener: True
         self.unheard = 0

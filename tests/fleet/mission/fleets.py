@@ -2,10 +2,9 @@
 
 from random import Random
 
-from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.fleet.mission.shared import SweptQueue
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived
+from fasaco_edge.fleet.mission.message import Messages
+from fasaco_edge.mission.core.events import MapReceived
 from tests.mission.world import CONFIG, Drive, building, pose_at, reachable_cells
 
 MOST_TILES = 4
@@ -20,8 +19,8 @@ class FleetRobot(Drive):
     """
 
     def __init__(self, name, cell, rows, config=CONFIG, before=None):
-        self.name, self.hangs, self.told, self.cannot = name, False, SweptQueue(), ()
-        self.told_ground, self.told_epoch = GroundQueue(), 1
+        self.name, self.hangs, self.cannot = name, False, ()
+        self.messages = Messages(name, CONFIG.footprint.robot_radius_m)
         super().__init__(cell, config=config, kind=FleetKind(name))
         if before is not None:
             self.mission.restore_ledger(before)
@@ -29,28 +28,7 @@ class FleetRobot(Drive):
         self.tell(MapReceived(building(*rows)), pose_at(*cell))
 
     def report(self):
-        mission, pose = self.mission, self.mission.pose.pose
-        swept = mission.ledger.snapshot().tiles
-        if mission.shared.epoch != self.told_epoch:
-            self.told, self.told_epoch = SweptQueue(swept), mission.shared.epoch
-        tiles = self.told.next(swept, MOST_TILES)
-        return MemberReceived(
-            robot=self.name,
-            frame="map",
-            state=str(mission.state),
-            x=pose.x,
-            y=pose.y,
-            epoch=mission.shared.epoch,
-            division=mission.company.numbers.number,
-            tiles=tiles,
-            ground=self.told_ground.next(mission.area, MOST_TILES),
-            by=mission.company.numbers.by,
-            parts=mission.company.parts,
-            radius_m=CONFIG.footprint.robot_radius_m,
-            ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
-            waits_for=mission.waits_for,
-            kept=self.told.kept(tiles),
-        )
+        return self.messages.next(self.mission, MOST_TILES, MOST_TILES)
 
     def tick(self, after=1.0):
         """Plan if asked, and drive a cell."""

@@ -12,7 +12,6 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.fleet.daemon.exchange import PERIOD_S, FleetReceiver, FleetSender
 from fasaco_edge.fleet.mission.division import Division
-from fasaco_edge.fleet.mission.division import Robot as SharingRobot
 from fasaco_edge.fleet.mission.frames import (
     MOST_OTHERS,
     FleetFrames,
@@ -160,9 +159,9 @@ def test_a_seed_off_the_map_counts_as_on_the_nearest_cell():
     free = np.ones((5, 9), np.bool_)
     free[2, :3] = False
     lattice = CoverageLattice.from_free(free)
-    robots = tuple(SharingRobot(name, (0, 0), 1.0) for name in ("r1", "r2"))
     told, here = (
-        Division(robots, (seed, (2, 8)), (0.0, 0.0)).owners(lattice) for seed in ((2, 0), (1, 0))
+        Division((Part("r1", seed, 0.0, 1.0), Part("r2", (2, 8), 0.0, 1.0))).owners(lattice)
+        for seed in ((2, 0), (1, 0))
     )
     assert (told == here)[free].all()
     assert (told[:, 0] == 0).all()

@@ -13,7 +13,7 @@ from fasaco_edge.fleet.mission.members import Members
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, SharedProgress
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived
+from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.inputs import PATIENCE_S
@@ -193,6 +193,12 @@ def test_ground_far_away_of_a_robot_that_lies_takes_no_memory():
     assert joint.lattice.states.size <= own.lattice.states.size + shared_ground.MOST_ADDED
 
 
+def divided(robots, seeds, handicaps_s=(0.0, 0.0, 0.0)):
+    """Return the division of robots by their seeds."""
+    parts = zip(robots, seeds, handicaps_s, strict=False)
+    return Division.of(Part(robot.name, seed, s, robot.step_s) for robot, seed, s in parts)
+
+
 @pytest.mark.parametrize("moved", [(0, 12), (1, 15)])
 def test_parts_stay_in_place_while_nothing_ends_much_earlier(moved):
     lattice = CoverageLattice.from_free(np.ones((3, 40), np.bool_))
@@ -200,7 +206,7 @@ def test_parts_stay_in_place_while_nothing_ends_much_earlier(moved):
     robots = [Robot("r1", (0, 0), 1.0), Robot("r2", (0, 39), 1.0)]
     first = divide(lattice, wanted, robots)
     later = divide(lattice, wanted, [Robot("r1", moved, 1.0), robots[1]], first)
-    assert later.seeds == first.seeds
+    assert [part.seed for part in later.parts] == [part.seed for part in first.parts]
 
 
 @pytest.mark.parametrize(("idle_at", "helps"), [((5, 7), False), ((0, 20), True)])
@@ -211,7 +217,7 @@ def test_a_robot_gets_its_first_cells_only_if_all_end_sooner(idle_at, helps):
     wanted[:2, 2:6], wanted[:, 34:] = True, True
     places, seeds = [(2, 5), idle_at, (3, 33)], ((1, 4), (3, 20), (3, 36))
     robots = [Robot(f"r{number}", cell, 1.0) for number, cell in enumerate(places)]
-    before = Division(tuple(robots), seeds, (0.0, 0.0, 0.0))
+    before = divided(robots, seeds)
     after = divide(lattice, wanted, robots, before)
     changed = wanted & (before.owners(lattice) != after.owners(lattice))
     assert changed.any() == helps
@@ -229,7 +235,7 @@ WALLED = CoverageLattice.from_free(np.arange(60) != np.full((30, 1), 40))
 def test_a_seed_out_of_reach_is_not_kept(own, step_s, wide):
     """Its huge handicap gave all to one robot, on its map and on the other's to different ones."""
     robots = [Robot("r1", (0, 0), step_s), Robot("r2", (29, 39), step_s)]
-    before = Division(tuple(robots), ((0, 0), (15, 50)), (0.0, 0.0))
+    before = divided(robots, ((0, 0), (15, 50)))
     wanted = np.zeros(own.steps.shape, np.bool_)
     wanted[:, :wide] = True
     after = divide(own, wanted, robots, before)
@@ -243,7 +249,7 @@ def test_cells_out_of_reach_of_seeds_go_by_handicap_not_pace(own):
     robots = Robot("r1", (0, 0), 3.0), Robot("r2", (29, 39), 0.6)
     seeds = (15, 50), (20, 50)
     for handicaps_s, owner in (((0.0, 1000.0), 0), ((1000.0, 0.0), 1)):
-        owners = Division(robots, seeds, handicaps_s).owners(own)
+        owners = divided(robots, seeds, handicaps_s).owners(own)
         assert (owners[:, :40] == owner).all()
 
 
@@ -306,7 +312,7 @@ def test_a_distant_robot_without_a_part_takes_over_cells():
     wanted = np.zeros((3, 100), np.bool_)
     wanted[:, 60:] = True
     robots = [Robot("r1", (1, 0), 1.0), Robot("r2", (1, 99), 1.0)]
-    before = Division(tuple(robots), ((1, 20), (1, 80)), (0.0, 0.0))
+    before = divided(robots, ((1, 20), (1, 80)))
     assert (before.owners(lattice)[wanted] == 1).all()
     owners = divide(lattice, wanted, robots, before).owners(lattice)
     assert 20 < np.count_nonzero(owners[wanted] == 0) < 50

@@ -5,14 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.fleet.observer.members import (
-    GONE_NS,
-    NOBODY,
-    Member,
-    Members,
-    owners_of,
-    shares_of,
-)
+from fasaco_edge.fleet.observer.members import GONE_NS, Members
+from fasaco_edge.fleet.observer.survey import NOBODY, owners_of, survey_of
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.wire.documents.fleet import FleetPart
 from tests.fleet.told import member
@@ -25,15 +19,15 @@ PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (0, 0)),
 @pytest.fixture
 def halved():
     """Two robots that have divided a hall."""
-    members = Members(Member)
-    assert shares_of(members, 0) is None
+    members = Members()
+    assert survey_of(members, 0).geometry is None
     for name in ("a", "b"):
         members.receive(name, member(division=7, by="a", parts=PARTS), SECOND)
     return members
 
 
 def test_each_has_the_part_that_it_is_nearer_to(halved):
-    cells = shares_of(halved, SECOND).cells
+    cells = survey_of(halved, SECOND).left
     assert cells.keys() == {"a", "b"}
     assert cells.total() == HALL
     assert abs(cells["a"] - cells["b"]) <= 20
@@ -43,12 +37,12 @@ def test_one_left_alone_has_all_that_is_left(halved):
     swept = [(0, col) for col in range(30)]
     now = SECOND + GONE_NS + 1
     halved.receive("b", member(cells=swept, division=8, by="b"), now)
-    assert shares_of(halved, now).cells == {"b": HALL - 30}
+    assert (+survey_of(halved, now).left) == {"b": HALL - 30}
 
 
 def test_a_new_robot_without_a_division_changes_nothing(halved):
     halved.receive("c", member(division=0), SECOND)
-    assert shares_of(halved, SECOND).cells.keys() == {"a", "b"}
+    assert (+survey_of(halved, SECOND).left).keys() == {"a", "b"}
 
 
 def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
@@ -56,10 +50,10 @@ def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
     now = SECOND + GONE_NS
     for name in ("a", "b"):
         halved.receive(name, member(division=8, by="b", parts=PARTS), now)
-    assert shares_of(halved, now).cells == {"c": HALL}
-    assert shares_of(halved, now + 1).cells.keys() == {"a", "b"}
+    assert (+survey_of(halved, now).left) == {"c": HALL}
+    assert (+survey_of(halved, now + 1).left).keys() == {"a", "b"}
     # Once all are gone the last division stays drawn.
-    assert shares_of(halved, now + GONE_NS + 1).cells == {"c": HALL}
+    assert (+survey_of(halved, now + GONE_NS + 1).left) == {"c": HALL}
 
 
 def test_cells_beyond_the_steps_that_are_looked_for_are_nobodys(halved):

@@ -278,7 +278,7 @@ def test_a_later_part_can_be_read_alone(studio):
 
 def test_a_robot_beyond_the_limit_replaces_one_long_gone(monkeypatch):
     monkeypatch.setattr(members, "MOST_MEMBERS", 2)
-    fleet, second = members.Members(members.Member), 1_000_000_000
+    fleet, second = members.Members(), 1_000_000_000
     for name, at_s in (("a", 1), ("b", 50)):
         assert fleet.receive(name, member(), at_s * second)[1] == members.JOINED
     with pytest.raises(FleetError, match="c: 2 robots"):
@@ -289,7 +289,7 @@ def test_a_robot_beyond_the_limit_replaces_one_long_gone(monkeypatch):
 
 
 def test_all_robots_that_a_division_may_have_are_recorded():
-    fleet = members.Members(members.Member)
+    fleet = members.Members()
     for number in range(MAX_FLEET_PARTS):
         fleet.receive(f"r{number}", member(), 1)
     assert [one.number for one in fleet] == list(range(MAX_FLEET_PARTS))

@@ -89,16 +89,6 @@ def test_before_there_is_a_robot_other_fleets_are_named():
     assert "waiting for the bus at tcp/127.0.0.1:7447" in page_of(view)
 
 
-def test_of_more_robots_than_lines_some_are_counted():
-    view = FleetView("house")
-    for number in range(30):
-        say(view, f"r{number:02}")
-    page = page_of(view, 80, 24)
-    assert "30 of 30 robots at work" in page
-    assert "r10" in page
-    assert "14 more" in page
-
-
 NUMBER = st.floats(-MAX_COORDINATE_M, MAX_COORDINATE_M)
 PLACE = st.tuples(NUMBER, NUMBER)
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from fasaco_edge.client.events import KEPT
 from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS, REPLACED_NS
-from fasaco_edge.fleet.watch import floor as fleet_floor
-from fasaco_edge.fleet.watch.robot import LONGEST
-from fasaco_edge.fleet.watch.view import MOST_FAULTS, MOST_FLEETS, FleetView
+from fasaco_edge.fleet.observer.survey import MOST_STEPS
+from fasaco_edge.fleet.watch import view as fleet_view
+from fasaco_edge.fleet.watch.view import LONGEST, MOST_FAULTS, MOST_FLEETS, FleetView
 from fasaco_edge.wire.documents.fleet import CellTile, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import (
@@ -35,8 +35,8 @@ HALL = 20 * 30
 @pytest.fixture(autouse=True)
 def _at_once(monkeypatch):
     """The floor is made again as often as it changes."""
-    monkeypatch.setattr(fleet_floor, "LEAST_AGE_S", 0.0)
-    monkeypatch.setattr(fleet_floor, "LEAST_REST", 0.0)
+    monkeypatch.setattr(fleet_view, "LEAST_AGE_S", 0.0)
+    monkeypatch.setattr(fleet_view, "LEAST_REST", 0.0)
 
 
 def texts(view):
@@ -53,10 +53,10 @@ def test_it_tells_who_does_what():
     assert doing(view) == {"a": "covering", "b": "waits for a"}
     assert (a.x, a.y) == (1.0, 1.0)
     assert (a.swept_cells, b.swept_cells) == (4, 3)
-    assert a.swept_m2 == pytest.approx(4 * CELL_M**2)
+    assert a.cell_m2 == pytest.approx(CELL_M**2)
     # Each cell counts once, and cells that are swept are no part of what is left.
     assert view.floor.area == HALL
-    assert (view.floor.swept, view.floor.twice) == (6, 1)
+    assert (view.floor.swept, view.floor.twice.sum()) == (6, 1)
     assert a.left_cells + b.left_cells == HALL - 6
     assert abs(a.left_cells - b.left_cells) <= 20
     assert texts(view) == [
@@ -130,7 +130,7 @@ def test_robots_with_turned_maps_share_the_floor():
     # The same floor, seen from the corner across.
     say(view, "b", cells=square[:50], origin=(3.0, 3.0, 180.0), **ours)
     view.tick(NOW)
-    assert (view.floor.area, view.floor.swept, view.floor.twice) == (100, 100, 50)
+    assert (view.floor.area, view.floor.swept, view.floor.twice.sum()) == (100, 100, 50)
 
 
 def test_a_robot_that_others_leave_out_is_shown_as_such():
@@ -278,7 +278,7 @@ def test_a_maze_as_large_as_can_be_told_takes_a_moment_only():
     view.tick(NOW + 0.2 * number)
     print(f"{time.monotonic() - began:.1f} s")
     assert view.floor.area == np.count_nonzero(maze) > 900_000
-    assert fleet_floor.MOST_STEPS <= view.floor.left["a"] < 2 * fleet_floor.MOST_STEPS
+    assert MOST_STEPS <= view.floor.left["a"] < 2 * MOST_STEPS
 
 
 SAID = member(cells=[(1, 2)], division=3, by="a", parts=PARTS, waits_for="b", ahead=((1.0, 2.0),))

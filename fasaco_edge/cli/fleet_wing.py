@@ -1,0 +1,48 @@
+"""Interface to the package ``fleet``: what commands need, loaded only if a fleet is requested.
+
+The one place of the command line that imports the fleet, as ``daemon.fleet_wing`` is of the daemon.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fasaco_edge.fleet.cli.mission import command_fleet
+    from fasaco_edge.fleet.cli.plan import plan_fleet
+    from fasaco_edge.fleet.cli.review import print_fleet
+    from fasaco_edge.fleet.cli.watch import fleet_on_bus
+    from fasaco_edge.fleet.mission.travel import apart
+    from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
+    from fasaco_edge.fleet.review.drawing import draw_fleet_mission
+
+__all__ = [
+    "apart",
+    "command_fleet",
+    "draw_fleet_mission",
+    "file_name",
+    "fleet_on_bus",
+    "plan_fleet",
+    "print_fleet",
+    "run_fleet_recorder",
+]
+
+_PLACES = {
+    "apart": "mission.travel",
+    "command_fleet": "cli.mission",
+    "draw_fleet_mission": "review.drawing",
+    "file_name": "recording.recorder",
+    "fleet_on_bus": "cli.watch",
+    "plan_fleet": "cli.plan",
+    "print_fleet": "cli.review",
+    "run_fleet_recorder": "recording.recorder",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Load a function of the fleet when it is imported from here."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found: object = getattr(import_module(f"fasaco_edge.fleet.{_PLACES[name]}"), name)
+    return found

@@ -1,0 +1,61 @@
+"""Messages of a robot to its fleet: its state, its next metres, its division, and tiles in turn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fasaco_edge.fleet.mission.ground import GroundQueue
+from fasaco_edge.fleet.mission.kind import fleet_of
+from fasaco_edge.fleet.mission.tiles import SweptQueue
+from fasaco_edge.mission.core.events import MemberReceived
+
+if TYPE_CHECKING:
+    from fasaco_edge.mission.core.mission import Mission
+
+
+class Messages:
+    """Makes the messages of one robot, as other robots of its map frame receive them.
+
+    Args:
+        robot: its name.
+        radius_m: of its disc [m].
+    """
+
+    def __init__(self, robot: str, radius_m: float) -> None:
+        self._robot, self._radius_m, self._epoch = robot, radius_m, 0
+        self._swept, self._ground = SweptQueue(), GroundQueue()
+
+    def next(self, mission: Mission, most: int, most_anew: int) -> MemberReceived | None:
+        """Return the next message; None before the mission has a map and a pose.
+
+        Args:
+            mission: of the robot.
+            most: limit on the tiles of progress, and on those of ground.
+            most_anew: the same after cells were forgotten.
+        """
+        if mission.pose is None or not mission.ledger.frame:
+            return None
+        others, pose, tiles = fleet_of(mission), mission.pose.pose, mission.ledger.snapshot().tiles
+        if others.shared.epoch != self._epoch:
+            # Published changes are forgotten. Cells swept before a restart are not known.
+            before = tiles if self._epoch else None
+            self._epoch, self._swept, most = others.shared.epoch, SweptQueue(before), most_anew
+        swept = self._swept.next(tiles, most)
+        return MemberReceived(
+            robot=self._robot,
+            frame=mission.ledger.frame,
+            state=str(mission.state),
+            x=round(pose.x, 3),
+            y=round(pose.y, 3),
+            step_s=others.step_s,
+            epoch=others.shared.epoch,
+            division=others.numbers.number,
+            tiles=swept,
+            ground=self._ground.next(mission.area, most),
+            by=others.numbers.by,
+            parts=others.parts,
+            radius_m=self._radius_m,
+            ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
+            waits_for=mission.waits_for,
+            kept=self._swept.kept(swept),
+        )
