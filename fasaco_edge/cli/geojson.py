@@ -18,16 +18,22 @@ from fasaco_edge.wire.documents.rooms import Rooms
 SUFFIX = ".geojson"
 HINT = "draw each zone as a Polygon; `rooms list --geojson` shows what one looks like"
 # Properties of a feature that are members of a zone.
-OF_ZONES = ("name", "passes", "room")
+OF_ZONES = ("name", "passes", "room", "priority")
 # Members of the collection that are members of an order.
-OF_ORDERS = ("passes", "return_home", "keep_covered", "unknown")
+OF_ORDERS = ("passes", "return_home", "keep_covered", "unknown", "until_min")
 
 Feature = dict[str, object]
 
 
-def collection(frame: str, features: Iterable[Feature]) -> dict[str, object]:
-    """Return a document of features in a frame."""
-    return {"type": "FeatureCollection", "frame": frame, "features": list(features)}
+def lines_collection(
+    lines: Iterable[tuple[Sequence[Sequence[float]], dict[str, object]]],
+) -> dict[str, object]:
+    """Return lines through points (x, y) [m], each with its properties."""
+    features = [
+        _feature("LineString", [list(point[:2]) for point in points], properties)
+        for points, properties in lines
+    ]
+    return {"type": "FeatureCollection", "features": features}
 
 
 def rooms_collection(rooms: Rooms) -> dict[str, object]:
@@ -44,16 +50,11 @@ def rooms_collection(rooms: Rooms) -> dict[str, object]:
             "swept": room.swept,
             "skip": room.skip,
         }
-        features.append(feature("Polygon", rings, properties))
-    return collection(rooms.frame, features)
+        features.append(_feature("Polygon", rings, properties))
+    return {"type": "FeatureCollection", "frame": rooms.frame, "features": features}
 
 
-def line_feature(points: Sequence[Sequence[float]], properties: dict[str, object]) -> Feature:
-    """Return a line through points (x, y) [m]."""
-    return feature("LineString", [list(point) for point in points], properties)
-
-
-def feature(kind: str, coordinates: object, properties: dict[str, object]) -> Feature:
+def _feature(kind: str, coordinates: object, properties: dict[str, object]) -> Feature:
     """Return a feature of one geometry."""
     geometry = {"type": kind, "coordinates": coordinates}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
@@ -75,31 +76,41 @@ def is_geojson(document: object) -> TypeGuard[dict[str, object]]:
 def order_of(document: dict[str, object]) -> dict[str, object]:
     """Return the order that a collection of polygons stands for.
 
-    A polygon is a zone, with ``name`` and ``passes`` of its properties; with ``"keep_out": true``
-    it is one that the robot must not touch. A room is ordered by its number. ``passes``,
-    ``return_home``, ``keep_covered`` and ``unknown`` of the collection are those of the order.
+    A polygon is a zone, with ``OF_ZONES`` of its properties; with ``"keep_out": true`` it is one
+    that the robot must not touch. A room is ordered by its number, whatever its outline, unless it
+    is to be skipped. ``OF_ORDERS`` of the collection are those of the order.
 
     Raises:
-        OrderError: a feature is no polygon without holes.
+        OrderError: there is no feature, or one is no polygon without holes.
     """
     zones: list[dict[str, object]] = []
     keep_out: list[object] = []
     features = document.get("features")
-    for number, each in enumerate(features if isinstance(features, list) else ()):
+    if not isinstance(features, list) or not features:
+        raise OrderError("features: there is none", hint=HINT)
+    for number, each in enumerate(features):
         where, members = f"features[{number}]", each if isinstance(each, dict) else {}
         properties = members.get("properties") or {}
         if not isinstance(properties, dict):
             raise OrderError(f"{where}: properties must be an object", hint=HINT)
-        own = {name: properties[name] for name in OF_ZONES if properties.get(name) is not None}
-        named = {"name": f"zone {number + 1}"} | own
-        if "room" in own:
-            zones.append(named)
-        elif properties.get("keep_out") is True:
-            keep_out.append(_corners(members.get("geometry"), where))
-        else:
-            zones.append(named | {"polygon": _corners(members.get("geometry"), where)})
+        geometry = members.get("geometry")
+        if _is_set(properties, "keep_out", where):
+            keep_out.append(_corners(geometry, where))
+        elif not _is_set(properties, "skip", where):
+            own = {name: properties[name] for name in OF_ZONES if properties.get(name) is not None}
+            named = {"name": f"zone {number + 1}"} | own
+            placed = {} if "room" in own else {"polygon": _corners(geometry, where)}
+            zones.append(named | placed)
     order = {name: document[name] for name in OF_ORDERS if name in document}
     return order | {"zones": zones, "keep_out": keep_out}
+
+
+def _is_set(properties: dict[str, object], name: str, where: str) -> bool:
+    """Return a property that is true or false; without it false."""
+    value = properties.get(name)
+    if value is not None and not isinstance(value, bool):
+        raise OrderError(f"{where}.{name}: must be true or false, is {value!r}", hint=HINT)
+    return bool(value)
 
 
 def _corners(geometry: object, where: str) -> list[object]:
@@ -114,4 +125,5 @@ def _corners(geometry: object, where: str) -> list[object]:
     ring = rings[0]
     if not isinstance(ring, list) or len(ring) < 2 or ring[0] != ring[-1]:
         raise OrderError(f"{where}: the last corner must be the first again", hint=HINT)
-    return ring[:-1]
+    # Drawing programs add a height.
+    return [corner[:2] if isinstance(corner, list) else corner for corner in ring[:-1]]

@@ -197,7 +197,7 @@ class CoverageProblem:
         return int(np.count_nonzero(_differ(rooms[:-1], rooms[1:]))) * self.cost.room_us
 
     @property
-    def steps(self) -> NDArray[np.uint8]:
+    def steps_with_rooms(self) -> NDArray[np.uint8]:
         """The steps of the lattice, with those that lead into another room, see ``ROOM_BITS``."""
         steps, rooms = self.lattice.steps, self.rooms
         if rooms is None:
@@ -305,7 +305,7 @@ class FramedGround:
     def of(cls, problem: CoverageProblem) -> FramedGround:
         """Add a border to a problem's lattice."""
         rows, cols = problem.to_cover.shape
-        steps = np.pad(problem.steps, FRAME)
+        steps = np.pad(problem.steps_with_rooms, FRAME)
         needed = np.pad(problem.to_cover.astype(np.int32), FRAME)
         width = cols + 2 * FRAME
         offsets = np.array([1, width, -1, -width], np.int64)

@@ -78,7 +78,11 @@ class RecordedRun:
         """
         # Releases without lines drove through cells; those without lattice rotation, along the
         # axes.
+        # They took no price for steps into other rooms, either.
         config = without_removed(renamed(self.config))
+        mission = config.get("mission", {})
+        if isinstance(mission, Mapping):
+            config["mission"] = {"by_room": "never", **mission}
         planner = config.get("planner", {})
         if isinstance(planner, Mapping):
             config["planner"] = {"line": "cells", "align": "axes", **planner}

@@ -6,7 +6,7 @@ from itertools import pairwise
 import pytest
 
 from fasaco_edge.cli import main
-from fasaco_edge.cli.geojson import collection, is_geojson, line_feature, order_of, rooms_collection
+from fasaco_edge.cli.geojson import is_geojson, order_of, rooms_collection
 from fasaco_edge.errors import OrderError
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
@@ -18,8 +18,12 @@ ROOMS = Rooms(
 )
 
 
+def collection(features):
+    return {"type": "FeatureCollection", "features": features}
+
+
 def square(**properties):
-    corners = [[0, 0], [4, 0], [4, 3], [0, 3], [0, 0]]
+    corners = [[0, 0, 9], [4, 0, 9], [4, 3, 9], [0, 3, 9], [0, 0, 9]]  # with a height
     geometry = {"type": "Polygon", "coordinates": [corners]}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
 
@@ -49,13 +53,12 @@ def test_rooms_that_were_written_are_an_order_for_these_rooms():
 
 def test_an_order_is_read_as_it_was_drawn():
     drawn = [square(name="kitchen", passes=["auto", "cross"]), square(keep_out=True), square()]
-    order = read_order(order_of(collection("map", drawn) | {"return_home": True}))
+    order = read_order(order_of(collection(drawn) | {"return_home": True, "until_min": 40}))
     assert [zone.name for zone in order.zones] == ["kitchen", "zone 3"]
     assert order.zones[0].passes == 2
     assert order.zones[0].polygon == ((0, 0), (4, 0), (4, 3), (0, 3))
     assert len(order.keep_out) == 1
-    assert order.return_home
-    assert read_order(order_of(collection("map", []))).zones[0].polygon is None
+    assert (order.return_home, order.until_min) == (True, 40)
 
 
 @pytest.mark.parametrize(
@@ -73,12 +76,26 @@ def test_an_order_is_read_as_it_was_drawn():
 def test_a_feature_that_is_no_zone_is_named(geometry):
     drawn = [square(), {"type": "Feature", "geometry": geometry, "properties": None}]
     with pytest.raises(OrderError, match=r"features\[1\]|zones\[1\]"):
-        read_order(order_of(collection("map", drawn)))
+        read_order(order_of(collection(drawn)))
 
 
-def test_a_line_is_a_line():
-    line = line_feature([(0.0, 0.5), (1.0, 0.5)], {"seconds": 4.0})
-    assert line["geometry"] == {"type": "LineString", "coordinates": [[0.0, 0.5], [1.0, 0.5]]}
+def test_what_is_not_to_be_driven_is_never_floor_to_sweep():
+    room = square(room=3, name="bath")
+    drawn = [room | {"properties": room["properties"] | more} for more in KEPT]
+    order = read_order(order_of(collection([*drawn, square(name="hall", priority=90)])))
+    assert [(zone.name, zone.priority) for zone in order.zones] == [("hall", 90)]
+    assert order.keep_out == (((0, 0), (4, 0), (4, 3), (0, 3)),)
+    with pytest.raises(OrderError, match="keep_out: must be true or false, is 'true'"):
+        order_of(collection([square(keep_out="true")]))
+
+
+KEPT = ({"keep_out": True}, {"skip": True})
+
+
+@pytest.mark.parametrize("features", [{}, {"features": []}, {"features": {"0": 1}}])
+def test_a_file_without_features_is_no_order_for_everything(features):
+    with pytest.raises(OrderError, match="features: there is none"):
+        order_of({"type": "FeatureCollection"} | features)
 
 
 def test_plan_writes_a_line_and_an_order_is_read_from_a_file(tmp_path, capsys):

@@ -101,9 +101,11 @@ def test_the_last_shares_of_an_order_do_not_wait():
     assert len(sent.messages) == 1
     publisher.publish(drive.mission, now=SWEPT_PERIOD_S)
     assert len(sent.messages) == 2
+    rooms = decode_document(sent.messages[-1][1], Rooms).rooms
+    assert {room.id: room.to_go_s for room in rooms}[number] > 10.0
     drive.finish()
     publisher.publish(drive.mission, now=SWEPT_PERIOD_S + ROOMS_PERIOD_S)
     rooms = decode_document(sent.messages[-1][1], Rooms).rooms
-    assert {room.id: room.swept for room in rooms}[number] == 1.0
+    assert {room.id: (room.swept, room.to_go_s) for room in rooms}[number] == (1.0, None)
     publisher.publish(drive.mission, now=3 * SWEPT_PERIOD_S)
     assert len(sent.messages) == 3

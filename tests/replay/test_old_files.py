@@ -67,6 +67,7 @@ def test_samples_lead_to_the_same_paths(recording):
     config = read_run(samples).daemon_config()
     # What there was no setting for is as it was.
     assert (config.planner.line, config.planner.align) == ("cells", "axes")
+    assert config.mission.by_room == "never"
     replay = Replay(config, work=100)
     paths = [step.decision.path for step in replay.steps(samples) if step.decision.path is not None]
     digests = [digest(path.cells.astype("<i4").tobytes()).hex() for path in paths]

@@ -36,7 +36,7 @@ def test_rooms_are_said_once_and_shares_as_they_are_swept():
     assert heard(view, "rooms", 1.0) == {"kind": "rooms", "rooms": []}
     rooms = [RoomReport(index + 1, outline=each) for index, each in enumerate(GRID)]
     rooms[1] = RoomReport(
-        2, "kit\x1bchen", GRID[1], 9.04, (1, 3), (), 0.25, ("auto", "cross"), True
+        2, "kit\x1bchen", GRID[1], 9.04, (1, 3), (), 0.25, passes=("auto", "cross"), skip=True
     )
     far = RoomReport(90, outline=square(1e9, 0.0))
     tell(view, "rooms", Rooms("map", 1, (*rooms, far, RoomReport(91))), 2.0)
@@ -50,7 +50,9 @@ def test_rooms_are_said_once_and_shares_as_they_are_swept():
     shares = json.loads(news["shares"])["swept"]
     assert (shares["1"], shares["2"]) == (None, 0.25)
     # A drive changes the shares alone.
-    rooms[1] = RoomReport(2, "kit\x1bchen", GRID[1], 9.04, (1, 3), (), 0.5, ("auto", "cross"), True)
+    rooms[1] = RoomReport(
+        2, "kit\x1bchen", GRID[1], 9.04, (1, 3), (), 0.5, passes=("auto", "cross"), skip=True
+    )
     tell(view, "rooms", Rooms("map", 1, tuple(rooms)), 3.0)
     news = view.news(3.0)
     assert "rooms" not in news

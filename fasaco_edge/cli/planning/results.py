@@ -15,7 +15,7 @@ from rich.table import Table
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.geojson import SUFFIX, collection, line_feature
+from fasaco_edge.cli.geojson import SUFFIX, lines_collection
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.documents.json_text import encode_json
 
@@ -62,12 +62,13 @@ def _write_lines(file: Path, plans: Sequence[Plan], is_several: bool) -> None:
     if curve is not None:
         lines, header = [curve.poses], ["x_m", "y_m", "yaw_rad"]
     if file.suffix == SUFFIX:
-        features = (
-            line_feature(line[:, :2].tolist(), {"pass": number, "swept": plan.swept_share})
-            for number, (plan, line) in enumerate(zip(plans, lines, strict=True), 1)
+        each = enumerate(zip(plans, lines, strict=True), 1)
+        document = lines_collection(
+            (line.tolist(), {"pass": number, "swept": plan.swept_share})
+            for number, (plan, line) in each
         )
         with writing(file) as new:
-            new.write_bytes(encode_json(collection("map", features)))
+            new.write_bytes(encode_json(document))
         return
     rows = _numbered(lines, is_several)
     form = ["%d"] * is_several + ["%.6f"] * (rows.shape[1] - is_several)

@@ -242,22 +242,28 @@ class RoomsPublisher:
         self._outbox, self._book = outbox, book
         self._published_at = float("-inf")
         self._version = -1
-        self._covered: object = None
+        self._progress: object = None
 
     def publish(self, mission: Mission | None, now: float) -> None:
         """Publish the rooms if that is due."""
-        book, covered = self._book, None if mission is None else mission.covered.version
+        book, progress_id = self._book, None if mission is None else _progress_of(mission)
         is_new = book.version != self._version
-        if not is_new and (covered == self._covered or not book.rooms):
+        if not is_new and (progress_id == self._progress or not book.rooms):
             return
         # Shares at the end of an order are not to be missed by who ends with it.
         is_over = mission is not None and mission.state.is_at_rest
         if now - self._published_at < (ROOMS_PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
             return
-        self._published_at, self._version, self._covered = now, book.version, covered
+        self._published_at, self._version, self._progress = now, book.version, progress_id
         progress = {} if mission is None else mission.room_progress()
         rooms = tuple(_report(room, progress.get(room.id)) for room in book.rooms)
         self._outbox.send(ROOMS, encode_json(Rooms(book.frame, book.version, rooms)))
+
+
+def _progress_of(mission: Mission) -> tuple[object, int, bool]:
+    """Return what shares, and times to go, change with."""
+    route = mission.route
+    return mission.covered.version, route.revision, len(route.path.ahead) > 1
 
 
 def _report(room: Room, progress: RoomProgress | None) -> RoomReport:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Exit, writing
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.cli.geojson import SUFFIX, lines_collection
 from fasaco_edge.cli.planning.request import require_frame, watching
 from fasaco_edge.cli.planning.results import say_written
 from fasaco_edge.cli.warmup import compile_kernels
@@ -25,6 +26,7 @@ from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.planner import Interrupt, SearchProgress, TimeBudget
 from fasaco_edge.planners.stages import stages_of_plan
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
 if TYPE_CHECKING:
@@ -171,7 +173,12 @@ def _write(
 
         lines = [line_through(lattice, walk) for walk in division.walks]
         with writing(args.xy_out) as file:
-            _write_rows(file, "robot,x_m,y_m", ("%d", "%.6f", "%.6f"), lines)
+            if args.xy_out.suffix == SUFFIX:
+                each = enumerate((line.tolist() for line in lines), 1)
+                document = lines_collection((line, {"robot": number}) for number, line in each)
+                file.write_bytes(encode_json(document))
+            else:
+                _write_rows(file, "robot,x_m,y_m", ("%d", "%.6f", "%.6f"), lines)
     if args.png is not None:
         from fasaco_edge.fleet.review.drawing import draw_fleet
 

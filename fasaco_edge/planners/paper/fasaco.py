@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.colony import ColonyState, Rules, deposit, settle, walk_ants
 from fasaco_edge.kernels.ants.graph import Graph
+from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
 from fasaco_edge.planners.living_trail import TrailSnapshot, legal, mean_into
 from fasaco_edge.planners.paper.colony import VISIBILITIES, ColonyConfig
@@ -256,7 +257,8 @@ class Fasaco:
         with ThreadPoolExecutor(self.threads) as pool:
             colony = Colony(config, problem, graph_of(problem), pool, self.threads)
             if (before := _walk_before(problem)) is not None:
-                colony.offer(before, problem.cost_us(before))
+                cost = problem.cost
+                colony.offer(before, int(walk_cost(before, cost.step_us, cost.quarter_turn_us)))
                 first_us = colony.best_us
             for cohort, velocity, streams, is_last in groups_of(config, problem.cells):
                 colony.walk(velocity, streams)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fasaco_edge.planners.bound import GLANCE, lower_bound_of, lower_bound_steps
-from fasaco_edge.planners.cost import SearchWork
+from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
@@ -108,7 +108,8 @@ def _with_lead(problem: CoverageProblem, path: CoveragePath) -> CoveragePath:
     cells = np.concatenate((problem.lead, path.cells))
     cost_s = whole.cost.of_walk(cells)
     # A path that is no better is dropped, so its bound is not needed.
-    if problem.before is not None and path.cost_s >= problem.cost.of_walk(problem.before):
+    before_s = None if problem.before is None else problem.price_us(problem.before) / MICROSECONDS
+    if before_s is not None and path.cost_s >= before_s:
         return replace(path, cells=cells, cost_s=cost_s, lower_bound_steps=0, lower_bound_cost_s=0)
     bound = lower_bound_of(whole, GLANCE)
     return replace(

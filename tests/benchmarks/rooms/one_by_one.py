@@ -25,7 +25,7 @@ from tests.benchmarks.online.sight import Senses
 from tests.benchmarks.rooms.homes import Home, home
 
 KINDS = ("home", "office")
-POLICIES: tuple[ByRoom, ...] = ("never", "auto", "always")
+POLICIES: tuple[ByRoom, ...] = ("never", "auto")
 FOOTPRINT, PACE, RANGE_M = Footprint(0.3, 0.18), Pace(0.25, 1.5), 3.0
 PROPOSALS, SPARE_SHARE = 200_000, 0.05
 # A stay in a room is one to sweep if so many cells are new: fewer are passed on the way through.
@@ -143,7 +143,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Drive, None, None]
             floor = home(kind, number)
             for start in range(args.starts):
                 say(f"{floor.name}, start {start}")
-                for policy in POLICIES[: args.policies]:
+                for policy in POLICIES:
                     yield drive(floor, start, policy, kind, number)
 
 
@@ -154,19 +154,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--starts", type=positive, default=2, help="on each floor (default: %(default)s)"
     )
-    parser.add_argument(
-        "--policies",
-        type=positive,
-        default=len(POLICIES),
-        help=f"the first so many of {', '.join(POLICIES)} (default: all)",
-    )
     parser.add_argument("--seed", type=seed, default=0, help="the first (default: %(default)s)")
 
 
 def _report(args: argparse.Namespace, samples: Sequence[Drive]) -> Report:
     never = {(one.kind, one.number): one for one in samples if one.policy == POLICIES[0]}
     figures, rows = [], []
-    for policy in POLICIES[: args.policies]:
+    for policy in POLICIES:
         for kind in (*KINDS, "all"):
             drives = [one for one in samples if one.policy == policy and kind in (one.kind, "all")]
             ratios = [one.seconds / never[one.kind, one.number].seconds for one in drives]
@@ -180,23 +174,17 @@ def _report(args: argparse.Namespace, samples: Sequence[Drive]) -> Report:
             figures[-1] |= {"missions": len(drives), "done": done}
             rows.append((kind, policy, str(len(drives)), f"{time:.4f}", *map(str, sums.values())))
     total = {each["by_room"]: each for each in figures if each["kind"] == "all"}
-    goals: tuple[Goal, ...] = ()
-    if args.policies > 1:
-        least = max(int(total["never"]["returns"]), 1)
-        goals = (
-            Goal("time of auto, over never", float(total["auto"]["time"]), GOAL_TIME),
-            Goal(
-                "rooms come back to, auto over never",
-                round(int(total["auto"]["returns"]) / least, 3),
-                round(GOAL_SHARE, 3),
-            ),
-        )
+    least = max(int(total["never"]["returns"]), 1)
+    share = round(int(total["auto"]["returns"]) / least, 3)
     return Report(
         title="a room finished before the next",
         header=HEADER,
         rows=tuple(rows),
         figures={"by_room": figures},
-        goals=goals,
+        goals=(
+            Goal("time of auto, over never", float(total["auto"]["time"]), GOAL_TIME),
+            Goal("rooms come back to, auto over never", share, round(GOAL_SHARE, 3)),
+        ),
         remarks=(
             "came back: stays with four new cells or more in a room that had such a stay before, "
             "but for rooms on the way to others; also through: those, too; time: mean of the "
@@ -209,16 +197,16 @@ BY_ROOM = Benchmark(
     name="by-room",
     summary="what finishing a room before the next costs, and saves",
     description="Simulate missions in unknown generated homes and offices with mission.by_room "
-    "never, auto and always. Count by the robot's track and the true rooms how often it came back "
+    "never and auto. Count by the robot's track and the true rooms how often it came back "
     "to a room that it had left half done.",
     add_options=_add_options,
-    count=lambda args: len(KINDS) * args.floors * args.starts * min(args.policies, len(POLICIES)),
+    count=lambda args: len(KINDS) * args.floors * args.starts * len(POLICIES),
     measure=_measure,
     report=_report,
     epilog="""\
 examples:
   python -m tests.benchmarks by-room
-  python -m tests.benchmarks by-room --floors 2 --policies 2 --seed 900
+  python -m tests.benchmarks by-room --floors 2 --seed 900
 
 Some 30 s a mission on a quiet machine.
 """,
