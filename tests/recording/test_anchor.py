@@ -71,6 +71,18 @@ def test_the_path_lies_on_its_cells_to_a_tenth_of_a_millimetre(recorded):
     assert np.abs(np.asarray(robot[:2], np.float64)).max() < 100.0
 
 
+def test_the_path_before_the_present_one_is_drawn_beside_it(recorded):
+    new, old = (
+        [[np.asarray(line) for line in lines] for lines in read_column(recorded[0], each, STRIPS)[1]]
+        for each in (entities.PATH, entities.OLD_PATH)
+    )
+    assert len(old) >= 1
+    assert any(np.array_equal(old[-1][0], line[0]) for line in new[:-1])
+
+
+STRIPS = "LineStrips3D:strips"
+
+
 def test_the_rectangle_of_a_reason_is_moved_with_all_else(recorded):
     strips = read_column(recorded[0], entities.REPLAN_WINDOW, "LineStrips3D:strips").values
     boxes = [np.asarray(strip[0]) for strip in strips if len(strip)]

@@ -65,6 +65,7 @@ class LineStyle:
 WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
 # They lie below all that moves; the colour is also that of their names, on dark labels.
 ROOM = LineStyle((251, 146, 60), z=0.015, width=1.0)
+OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
 DRIVEN = LineStyle((5, 150, 105), z=0.05, width=1.6)
 ZONE = LineStyle((37, 99, 235), z=0.052, width=2.0)
@@ -72,6 +73,7 @@ KEEP_OUT = LineStyle((234, 88, 12), z=0.053, width=2.4)
 LINES = {
     entities.REPLAN_WINDOW: WINDOW,
     entities.ROOMS: ROOM,
+    entities.OLD_PATH: OLD_PATH,
     entities.PATH: PATH,
     entities.DRIVEN_PATH: DRIVEN,
     entities.ZONES: ZONE,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from msgspec.structs import astuple
+from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
@@ -18,8 +19,11 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.reasons import plain
 
-# Bytes of a point in the file.
-POINT_BYTES = 12
+# Bytes of a point in the file; each path is drawn twice, the second time as the previous path.
+POINT_BYTES = 2 * 12
+
+
+Line = NDArray[np.float64]
 
 
 class PathDrawing:
@@ -32,6 +36,8 @@ class PathDrawing:
         self.catch_up, self.finish = self._log.catch_up, self._log.finish
         self._revision = -1
         self._has_window = False
+        # Revision and line of the path that is drawn.
+        self._drawn: tuple[int, Line | None] = (-1, None)
 
     def add(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw a path; a path that is published again is not drawn anew."""
@@ -44,8 +50,10 @@ class PathDrawing:
         self._revision, line = revision, draw.corners(message.xy)
 
         def draw_path() -> None:
-            archetype = draw.line_archetype(line, draw.PATH)
-            self._writer.log(entities.PATH, archetype, latched=True, size=line.nbytes)
+            (before, old), self._drawn = self._drawn, (revision, line)
+            if old is not None and before != revision:
+                self._draw(entities.OLD_PATH, old, draw.OLD_PATH)
+            self._draw(entities.PATH, line, draw.PATH)
 
         self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._writer.wall_ns)
 
@@ -63,6 +71,10 @@ class PathDrawing:
         self._has_window = changed is not None
         self._writer.log(entities.REPLAN_WINDOW, box, latched=True)
         self._writer.log(entities.REPLAN_REASON, label, latched=True)
+
+    def _draw(self, entity: str, line: Line, style: draw.LineStyle) -> None:
+        archetype = draw.line_archetype(line, style)
+        self._writer.log(entity, archetype, latched=True, size=line.nbytes)
 
 
 # Plans of one kind that follow each other for this long are one line of the log.

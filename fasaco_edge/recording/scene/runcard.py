@@ -25,7 +25,7 @@ MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 LEGEND = """\
 - **Map** white free, black occupied, grey unknown; **turquoise** swept floor
 - **Robot** red, its front yellow; its **track** green, from **start** to **end**
-- **Path** to drive violet
+- **Path** to drive violet, the previous one pale
 - **Pink frame** around all changes of the map that led to this path, and its reason
 - **Blue line** a zone of the order, **orange line** a keep-out zone
 - **Pheromone** left by the planner's ants, for its next ants: dark little, bright much
