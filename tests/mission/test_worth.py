@@ -176,6 +176,9 @@ def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
         tick(drive)
     drive.tell(dirt(95, columns=WEST_COLUMNS))
     assert (drive.request.reason, drive.mission.first_from) == ("priorities have changed", 95)
+    drive.plan()
+    drive.tell(dirt(95, columns=WEST_COLUMNS))
+    assert drive.request is None, "the same again"
     assert finish(drive)[0] == 90
     drive = ranked(None, until_min=60.0)
     drive.plan()

@@ -83,7 +83,15 @@ class WorthFirst:
         self.least, self._is_given_up = 0, False
 
     def take(self, given: OccupancyGrid | None) -> bool:
-        """Take priorities from a message; return whether a new plan has to follow them."""
+        """Take priorities from a message; return whether a new plan has to follow them.
+
+        The same ones again change nothing.
+        """
+        before = self.given
+        if before is not None and given is not None:
+            is_placed_alike = (before.geometry, before.frame) == (given.geometry, given.frame)
+            if is_placed_alike and np.array_equal(before.cells, given.cells):
+                return False
         self.given, self._told = given, None
         return self.choose_anew()
 
