@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import CommandReceived, PriorityReceived, State
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PriorityReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import order_document, read_order
 from fasaco_edge.mission.orders.order_state import OrderState
@@ -29,7 +29,7 @@ from tests.mission.test_room_orders import (
     settled,
     visited,
 )
-from tests.mission.world import rectangle
+from tests.mission.world import Drive, building, pose_at, rectangle
 
 # Both rooms have 90 cells, a second each; the passage between them 8.
 TIGHT_MIN = 2.5
@@ -188,8 +188,13 @@ def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
 
 def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
     drive = settled(*BOTH)
-    (fault,) = drive.tell(dirt(90, frame="odom")).faults
-    assert (fault.code, str(fault)) == ("wrong_frame", "priorities in frame 'odom', map in 'map'")
+    early = Drive((0, 0), dirt(90, frame="odom"))
+    first_map = MapReceived(building(*BOTH)), pose_at(0, 0)
+    for decision in drive.tell(dirt(90, frame="odom")), early.tell(*first_map):
+        (fault,) = decision.faults
+        said = "priorities in frame 'odom', map in 'map'"
+        assert (fault.code, str(fault)) == ("wrong_frame", said)
+    assert not early.tell(*first_map).faults
     drive.command("start", {"until_min": TIGHT_MIN})
     drive.plan()
     assert drive.mission.first_from == 0
