@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PriorityReceived, State
 from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.orders.order import order_document, read_order
+from fasaco_edge.mission.orders.order import EVERYTHING, Zone, order_document, read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.placing import are_same
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.orders.sequencer import MAX_IN_VAIN
-from fasaco_edge.mission.orders.worth import least_priority
+from fasaco_edge.mission.orders.worth import WorthFirst, least_priority
 from tests.mission.battery import Battery
 from tests.mission.test_room_orders import (
     BOTH,
@@ -29,7 +29,7 @@ from tests.mission.test_room_orders import (
     settled,
     visited,
 )
-from tests.mission.world import Drive, building, pose_at, rectangle
+from tests.mission.world import CELL, Drive, building, pose_at, rectangle
 
 # Both rooms have 90 cells, a second each; the passage between them 8.
 TIGHT_MIN = 2.5
@@ -198,6 +198,18 @@ def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
     drive.command("start", {"until_min": TIGHT_MIN})
     drive.plan()
     assert drive.mission.first_from == 0
+
+
+def test_one_slow_path_does_not_count_in_later_passes():
+    window, everything = Window(0, 0, 10, 21), np.ones((10, 21), bool)
+    worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
+    worth.take(dirt(90).grid)
+    worth.allow(300.0)
+    assert worth.is_other_first(everything, window, 2000.0)
+    worth.begin()
+    worth.choose(everything, window)
+    assert worth.least == 0
+    assert not worth.are_too_many(everything.size)
 
 
 WEST, EAST = rectangle(0, 0, 10, 10), rectangle(0, 11, 10, 21)

@@ -74,7 +74,7 @@ class WorthFirst:
         self._cell_m, self._zone, self._frame = cell_m, zone, frame
         # The priorities given by a message on the cells of a window, int8; -1 for none.
         self._told: tuple[Window, NDArray[np.int8]] | None = None
-        # Time that a cell takes; at first the least, by which too much is never put off [s].
+        # The least time that a cell takes, by which too much is never put off [s].
         self._cell_s = step_s
         self._is_given_up = False
 
@@ -142,8 +142,6 @@ class WorthFirst:
         planned = int(np.count_nonzero(cells))
         if not planned or ahead_s <= self.may_work_s:
             return False
-        if not self.least:
-            self._cell_s = ahead_s / planned
         least = self._least_of(cells, window, ahead_s / planned)
         if not least:
             return False
