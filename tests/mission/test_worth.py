@@ -246,6 +246,21 @@ def test_zones_of_higher_priority_come_first_where_time_is_short(priorities, unt
     assert kept.order.zones == drive.mission.order_state.order.zones
 
 
+@pytest.mark.parametrize(
+    ("settings", "enough_min"), [({"passes": ["edge", "rest"]}, 3.5), ({"keep_covered": True}, 2.0)]
+)
+def test_zones_are_counted_by_what_their_passes_cover(settings, enough_min):
+    drive = settled(*BOTH)
+    if "keep_covered" in settings:
+        drive.command("start", {"zones": zones()[:1]})
+        finish(drive)
+    for until_min, first in (enough_min, "west"), (1.4, "east"):
+        order = {"zones": zones(east=60), "until_min": until_min, **settings}
+        drive.command("start", order)
+        assert drive.mission.order_state.order.zones[0].name == first
+        drive.command("cancel")
+
+
 def test_a_room_gives_its_priority_to_the_zone_of_its_name():
     drive = settled(*BOTH)
     name(drive, room_at(drive, *IN_EAST).id, "bath")

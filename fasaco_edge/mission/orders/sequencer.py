@@ -22,7 +22,7 @@ from fasaco_edge.mission.orders.by_room import RoomPrice
 from fasaco_edge.mission.orders.cells_left import (
     CellsLeft,
     LeftBehind,
-    cells_in,
+    visits_due,
     zones_beyond,
 )
 from fasaco_edge.mission.orders.exploration import Exploration
@@ -262,7 +262,11 @@ class Sequencer:
         to_come = state.order.zones[state.zone :]
         if area is None or len({each.worth for each in to_come}) < 2:
             return state
-        cells = sum(each.passes * cells_in(each, area) for each in to_come)
+        window = area.lattice.window
+        skipped = np.zeros(area.reachable.shape, bool)
+        if state.order.keep_covered:
+            skipped = self._ledger.current.visits(window) > 0
+        cells = sum(visits_due(each, area, skipped) for each in to_come)
         return state.most_worthwhile_next() if self.worth.are_too_many(cells) else state
 
     def _forget(self, zone: Zone, state: OrderState) -> None:
