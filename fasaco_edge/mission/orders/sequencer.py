@@ -254,13 +254,17 @@ class Sequencer:
         return "" if state.automatic else state.title
 
     def _most_worthwhile_next(self) -> OrderState:
-        """Return the order with the zones to come by priority, if there is no time for all."""
+        """Return the order with the zones to come by priority, if there is no time for all.
+
+        Not in a fleet: its robots sweep a zone together, in the order given.
+        """
         state, area = self.order_state, self._map.area
         zone = state.current_zone
         if zone is None or state.order is None or state.begun or state.pass_number > 1:
             return state
         to_come = state.order.zones[state.zone :]
-        if area is None or len({each.worth for each in to_come}) < 2:
+        is_alike = len({each.worth for each in to_come}) < 2
+        if area is None or is_alike or self._company.has_members:
             return state
         window = area.lattice.window
         skipped = np.zeros(area.reachable.shape, bool)
