@@ -270,6 +270,13 @@ def test_a_room_gives_its_priority_to_the_zone_of_its_name():
     drive.command("start", {"zones": named, "until_min": 1.5})
     first, second = drive.mission.order_state.order.zones
     assert (first.name, first.worth, second.worth) == ("bath", 70, 50)
+    # A room's other priority makes the same order no other one.
+    order = drive.mission.order_state.order
+    for priority in 80, 50, 20:
+        drive.command("room_set", room=RoomRequest("bath", priority=priority))
+        drive.command("start", {"zones": named, "until_min": 1.5})
+        assert drive.mission.order_state.order == order
+    drive.command("cancel")
     named[1]["priority"] = 10
     drive.command("start", {"zones": named, "until_min": 1.5})
     assert [zone.worth for zone in drive.mission.order_state.order.zones] == [50, 10]
