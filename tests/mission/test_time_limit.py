@@ -166,6 +166,19 @@ def test_pauses_count_and_a_paused_robot_stands():
     assert drive.cell == (0, 0)
 
 
+def test_the_order_of_a_robot_that_was_sent_home_ends_there():
+    drive = Clocked(order={"until_min": 1.0})
+    drive.run(State.COVERING)
+    for _ in range(10):
+        drive.go()
+    drive.command("home")
+    drive.run(State.PAUSED)
+    for _ in range(60):
+        drive.go()
+    assert (drive.mission.state, drive.cell) == (State.DONE, (0, 0))
+    assert drive.mission.reason.startswith("time is up after 1 min: ")
+
+
 def test_charging_counts_and_a_robot_in_its_dock_stays_there():
     drive = Battery(0.19, until_min=1.0)
     drive.run(State.CHARGING)

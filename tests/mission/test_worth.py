@@ -102,6 +102,15 @@ def test_a_robot_that_turns_out_too_slow_turns_to_what_matters():
     assert "what comes first is done: the rest" in [each.reason for each in drive.updates]
 
 
+def test_nothing_is_planned_first_once_time_is_up():
+    drive = ranked(80, until_min=0.5)
+    drive.plan()
+    assert drive.mission.first_from == 80
+    drive.command("pause")
+    drive.tell(after=40.0)
+    assert drive.mission.first_from == 0
+
+
 def test_the_rest_follows_where_time_is_left_after_all():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()

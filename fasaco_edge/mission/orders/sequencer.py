@@ -27,7 +27,7 @@ from fasaco_edge.mission.orders.cells_left import (
 )
 from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand, Zone
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
+from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.worth import WorthFirst
@@ -494,10 +494,14 @@ class Sequencer:
         self.order_state = replace(state, spent_s=state.spent_s + seconds)
 
     def run_out_of_time(self, minutes: float) -> None:
-        """End the order, as its time of so many minutes is up: at home, or on an errand at once."""
+        """End the order, as its time of so many minutes is up: at home; of a robot on an errand, or
+        sent home before, at once."""
         self._run.retry_at = None
-        self.order_state = self.order_state.out_of_time(minutes)
-        if self.order_state.errand:
+        self.worth.begin()
+        state = self.order_state = self.order_state.out_of_time(minutes)
+        is_sent_home = state.paused and state.why == AT_HOME
+        if state.errand or is_sent_home:
+            self.order_state = replace(state, paused=state.paused and not is_sent_home)
             self._end()
 
     def waiting_reason(self) -> str:
