@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -219,6 +221,24 @@ def test_one_slow_path_does_not_count_in_later_passes():
     worth.choose(everything, window)
     assert worth.least == 0
     assert not worth.are_too_many(everything.size)
+
+
+def test_a_map_of_dirt_on_a_large_lattice_takes_some_bytes_a_cell():
+    window = Window(-400, -700, 1600, 1300)
+    worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
+    worth.take(dirt(90).grid)
+    worth.allow(100.0)
+    everything = np.ones((window.rows, window.cols), bool)
+    tracemalloc.start()
+    worth.choose(everything, window)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10 * everything.size
+    # Each cell has the value of the pixel at its centre.
+    assert worth.least == 90
+    first = np.argwhere(worth.first(everything, window))
+    first += np.array([window.row0, window.col0])
+    assert first.tolist() == [[row, col] for row in range(10) for col in EAST_COLUMNS]
 
 
 WEST, EAST = rectangle(0, 0, 10, 10), rectangle(0, 11, 10, 21)
