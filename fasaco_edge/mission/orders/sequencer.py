@@ -345,14 +345,19 @@ class Sequencer:
         return self.worth.is_other_first(open_cells, area.lattice.window, ahead_s)
 
     @property
-    def is_first_done(self) -> bool:
-        """Whether the cells planned first are covered, and others are left."""
+    def is_any_planned_left(self) -> bool:
+        """Whether this robot has to visit any of the cells that are planned now."""
         area = self._map.area
-        if area is None or not self.worth.least:
+        if area is None:
             return False
         open_cells = self.cells.open_to_me(area) & area.reachable
-        first = self.worth.first(open_cells, area.lattice.window)
-        return bool(open_cells.any()) and not first.any()
+        return bool(self.worth.first(open_cells, area.lattice.window).any())
+
+    @property
+    def is_first_done(self) -> bool:
+        """Whether the cells planned first are covered, and others are left."""
+        is_limited = self.worth.least > 0 and self.cells.left_to_me() > 0
+        return is_limited and not self.is_any_planned_left
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
