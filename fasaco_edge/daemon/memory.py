@@ -26,7 +26,8 @@ Larger messages are dropped on arrival, by their size alone. Nothing else grows 
 pixels: kernels read a map tile by tile, and a tile is bounded, see ``grid.lattice``. Of the memory
 per cell the path takes most: some 80 bytes a pose, twice while it is sent. The living trail takes
 16 bytes a cell, as much again while a copy is planned on or written, and 8 in the ledger's file;
-what the ants of a plan leave spans the regions they walked on.
+what the ants of a plan leave spans the regions they walked on. Priorities take 3 bytes a cell:
+those of a message, and twice those of rooms.
 The rest of the ledger takes 4 bytes a cell, with the copy being written; swept floor takes a bit a
 pixel of 2.5 cm, 18 bytes a cell of 0.3 m, and as much again where it changed since that copy. The
 ledger is bounded on its own: 34 MB of cells and twice 13 MB of floor, if jumping poses fill it.

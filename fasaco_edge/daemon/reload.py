@@ -49,6 +49,7 @@ CHANGEABLE = frozenset(
         "mission.home",
         "mission.dock",
         "mission.map_frame",
+        "mission.by_room",
     }
 )
 # Exceptions in a section that can change: they determine the ledger's cells.

@@ -266,6 +266,26 @@ def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
     writer.disk.close(1.0)
 
 
+def test_time_that_a_paused_robot_spends_is_written_twice_a_minute(tmp_path):
+    drive = Drive((0, 0), MapReceived(building("....")), pose_at(0, 0))
+    drive.command("start", {"until_min": 5.0})
+    drive.command("pause")
+    writer = open_ledger(tmp_path, "robot", CELL)
+    keeper = LedgerKeeper(writer, CELL, autostart=False)
+
+    def kept_s():
+        keeper.keep(drive.mission, drive.now)
+        until(lambda: not writer.disk.is_behind())
+        return OrderState.from_json(LedgerFile(tmp_path, "robot").load(CELL).ledger.note).spent_s
+
+    first_s = kept_s()
+    drive.tell(after=10.0)
+    assert kept_s() == first_s
+    drive.tell(after=25.0)
+    assert kept_s() == pytest.approx(first_s + 35.0)
+    writer.disk.close(1.0)
+
+
 def test_floor_alone_is_restored_too(tmp_path):
     """A robot that never came over the middle of a cell."""
     first = Drive((0, 0), MapReceived(building("....")), pose_at(0.45, 0.45))

@@ -129,3 +129,8 @@ def test_a_robot_sent_home_sweeps_no_other_building_instead():
         assert (after.automatic, after.paused, after.home, after.keep_out) == (True, True, None, ())
     idle = replace(IDLE, errand="home").in_other_building("moved")
     assert (idle.errand, idle.home, idle.keep_out) == ("", None, ())
+
+
+def test_time_spent_counts_in_another_frame_too():
+    begun = OrderState(read_order({"until_min": 5.0}), begun=True, spent_s=120.0)
+    assert begun.in_other_frame("moved").spent_s == 120.0

@@ -135,6 +135,23 @@ def test_the_time_goes_on_over_a_restart(covered):
     assert OrderState.from_json(drive.mission.snapshot().note).late == "time is up after 1 min"
 
 
+def test_a_first_pose_and_a_clock_that_is_set_on_take_no_time():
+    drive = Clocked(order={"until_min": 1.0})
+    drive.run(State.COVERING)
+    kept = drive.mission.snapshot()
+    drive.mission, drive.request = Mission(drive.config), None
+    drive.mission.restore_ledger(kept)
+    drive.mission.restore_order(OrderState.from_json(kept.note))
+    drive.revision, drive.walk = 0, []
+    drive.tell(MapReceived(building(*HALL)))
+    for stamp_s in (1_700_000_000, 1_700_003_600):
+        pose = replace(pose_at(*drive.cell).pose, stamp_ns=stamp_s * 10**9)
+        for _ in range(6):
+            drive.tell(PoseReceived(pose))
+    assert drive.mission.time_limit.left_s > 40.0
+    assert drive.mission.order_state.stage is Stage.COVERING
+
+
 def test_pauses_count_and_a_paused_robot_stands():
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
@@ -147,6 +164,19 @@ def test_pauses_count_and_a_paused_robot_stands():
     drive.command("resume")
     drive.finish(ticks=20)
     assert drive.cell == (0, 0)
+
+
+def test_the_order_of_a_robot_that_was_sent_home_ends_there():
+    drive = Clocked(order={"until_min": 1.0})
+    drive.run(State.COVERING)
+    for _ in range(10):
+        drive.go()
+    drive.command("home")
+    drive.run(State.PAUSED)
+    for _ in range(60):
+        drive.go()
+    assert (drive.mission.state, drive.cell) == (State.DONE, (0, 0))
+    assert drive.mission.reason.startswith("time is up after 1 min: ")
 
 
 def test_charging_counts_and_a_robot_in_its_dock_stays_there():

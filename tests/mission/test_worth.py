@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import CommandReceived, PriorityReceived, State
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PriorityReceived, State
 from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.orders.order import order_document, read_order
+from fasaco_edge.mission.orders.order import EVERYTHING, Zone, order_document, read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.placing import are_same
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.orders.sequencer import MAX_IN_VAIN
-from fasaco_edge.mission.orders.worth import least_priority
+from fasaco_edge.mission.orders.worth import WorthFirst, least_priority
 from tests.mission.battery import Battery
 from tests.mission.test_room_orders import (
     BOTH,
@@ -29,7 +31,7 @@ from tests.mission.test_room_orders import (
     settled,
     visited,
 )
-from tests.mission.world import rectangle
+from tests.mission.world import CELL, Drive, building, pose_at, rectangle
 
 # Both rooms have 90 cells, a second each; the passage between them 8.
 TIGHT_MIN = 2.5
@@ -102,6 +104,15 @@ def test_a_robot_that_turns_out_too_slow_turns_to_what_matters():
     assert "what comes first is done: the rest" in [each.reason for each in drive.updates]
 
 
+def test_nothing_is_planned_first_once_time_is_up():
+    drive = ranked(80, until_min=0.5)
+    drive.plan()
+    assert drive.mission.first_from == 80
+    drive.command("pause")
+    drive.tell(after=40.0)
+    assert drive.mission.first_from == 0
+
+
 def test_the_rest_follows_where_time_is_left_after_all():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
@@ -124,8 +135,7 @@ def test_the_battery_is_a_limit_too():
         drive.command("start")
         for _ in range(130):
             tick(drive)
-        cells, covered = drive.mission.room_progress()[number]
-        shares.append(covered / cells)
+        shares.append(drive.mission.room_progress()[number].share)
     assert shares[0] < 0.6
     assert shares[1] == 1.0
 
@@ -177,6 +187,9 @@ def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
         tick(drive)
     drive.tell(dirt(95, columns=WEST_COLUMNS))
     assert (drive.request.reason, drive.mission.first_from) == ("priorities have changed", 95)
+    drive.plan()
+    drive.tell(dirt(95, columns=WEST_COLUMNS))
+    assert drive.request is None, "the same again"
     assert finish(drive)[0] == 90
     drive = ranked(None, until_min=60.0)
     drive.plan()
@@ -186,11 +199,46 @@ def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
 
 def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
     drive = settled(*BOTH)
-    (fault,) = drive.tell(dirt(90, frame="odom")).faults
-    assert (fault.code, str(fault)) == ("wrong_frame", "priorities in frame 'odom', map in 'map'")
+    early = Drive((0, 0), dirt(90, frame="odom"))
+    first_map = MapReceived(building(*BOTH)), pose_at(0, 0)
+    for decision in drive.tell(dirt(90, frame="odom")), early.tell(*first_map):
+        (fault,) = decision.faults
+        said = "priorities in frame 'odom', map in 'map'"
+        assert (fault.code, str(fault)) == ("wrong_frame", said)
+    assert not early.tell(*first_map).faults
     drive.command("start", {"until_min": TIGHT_MIN})
     drive.plan()
     assert drive.mission.first_from == 0
+
+
+def test_one_slow_path_does_not_count_in_later_passes():
+    window, everything = Window(0, 0, 10, 21), np.ones((10, 21), bool)
+    worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
+    worth.take(dirt(90).grid)
+    worth.allow(300.0)
+    assert worth.is_other_first(everything, window, 2000.0)
+    worth.begin()
+    worth.choose(everything, window)
+    assert worth.least == 0
+    assert not worth.are_too_many(everything.size)
+
+
+def test_a_map_of_dirt_on_a_large_lattice_takes_some_bytes_a_cell():
+    window = Window(-400, -700, 1600, 1300)
+    worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
+    worth.take(dirt(90).grid)
+    worth.allow(100.0)
+    everything = np.ones((window.rows, window.cols), bool)
+    tracemalloc.start()
+    worth.choose(everything, window)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10 * everything.size
+    # Each cell has the value of the pixel at its centre.
+    assert worth.least == 90
+    first = np.argwhere(worth.first(everything, window))
+    first += np.array([window.row0, window.col0])
+    assert first.tolist() == [[row, col] for row in range(10) for col in EAST_COLUMNS]
 
 
 WEST, EAST = rectangle(0, 0, 10, 10), rectangle(0, 11, 10, 21)
@@ -227,6 +275,21 @@ def test_zones_of_higher_priority_come_first_where_time_is_short(priorities, unt
     assert kept.order.zones == drive.mission.order_state.order.zones
 
 
+@pytest.mark.parametrize(
+    ("settings", "enough_min"), [({"passes": ["edge", "rest"]}, 3.5), ({"keep_covered": True}, 2.0)]
+)
+def test_zones_are_counted_by_what_their_passes_cover(settings, enough_min):
+    drive = settled(*BOTH)
+    if "keep_covered" in settings:
+        drive.command("start", {"zones": zones()[:1]})
+        finish(drive)
+    for until_min, first in (enough_min, "west"), (1.4, "east"):
+        order = {"zones": zones(east=60), "until_min": until_min, **settings}
+        drive.command("start", order)
+        assert drive.mission.order_state.order.zones[0].name == first
+        drive.command("cancel")
+
+
 def test_a_room_gives_its_priority_to_the_zone_of_its_name():
     drive = settled(*BOTH)
     name(drive, room_at(drive, *IN_EAST).id, "bath")
@@ -236,6 +299,13 @@ def test_a_room_gives_its_priority_to_the_zone_of_its_name():
     drive.command("start", {"zones": named, "until_min": 1.5})
     first, second = drive.mission.order_state.order.zones
     assert (first.name, first.worth, second.worth) == ("bath", 70, 50)
+    # A room's other priority makes the same order no other one.
+    order = drive.mission.order_state.order
+    for priority in 80, 50, 20:
+        drive.command("room_set", room=RoomRequest("bath", priority=priority))
+        drive.command("start", {"zones": named, "until_min": 1.5})
+        assert drive.mission.order_state.order == order
+    drive.command("cancel")
     named[1]["priority"] = 10
     drive.command("start", {"zones": named, "until_min": 1.5})
     assert [zone.worth for zone in drive.mission.order_state.order.zones] == [50, 10]

@@ -35,16 +35,20 @@ PERIOD_S = 0.5
 # Period if only floor and trail changed: they change with every pose or path, and memory cards
 # wear out.
 FLOOR_PERIOD_S = 1.0
+# Period if only time was spent, as in a dock.
+SPENT_PERIOD_S = 30.0
 
 
 class _Kept(NamedTuple):
-    """The state last passed to the writer: visits, changes of floor, trail and fleet, the order."""
+    """The state last passed to the writer: visits, changes of floor, trail and fleet, the order,
+    and its time spent in whole periods."""
 
     visits: int
     floor_changes: int
     trail_changes: int
     heard: int
     order_state: OrderState
+    spent: int = 0
 
     def may_wait_s(self, before: _Kept) -> float:
         """Return how long this may wait after the previous one [s]."""
@@ -82,7 +86,9 @@ class LedgerKeeper:
         """Write changes: an order at once, coverage once a period."""
         if mission is not None:
             changes = mission.floor.changes, mission.trail.changes, mission.shared.version
-            held = _Kept(mission.ledger.total, *changes, mission.order_state)
+            state = mission.order_state
+            spent = int(state.spent_s // SPENT_PERIOD_S)
+            held = _Kept(mission.ledger.total, *changes, state, spent)
         else:
             held = _Kept(self._before.total, self._before.floor.changes, 0, 0, self.order_state)
         if held == self._kept or now - self._kept_at < held.may_wait_s(self._kept):

@@ -131,17 +131,14 @@ class EventHandler:
             self.route.want(reason)
 
     def _take_priorities(self, grid: OccupancyGrid) -> None:
-        """Take a map of priorities; what comes before the first map counts if it is in its frame.
+        """Take a map of priorities; of one before the first map ``_note_frame`` checks the frame.
 
         Raises:
             WrongFrame: they are in another frame than the map.
         """
         used = self.map.grid
         if used is not None and grid.frame != used.frame:
-            raise WrongFrame(
-                f"priorities in frame {grid.frame!r}, map in {used.frame!r}",
-                hint="publish them in the frame of the map",
-            )
+            raise _in_other_frame(grid, used)
         if self.orders.worth.take(grid):
             self.route.want(OTHERS_FIRST)
 
@@ -208,12 +205,16 @@ class EventHandler:
         return self.map.building.note_map(plain, pose, self._now, contradicts)
 
     def _note_frame(self) -> None:
-        """Bind places without a map to the map in use; drop places of another frame."""
+        """Bind places without a map to the map in use; drop what is in another frame."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
             return
         if fault := self.map.places.enter(grid.frame):
             self._faults.append(fault)
+        given = self.orders.worth.given
+        if given is not None and given.frame != grid.frame:
+            self.orders.worth.take(None)
+            self._faults.append(_in_other_frame(given, grid))
         order = self.orders.order_state
         if not order.frame:
             self.orders.set_state(replace(order, frame=grid.frame))
@@ -379,3 +380,10 @@ class EventHandler:
         self._compare_buildings()
         self.route.forget_failure()
         self._record_again()
+
+
+def _in_other_frame(priorities: OccupancyGrid, used: OccupancyGrid) -> WrongFrame:
+    return WrongFrame(
+        f"priorities in frame {priorities.frame!r}, map in {used.frame!r}",
+        hint="publish them in the frame of the map",
+    )

@@ -103,7 +103,7 @@ class PathChecks:
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
             return
         self._worth_at = now
-        if not self._line.is_worth_driving and not self._orders.cells.left_to_me():
+        if not self._line.is_worth_driving and not self._orders.is_any_planned_left:
             route.want("others have swept what lay ahead")
 
     def check_time(self, now: float) -> None:

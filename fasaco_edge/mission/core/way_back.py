@@ -12,17 +12,20 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 LOOK_EVERY_S = 5.0
 # Factor on estimated times, as lines are longer than walks over cells.
 SPARE = 1.2
+# Simulated robots run at some 20 times our clock; where stamps run faster, their clock was set.
+FASTEST = 30.0
 
 
 class Lapse:
     """Measures time since a look: the longer one by our clock and by the robot's.
 
-    Simulated time may run faster than ours, and stamps may stand still.
+    Simulated time may run faster than ours, up to ``FASTEST``, and stamps may stand still.
     """
 
     def __init__(self, map_state: MapState) -> None:
         self._map = map_state
-        # Our time [s] and the stamp of the pose [ns] at the last look; None before the first.
+        # Our time [s] and the stamp of the pose [ns], 0 without one, at the last look; None before
+        # the first.
         self._since: tuple[float, int] | None = None
 
     @property
@@ -39,7 +42,9 @@ class Lapse:
         if self._since is None:
             return 0.0
         at, stamp_ns = self._since
-        return max(now - at, 1e-9 * (self._stamp_ns - stamp_ns))
+        ours_s, newest_ns = now - at, self._stamp_ns
+        theirs_s = 1e-9 * (newest_ns - stamp_ns) if stamp_ns and newest_ns else 0.0
+        return theirs_s if ours_s < theirs_s <= FASTEST * ours_s else ours_s
 
     @property
     def _stamp_ns(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.exploration import Exploration, frontier, is_in_reach
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from fasaco_edge.mission.orders.zones import in_zones
-from fasaco_edge.planners.passes import Covers, edge_cells
+from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
 
 class CellsLeft:
@@ -181,14 +182,20 @@ class LeftBehind:
         self._area, self.times = None, self.times + 1
 
 
-def cells_in(zone: Zone, area: ReachableArea) -> int:
-    """Return how many cells a zone has: the reachable ones, or where none is known its area's."""
+def visits_due(zone: Zone, area: ReachableArea, skipped: NDArray[np.bool_]) -> int:
+    """Return how many cells the passes over a zone cover, the first one none of those skipped, bool
+    (rows, cols) of the area; where no cell of it is reachable, as many as fit into its polygon."""
     lattice = area.lattice
     inside = in_zones((zone,), lattice.window, lattice.cell_m) & area.reachable
-    found = int(np.count_nonzero(inside))
-    if found or not zone.polygon:
-        return found
-    return int(area_m2(zone.polygon) / lattice.cell_m**2)
+    if zone.polygon and not inside.any():
+        return zone.passes * int(area_m2(zone.polygon) / lattice.cell_m**2)
+    number_of = {
+        covers: int(np.count_nonzero(wanted_by(covers, lattice.steps, inside)))
+        for covers in get_args(Covers)
+    }
+    covered = [zone.kind(number).covers for number in range(1, zone.passes + 1)]
+    first = wanted_by(covered[0], lattice.steps, inside) & skipped
+    return sum(number_of[covers] for covers in covered) - int(np.count_nonzero(first))
 
 
 def zones_beyond(

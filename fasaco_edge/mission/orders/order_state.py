@@ -300,7 +300,8 @@ class OrderState:
         )
         if self.order is None or self.automatic or has_places:
             return self.in_other_building(why)
-        return OrderState(self.order, paused=self.paused or self.errand == "home")
+        is_to_stand = self.paused or self.errand == "home"
+        return OrderState(self.order, paused=is_to_stand, spent_s=self.spent_s)
 
     def _interrupted(self, *, is_paused: bool) -> OrderState:
         """Return the state after ``pause`` or ``resume``: interrupted work continues later."""

@@ -131,17 +131,22 @@ def _room_of(zone: Zone, book: RoomBook) -> Room | None:
 
 
 def are_same(one: MissionOrder, other: MissionOrder) -> bool:
-    """Return whether two orders ask for the same, wherever the outlines of rooms are by now."""
-    return _unplaced(one) == _unplaced(other)
+    """Return whether two orders ask for the same, wherever the outlines of rooms are by now, and
+    whatever comes first."""
+    # Zones of several priorities may have changed their order since.
+    is_ranked = any(len({zone.worth for zone in order.zones}) > 1 for order in (one, other))
+    first, second = (_unplaced(order, is_ranked=is_ranked) for order in (one, other))
+    return first == second
 
 
-def _unplaced(order: MissionOrder) -> MissionOrder:
+def _unplaced(order: MissionOrder, *, is_ranked: bool) -> MissionOrder:
     zones = [
-        replace(zone, polygon=(), holes=()) if zone.room else replace(zone, without=(), ranked=())
+        replace(zone, polygon=(), holes=(), priority=None)
+        if zone.room
+        else replace(zone, without=(), ranked=(), priority=None)
         for zone in order.zones
     ]
-    # Zones of several priorities may have changed their order since.
-    if len({zone.worth for zone in zones}) > 1:
+    if is_ranked:
         zones.sort(key=lambda zone: zone.name)
     return replace(order, zones=tuple(zones), keep_covered=False)
 

@@ -22,12 +22,12 @@ from fasaco_edge.mission.orders.by_room import RoomPrice
 from fasaco_edge.mission.orders.cells_left import (
     CellsLeft,
     LeftBehind,
-    cells_in,
+    visits_due,
     zones_beyond,
 )
 from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand, Zone
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
+from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.worth import WorthFirst
@@ -254,15 +254,23 @@ class Sequencer:
         return "" if state.automatic else state.title
 
     def _most_worthwhile_next(self) -> OrderState:
-        """Return the order with the zones to come by priority, if there is no time for all."""
+        """Return the order with the zones to come by priority, if there is no time for all.
+
+        Not in a fleet: its robots sweep a zone together, in the order given.
+        """
         state, area = self.order_state, self._map.area
         zone = state.current_zone
         if zone is None or state.order is None or state.begun or state.pass_number > 1:
             return state
         to_come = state.order.zones[state.zone :]
-        if area is None or len({each.worth for each in to_come}) < 2:
+        is_alike = len({each.worth for each in to_come}) < 2
+        if area is None or is_alike or self._company.has_members:
             return state
-        cells = sum(each.passes * cells_in(each, area) for each in to_come)
+        window = area.lattice.window
+        skipped = np.zeros(area.reachable.shape, bool)
+        if state.order.keep_covered:
+            skipped = self._ledger.current.visits(window) > 0
+        cells = sum(visits_due(each, area, skipped) for each in to_come)
         return state.most_worthwhile_next() if self.worth.are_too_many(cells) else state
 
     def _forget(self, zone: Zone, state: OrderState) -> None:
@@ -337,14 +345,19 @@ class Sequencer:
         return self.worth.is_other_first(open_cells, area.lattice.window, ahead_s)
 
     @property
-    def is_first_done(self) -> bool:
-        """Whether the cells planned first are covered, and others are left."""
+    def is_any_planned_left(self) -> bool:
+        """Whether this robot has to visit any of the cells that are planned now."""
         area = self._map.area
-        if area is None or not self.worth.least:
+        if area is None:
             return False
         open_cells = self.cells.open_to_me(area) & area.reachable
-        first = self.worth.first(open_cells, area.lattice.window)
-        return bool(open_cells.any()) and not first.any()
+        return bool(self.worth.first(open_cells, area.lattice.window).any())
+
+    @property
+    def is_first_done(self) -> bool:
+        """Whether the cells planned first are covered, and others are left."""
+        is_limited = self.worth.least > 0 and self.cells.left_to_me() > 0
+        return is_limited and not self.is_any_planned_left
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
@@ -486,10 +499,14 @@ class Sequencer:
         self.order_state = replace(state, spent_s=state.spent_s + seconds)
 
     def run_out_of_time(self, minutes: float) -> None:
-        """End the order, as its time of so many minutes is up: at home, or on an errand at once."""
+        """End the order, as its time of so many minutes is up: at home; of a robot on an errand, or
+        sent home before, at once."""
         self._run.retry_at = None
-        self.order_state = self.order_state.out_of_time(minutes)
-        if self.order_state.errand:
+        self.worth.begin()
+        state = self.order_state = self.order_state.out_of_time(minutes)
+        is_sent_home = state.paused and state.why == AT_HOME
+        if state.errand or is_sent_home:
+            self.order_state = replace(state, paused=state.paused and not is_sent_home)
             self._end()
 
     def waiting_reason(self) -> str:

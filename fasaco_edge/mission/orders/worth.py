@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.map.room_raster import BLOCK, centres
 from fasaco_edge.mission.orders.order import RoomArea, Zone
 from fasaco_edge.mission.orders.zones import cells_of
 
@@ -74,7 +75,7 @@ class WorthFirst:
         self._cell_m, self._zone, self._frame = cell_m, zone, frame
         # The priorities given by a message on the cells of a window, int8; -1 for none.
         self._told: tuple[Window, NDArray[np.int8]] | None = None
-        # Time that a cell takes; at first the least, by which too much is never put off [s].
+        # The least time that a cell takes, by which too much is never put off [s].
         self._cell_s = step_s
         self._is_given_up = False
 
@@ -83,7 +84,15 @@ class WorthFirst:
         self.least, self._is_given_up = 0, False
 
     def take(self, given: OccupancyGrid | None) -> bool:
-        """Take priorities from a message; return whether a new plan has to follow them."""
+        """Take priorities from a message; return whether a new plan has to follow them.
+
+        The same ones again change nothing.
+        """
+        before = self.given
+        if before is not None and given is not None:
+            is_placed_alike = (before.geometry, before.frame) == (given.geometry, given.frame)
+            if is_placed_alike and np.array_equal(before.cells, given.cells):
+                return False
         self.given, self._told = given, None
         return self.choose_anew()
 
@@ -134,8 +143,6 @@ class WorthFirst:
         planned = int(np.count_nonzero(cells))
         if not planned or ahead_s <= self.may_work_s:
             return False
-        if not self.least:
-            self._cell_s = ahead_s / planned
         least = self._least_of(cells, window, ahead_s / planned)
         if not least:
             return False
@@ -148,7 +155,11 @@ class WorthFirst:
         priorities = None if self._is_given_up else self._priorities(window)
         if priorities is None:
             return 0
-        counts = np.bincount(priorities[cells], minlength=MOST_PRIORITY + 1)
+        found = priorities[cells]
+        parts = np.array_split(found, 1 + found.size // BLOCK)
+        counts: NDArray[np.int64] = np.sum(
+            [np.bincount(part, minlength=MOST_PRIORITY + 1) for part in parts], axis=0
+        )
         return least_priority(counts, cell_s or self._cell_s, self.may_work_s)
 
     def _priorities(self, window: Window) -> NDArray[np.uint8] | None:
@@ -163,16 +174,15 @@ class WorthFirst:
 
     def _told_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
         if self._told is None or self._told[0] != window:
-            x: NDArray[np.float64] = np.arange(window.col0, window.col1)[None] + np.float64(0.5)
-            y: NDArray[np.float64] = np.arange(window.row0, window.row1)[:, None] + np.float64(0.5)
-            # As many numbers as cells, not more: a large building has half a million.
-            col, row = (
-                np.floor(at).astype(np.int32)
-                for at in given.geometry.to_pixels(self._cell_m * x, self._cell_m * y)
-            )
-            rows, cols = given.cells.shape
-            told = np.full((window.rows, window.cols), -1, np.int8)
-            inside = (row >= 0) & (col >= 0) & (row < rows) & (col < cols)
-            told[inside] = given.cells[row[inside], col[inside]]
+            # In blocks of rows: places take far more than cells.
+            step, shifted = max(1, BLOCK // max(window.cols, 1)), given.cells + np.int8(1)
+            told = np.empty((window.rows, window.cols), np.int8)
+            for first in range(0, window.rows, step):
+                last = min(window.row0 + first + step, window.row1)
+                part = Window(window.row0 + first, window.col0, last, window.col1)
+                places = np.stack(centres(part, self._cell_m), axis=1)
+                # Beyond the grid it returns 0.
+                values = given.geometry.values_at(shifted, places) - np.int8(1)
+                told[first : first + part.rows] = values.reshape(part.rows, part.cols)
             self._told = window, told
         return self._told[1]

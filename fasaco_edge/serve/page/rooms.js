@@ -187,7 +187,7 @@ find("roompasses").addEventListener("change", setPasses);
 find("roomcross").addEventListener("change", () => { twiceAtLeast("roompasses", "roomcross"); setPasses(); });
 find("cross").addEventListener("change", () => { twiceAtLeast("passes", "cross"); keepDrafts(); });
 find("roomskip").addEventListener("change", () => change("room_set", { skip: find("roomskip").checked }));
-find("roompriority").addEventListener("change", ({ target }) => change("room_set", { priority: Math.round(target.value) }));
+find("roompriority").addEventListener("change", ({ target }) => target.value && change("room_set", { priority: Math.round(target.value) }));
 find("merge").addEventListener("click", (event) => {
   const both = [pickedRoom, Number(find("mergewith").value)];
   if (!isSure(event.target)) return;

@@ -502,3 +502,17 @@ def test_robots_that_meet_in_a_corridor_pass_at_a_niche():
         least = min(least, math.dist((first.x, first.y), (second.x, second.y)))
     assert fleet.left_out() == set()
     assert least >= 2 * CONFIG.footprint.robot_radius_m
+
+
+def test_robots_that_hear_each_other_keep_their_zones_in_order():
+    """One with more time or charge than another would sweep its zones in another order."""
+    robot, other = FleetRobot("r1", (0, 0), HALL), FleetRobot("r2", (0, 23), HALL)
+    zones = [
+        {"name": "west", "polygon": rectangle(0, 0, 12, 12)},
+        {"name": "east", "polygon": rectangle(0, 12, 12, 24), "priority": 90},
+    ]
+    for first, events in ("east", ()), ("west", (other.report(),)):
+        robot.tell(*events)
+        robot.command("start", {"zones": zones, "until_min": 2.0})
+        assert robot.mission.order_state.current_zone.name == first
+        robot.command("cancel")

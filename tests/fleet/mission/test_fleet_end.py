@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.members import HANGING_S
 from fasaco_edge.fleet.mission.shared_work import STUCK_S, WAITING_S, Remainder
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part, PriorityReceived
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot
 from tests.fleet.mission.test_fleet import tiles_of
-from tests.mission.world import CONFIG, building, patch, with_policy
+from tests.mission.world import CELL, CONFIG, building, patch, with_policy
 
 HALL = ["." * 24] * 12
 CELLS = [(row, col) for row in range(12) for col in range(24)]
+ALL_TO_R1 = (Part("r1", (0, 0), 0.0, 1.0), Part("r2", (6, 12), 1e6, 1.0))
 ALL_TO_R2 = (Part("r1", (0, 0), 1e6, 1.0), Part("r2", (6, 12), 0.0, 1.0))
 
 
@@ -244,3 +248,24 @@ def test_robots_share_by_one_division_if_one_sees_no_way():
     assert between(first, second) < 5
     assert {part.robot for part in first.mission.company.parts} == {"r1", "r2"}
     assert len(first.mission.company.parts) == 2
+
+
+def test_a_robot_plans_anew_once_others_have_swept_what_came_first():
+    east = range(22, 24)
+    cells = np.full((12, 24), -1, np.int8)
+    cells[:, east] = 90
+    geometry = GridGeometry(12, 24, CELL, Pose2D(0.0, 0.0))
+    fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (6, 6)})
+    ours, other = fleet.robots.values()
+    report = replace(other.report(), division=1, by="r2", parts=ALL_TO_R1)
+    ours.tell(PriorityReceived(OccupancyGrid(geometry, cells)), report)
+    ours.command("start", {"until_min": 2.0})
+    for _ in range(5):
+        ours.tick()
+    assert ours.mission.first_from == 90
+    swept = tiles_of([(row, col) for row in range(12) for col in east])
+    ours.tell(replace(report, tiles=swept))
+    for _ in range(3):
+        ours.tick()
+    assert "others have swept what lay ahead" in [each.reason for each in ours.updates]
+    assert ours.mission.first_from == 0
