@@ -73,7 +73,10 @@ def test_the_path_lies_on_its_cells_to_a_tenth_of_a_millimetre(recorded):
 
 def test_the_path_before_the_present_one_is_drawn_beside_it(recorded):
     new, old = (
-        [[np.asarray(line) for line in lines] for lines in read_column(recorded[0], each, STRIPS)[1]]
+        [
+            [np.asarray(line) for line in lines]
+            for lines in read_column(recorded[0], each, STRIPS)[1]
+        ]
         for each in (entities.PATH, entities.OLD_PATH)
     )
     assert len(old) >= 1

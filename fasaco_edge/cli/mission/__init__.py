@@ -42,7 +42,7 @@ examples:
   fasaco-edge mission start --passes edge,auto,cross@0.15   a lap along walls, lanes, lanes across
   fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
   fasaco-edge mission start --zone kitchen          a zone of the configuration, or a room
-  fasaco-edge mission start --until-min 40          home after 40 minutes, whatever is left
+  fasaco-edge mission start --until-min 40          home after 40 minutes
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
   fasaco-edge mission start --order evening.yaml
   fasaco-edge mission start --fleet building_7      to each of its robots: they share the floor
@@ -167,7 +167,8 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
         "--until-min",
         type=float,
         metavar="MIN",
-        help="be home after so many minutes, whatever is left; 0 for no limit (default: "
+        help="turn back in time to be home after so many minutes; a robot in its dock, or on its "
+        "way there, ends in the dock, and a paused one stays; 0 for no limit (default: "
         "mission.until_min of the daemon's configuration)",
     )
 
