@@ -89,7 +89,7 @@ class Errands:
 
     def way(self, area: ReachableArea, cell: Cell, goal: Cell) -> NDArray[np.int32]:
         """Return the shortest path, if possible around robots that stand in the way."""
-        around = self.orders.passable(area, cell)
+        around = self.orders.scope.passable(area, cell)
         path = around.shortest_path(cell, goal) if around.contains(goal) else NO_CELLS
         return path if len(path) else area.shortest_path(cell, goal)
 

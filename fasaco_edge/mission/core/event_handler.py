@@ -139,7 +139,7 @@ class EventHandler:
         used = self.map.grid
         if used is not None and grid.frame != used.frame:
             raise _in_other_frame(grid, used)
-        if self.orders.worth.take(grid):
+        if self.orders.scope.worth.take(grid):
             self.route.want(OTHERS_FIRST)
 
     def _close_floor(self, event: FollowerBlocked) -> None:
@@ -211,9 +211,9 @@ class EventHandler:
             return
         if fault := self.map.places.enter(grid.frame):
             self._faults.append(fault)
-        given = self.orders.worth.given
+        given = self.orders.scope.worth.given
         if given is not None and given.frame != grid.frame:
-            self.orders.worth.take(None)
+            self.orders.scope.worth.take(None)
             self._faults.append(_in_other_frame(given, grid))
         order = self.orders.order_state
         if not order.frame:
@@ -243,7 +243,7 @@ class EventHandler:
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
         """Update the reachable area; start over if the ledger belongs to another place."""
         if misfit is not None:
-            self.orders.worth.take(None)
+            self.orders.scope.worth.take(None)
             self._path = self.route.stop(str(misfit), self._now) or self._path
             self.trail.begin_anew()
             self.changes.begin(self.orders.order_state.in_other_building(str(misfit)))

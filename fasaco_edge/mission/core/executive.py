@@ -132,7 +132,7 @@ class Executive:
         """End the order if the robot has to turn home to be there in time."""
         is_due = self.time_limit.is_due(self._now)
         may_work_s = self.time_limit.may_work_s(self._now)
-        self.orders.worth.allow(min(may_work_s, self.charging.may_work_s))
+        self.orders.scope.worth.allow(min(may_work_s, self.charging.may_work_s))
         if not is_due:
             return
         if not self.orders.order_state.errand:

@@ -197,7 +197,7 @@ class Mission:
     def held(self) -> list[Event]:
         """Return the newest map, pose and priorities as events for a succeeding mission."""
         monitor = self._executive.monitor
-        priorities = self._rotation.grid(self._orders.worth.given)
+        priorities = self._rotation.grid(self._orders.scope.worth.given)
         return [
             *([MapReceived(self.grid, monitor.map_at)] if self.grid is not None else []),
             *([PoseReceived(self.pose, monitor.pose_at)] if self.pose is not None else []),
@@ -330,7 +330,7 @@ class Mission:
     @property
     def first_from(self) -> int:
         """The priority from which on floor is planned now; 0 while all is."""
-        return self._orders.worth.least
+        return self._orders.scope.worth.least
 
     def floor_to_sweep(self) -> FloorToSweep | None:
         """Return the areas of floor to sweep; None if cells are counted."""

@@ -67,7 +67,7 @@ class PathChecks:
             route.want("robot left the path")
 
     def _end_path(self, now: float, why: str = "") -> None:
-        if self._orders.is_first_done:
+        if self._orders.scope.is_first_done:
             self._route.want("what comes first is done: the rest")
         elif self._orders.note_path_end(why):
             self._orders.advance(now)
@@ -103,20 +103,20 @@ class PathChecks:
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
             return
         self._worth_at = now
-        if not self._line.is_worth_driving and not self._orders.is_any_planned_left:
+        if not self._line.is_worth_driving and not self._orders.scope.is_any_planned_left:
             route.want("others have swept what lay ahead")
 
     def check_time(self, now: float) -> None:
         """Want a new plan if time or battery do not allow all of the path: the most worthwhile
         floor comes first."""
-        orders, route, may_work_s = self._orders, self._route, self._orders.worth.may_work_s
+        orders, route, may_work_s = self._orders, self._route, self._orders.scope.worth.may_work_s
         is_due = may_work_s < float("inf") and now - self._timed_at >= WORTH_S
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
             return
         self._timed_at = now
         figures = self._line.ahead()
-        ahead_s = orders.walk_s(route.path.ahead) if figures is None else figures.seconds
-        if ahead_s > may_work_s and orders.puts_other_first(ahead_s):
+        ahead_s = orders.scope.walk_s(route.path.ahead) if figures is None else figures.seconds
+        if ahead_s > may_work_s and orders.scope.puts_other_first(ahead_s):
             route.want("not all can be done in time: the most worthwhile floor first")
 
     @property

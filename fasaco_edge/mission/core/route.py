@@ -254,7 +254,7 @@ class Route(PlanRequests):
         """
         first = self._first_open(cells, area.lattice.window)
         to = int(cells[first, 0]), int(cells[first, 1])
-        lead = self._orders.passable(area, here).shortest_path(here, to)
+        lead = self._orders.scope.passable(area, here).shortest_path(here, to)
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:

@@ -412,7 +412,7 @@ class LineLayer:
             return None
         window = area.lattice.window
         asked = area.reachable & self._orders.cells.asked_of_me(area)
-        asked = self._orders.worth.first(asked, window)
+        asked = self._orders.scope.worth.first(asked, window)
         before, self._asked = self._asked, (window, asked, area.reachable)
         if before is None:
             return Window(0, 0, floor.geometry.rows, floor.geometry.cols)

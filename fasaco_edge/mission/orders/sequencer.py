@@ -19,20 +19,14 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.map.room_book import MOST_LISTED
 from fasaco_edge.mission.orders.by_room import RoomPrice
-from fasaco_edge.mission.orders.cells_left import (
-    CellsLeft,
-    LeftBehind,
-    visits_due,
-    zones_beyond,
-)
+from fasaco_edge.mission.orders.cells_left import CellsLeft, LeftBehind, zones_beyond
 from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.placing import left_out
+from fasaco_edge.mission.orders.plan_scope import PlanScope
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
-from fasaco_edge.mission.orders.worth import WorthFirst
 from fasaco_edge.mission.orders.zones import in_zones
-from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 
 # After this many paths in a row that cover no further cell, the cells left wait for the retry: the
@@ -74,7 +68,7 @@ class Sequencer:
     Attributes:
         order_state: the order and its progress.
         cells: the cells left of it.
-        worth: which of these are planned first.
+        scope: which of these are planned now, and how.
     """
 
     def __init__(
@@ -90,7 +84,6 @@ class Sequencer:
         self._map = map_state
         self._ledger = ledger
         self._company = company
-        self._room_price = room_price
         self._run = _Run()
         # Returns at the end of an order how much floor was swept, as text; "" for no text.
         self._sum_up: Callable[[], str] = str
@@ -99,10 +92,8 @@ class Sequencer:
             covers=lambda: self.order_state.current_pass.covers,
             exploration=lambda: self._run.exploration,
         )
-        self.worth = WorthFirst(
-            *(config.footprint.cell_m, config.cost.step_s),
-            lambda: self.order_state.current_zone,
-            lambda: map_state.grid.frame if map_state.grid is not None else "",
+        self.scope = PlanScope(
+            config, map_state, self.cells, company, room_price, lambda: self.order_state
         )
         self._unreached = UnreachedFinder(map_state, ledger)
         # Cached result: whether a retry is worthwhile, for a given map and ledger.
@@ -158,7 +149,7 @@ class Sequencer:
         if state.stage is Stage.OVER and state.why:
             self._run.ending = state.why
         self._retry_check = (None, False)
-        self.worth.begin()
+        self.scope.worth.begin()
         # Floor that obstacles close for a while stays reachable for another order on the same map.
         is_crowded = state.home is not None and self._map.obstacles.closed > 0
         self._unreached.restart(self._unreached.reached if is_crowded else state.reached)
@@ -238,11 +229,11 @@ class Sequencer:
             self.advance(now)
         if run.retry_at is not None:
             return self._begin_retry(cell) if now >= run.retry_at else ""
-        state = self.order_state = self._most_worthwhile_next()
+        state = self.order_state = self.scope.most_worthwhile_next(self._ledger)
         if state.begun or state.order is None or state.stage is Stage.OVER or state.waits_for:
             return ""
         zone = state.current_zone
-        self.worth.begin()
+        self.scope.worth.begin()
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             self._forget(zone, state)
         run.is_laid_anew = zone is not None and bool(zone.kinds)
@@ -252,26 +243,6 @@ class Sequencer:
         if state.pass_number == 1:
             run.exploration.begin()
         return "" if state.automatic else state.title
-
-    def _most_worthwhile_next(self) -> OrderState:
-        """Return the order with the zones to come by priority, if there is no time for all.
-
-        Not in a fleet: its robots sweep a zone together, in the order given.
-        """
-        state, area = self.order_state, self._map.area
-        zone = state.current_zone
-        if zone is None or state.order is None or state.begun or state.pass_number > 1:
-            return state
-        to_come = state.order.zones[state.zone :]
-        is_alike = len({each.worth for each in to_come}) < 2
-        if area is None or is_alike or self._company.has_members:
-            return state
-        window = area.lattice.window
-        skipped = np.zeros(area.reachable.shape, bool)
-        if state.order.keep_covered:
-            skipped = self._ledger.current.visits(window) > 0
-        cells = sum(visits_due(each, area, skipped) for each in to_come)
-        return state.most_worthwhile_next() if self.worth.are_too_many(cells) else state
 
     def _forget(self, zone: Zone, state: OrderState) -> None:
         """Forget what the pass that begins is to cover again."""
@@ -299,76 +270,19 @@ class Sequencer:
         Raises:
             NothingToCover: no cell is open.
         """
-        area, state = self._map.area, self.order_state
+        area = self._map.area
         assert area is not None
-        free, home = self.passable(area, cell), self.goal()
-        lattice, reachable = free.lattice, free.reachable
-        self._run.exploration.end_if_reached(state.current_zone, area)
-        ends_home = home is not None and state.returns_home_next and area.contains(home)
-        ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
-        to_cover = self.cells.open_to_me(area)
-        if not attempt and self.worth.is_limited:
-            self.worth.choose(to_cover & reachable, lattice.window)
-        ends_home = ends_home and not self.worth.least
-        problem = CoverageProblem.of(
-            lattice,
-            cell,
-            covered=~self.worth.first(to_cover, lattice.window),
-            end=home if ends_home else None,
-            cost=self._cost(state),
-            before=before,
-            attempt=attempt,
-            # An attempt starts on the path, which the robot may have left for another area.
-            reachable=reachable if area.contains(cell) else None,
-        )
+        self._run.exploration.end_if_reached(self.order_state.current_zone, area)
+        problem = self.scope.problem(cell, before, self.goal(), attempt)
         # The walk of another pass has other lanes: a repair would keep them.
         is_full, self._run.is_laid_anew = self._run.is_laid_anew, False
-        return self._room_price.added_to(replace(problem, is_full=is_full))
-
-    def _cost(self, state: OrderState) -> CoverageCost:
-        """Return the cost of paths in the present pass, by its lanes and its speed."""
-        cost, usual_m_s = self._config.cost, self._config.speed_m_s
-        if state.speed_m_s and usual_m_s:
-            cost = replace(cost, step_s=cost.step_s * usual_m_s / state.speed_m_s)
-        return cost.along(state.current_pass.lanes)
-
-    def walk_s(self, cells: NDArray[np.int32]) -> float:
-        """Return how long a walk takes in the present pass [s]."""
-        return self._cost(self.order_state).of_walk(cells)
-
-    def puts_other_first(self, ahead_s: float) -> bool:
-        """Put other floor first if the path ahead, of ``ahead_s`` [s], takes too long."""
-        area = self._map.area
-        if area is None:
-            return False
-        open_cells = self.cells.open_to_me(area) & area.reachable
-        return self.worth.is_other_first(open_cells, area.lattice.window, ahead_s)
-
-    @property
-    def is_any_planned_left(self) -> bool:
-        """Whether this robot has to visit any of the cells that are planned now."""
-        area = self._map.area
-        if area is None:
-            return False
-        open_cells = self.cells.open_to_me(area) & area.reachable
-        return bool(self.worth.first(open_cells, area.lattice.window).any())
-
-    @property
-    def is_first_done(self) -> bool:
-        """Whether the cells planned first are covered, and others are left."""
-        is_limited = self.worth.least > 0 and self.cells.left_to_me() > 0
-        return is_limited and not self.is_any_planned_left
-
-    def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
-        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
-        radius_m = self._config.footprint.robot_radius_m
-        return self._company.passable(area, cell, radius_m)
+        return replace(problem, is_full=is_full)
 
     def explore(self, cell: Cell) -> str:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
         exploration, zone = self._run.exploration, self.order_state.current_zone
         area = self._map.area
-        free = None if area is None else self.passable(area, cell)
+        free = None if area is None else self.scope.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
         viewpoints = self._company.viewpoints(self.cells.open_cells, cell)
@@ -411,8 +325,8 @@ class Sequencer:
         is_given_up = cells > 0 and run.in_vain > MAX_IN_VAIN
         if is_given_up and run.exploration.skip_viewpoint():
             return False
-        if is_given_up and self.worth.least:
-            self.worth.give_up()
+        if is_given_up and self.scope.worth.least:
+            self.scope.worth.give_up()
             return False
         if is_given_up and self._company.has_company:
             # Other robots may leave before they have swept their parts: those come first.
@@ -502,7 +416,7 @@ class Sequencer:
         """End the order, as its time of so many minutes is up: at home; of a robot on an errand, or
         sent home before, at once."""
         self._run.retry_at = None
-        self.worth.begin()
+        self.scope.worth.begin()
         state = self.order_state = self.order_state.out_of_time(minutes)
         is_sent_home = state.paused and state.why == AT_HOME
         if state.errand or is_sent_home:

@@ -1,0 +1,140 @@
+"""Plan scope: which cells of the present pass a plan covers, through which area, at what price."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.company import Company
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.by_room import RoomPrice
+from fasaco_edge.mission.orders.cells_left import CellsLeft, visits_due
+from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.worth import WorthFirst
+from fasaco_edge.planners.cost import CoverageCost
+from fasaco_edge.planners.problem import CoverageProblem
+
+
+class PlanScope:
+    """Poses the planning problems of an order, and orders its floor by worth. Times are [s].
+
+    Attributes:
+        worth: which cells are planned first.
+    """
+
+    def __init__(
+        self,
+        config: MissionConfig,
+        map_state: MapState,
+        cells: CellsLeft,
+        company: Company,
+        room_price: RoomPrice,
+        state: Callable[[], OrderState],
+    ) -> None:
+        self._config, self._map, self._cells = config, map_state, cells
+        self._company, self._room_price, self._state = company, room_price, state
+        self.worth = WorthFirst(
+            *(config.footprint.cell_m, config.cost.step_s),
+            lambda: state().current_zone,
+            lambda: map_state.grid.frame if map_state.grid is not None else "",
+        )
+
+    def problem(
+        self, cell: Cell, before: NDArray[np.int32], home: Cell | None, attempt: int
+    ) -> CoverageProblem:
+        """Return the planning problem of the cells that are planned now.
+
+        Args:
+            cell: the robot's cell.
+            before: int32 (n, 2), the current path from there on.
+            home: the cell that the order leads back to at its end.
+            attempt: see ``CoverageProblem``.
+
+        Raises:
+            NothingToCover: no cell is open.
+        """
+        area, state = self._map.area, self._state()
+        assert area is not None
+        free = self.passable(area, cell)
+        lattice, reachable = free.lattice, free.reachable
+        to_cover = self._cells.open_to_me(area)
+        if not attempt and self.worth.is_limited:
+            self.worth.choose(to_cover & reachable, lattice.window)
+        ends_home = home is not None and state.returns_home_next and area.contains(home)
+        ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
+        problem = CoverageProblem.of(
+            lattice,
+            cell,
+            covered=~self.worth.first(to_cover, lattice.window),
+            end=home if ends_home and not self.worth.least else None,
+            cost=self._cost(),
+            before=before,
+            attempt=attempt,
+            # An attempt starts on the path, which the robot may have left for another area.
+            reachable=reachable if area.contains(cell) else None,
+        )
+        return self._room_price.added_to(problem)
+
+    def _cost(self) -> CoverageCost:
+        """Return the cost of paths in the present pass, by its lanes and its speed."""
+        cost, usual_m_s, state = self._config.cost, self._config.speed_m_s, self._state()
+        if state.speed_m_s and usual_m_s:
+            cost = replace(cost, step_s=cost.step_s * usual_m_s / state.speed_m_s)
+        return cost.along(state.current_pass.lanes)
+
+    def walk_s(self, cells: NDArray[np.int32]) -> float:
+        """Return how long a walk takes in the present pass [s]."""
+        return self._cost().of_walk(cells)
+
+    def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
+        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        return self._company.passable(area, cell, self._config.footprint.robot_radius_m)
+
+    def puts_other_first(self, ahead_s: float) -> bool:
+        """Put other floor first if the path ahead, of ``ahead_s`` [s], takes too long."""
+        area = self._map.area
+        if area is None:
+            return False
+        open_cells = self._cells.open_to_me(area) & area.reachable
+        return self.worth.is_other_first(open_cells, area.lattice.window, ahead_s)
+
+    @property
+    def is_any_planned_left(self) -> bool:
+        """Whether this robot has to visit any of the cells that are planned now."""
+        area = self._map.area
+        if area is None:
+            return False
+        open_cells = self._cells.open_to_me(area) & area.reachable
+        return bool(self.worth.first(open_cells, area.lattice.window).any())
+
+    @property
+    def is_first_done(self) -> bool:
+        """Whether the cells planned first are covered, and others are left."""
+        is_limited = self.worth.least > 0 and self._cells.left_to_me() > 0
+        return is_limited and not self.is_any_planned_left
+
+    def most_worthwhile_next(self, ledger: MissionLedger) -> OrderState:
+        """Return the order with the zones to come by priority, if there is no time for all.
+
+        Not in a fleet: its robots sweep a zone together, in the order given.
+        """
+        state, area = self._state(), self._map.area
+        zone = state.current_zone
+        if zone is None or state.order is None or state.begun or state.pass_number > 1:
+            return state
+        to_come = state.order.zones[state.zone :]
+        is_alike = len({each.worth for each in to_come}) < 2
+        if area is None or is_alike or self._company.has_members:
+            return state
+        skipped = np.zeros(area.reachable.shape, bool)
+        if state.order.keep_covered:
+            skipped = ledger.current.visits(area.lattice.window) > 0
+        cells = sum(visits_due(each, area, skipped) for each in to_come)
+        return state.most_worthwhile_next() if self.worth.are_too_many(cells) else state
