@@ -179,8 +179,8 @@ def document_of(args: argparse.Namespace) -> dict[str, object]:
     if args.connect:
         parts["bus"] = {"mode": "client", "listen": [], "connect": [args.connect]}
     if args.map_by != "zenoh":
-        told = {k: v for k, v in ros.items() if v not in (None, 0, "/")}
-        parts["ros2"] = {"kind": args.map_by} | told
+        unusual = {k: v for k, v in ros.items() if v not in (None, 0, "/")}
+        parts["ros2"] = {"kind": args.map_by} | unusual
     elif args.domain is not None or args.namespace is not None:
         raise BadConfiguration("--domain and --namespace are for maps from ROS 2, see --map-by")
     return {name: part for name, part in parts.items() if part}

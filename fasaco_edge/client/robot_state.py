@@ -199,7 +199,7 @@ class RobotState:
 
 
 def _order_of(status: Status) -> tuple[object, ...]:
-    """Return what tells orders apart."""
+    """Return what distinguishes orders."""
     return status.mission.ordered, *(zone.name for zone in status.mission.zones)
 
 

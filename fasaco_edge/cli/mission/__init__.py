@@ -234,8 +234,8 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
     if args.order is None:
         return order_document(read_order(given))
     if given:
-        told = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
-        names = ", ".join(f"--{name}" for name in told)
+        options_given = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
+        names = ", ".join(f"--{name}" for name in options_given)
         raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
     try:
         document = _read(args.order)

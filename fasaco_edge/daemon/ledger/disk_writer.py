@@ -1,4 +1,4 @@
-"""The disk writer: a thread that writes what changes, so that a slow or full disk delays nobody."""
+"""The disk writer: a thread that writes what changes, so that a slow disk delays no caller."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class WorthFirst:
         self.given: OccupancyGrid | None = None
         self._cell_m, self._zone, self._frame = cell_m, zone, frame
         # The priorities given by a message on the cells of a window, int8; -1 for none.
-        self._told: tuple[Window, NDArray[np.int8]] | None = None
+        self._on_cells: tuple[Window, NDArray[np.int8]] | None = None
         # The least time that a cell takes, by which too much is never put off [s].
         self._cell_s = step_s
         self._is_given_up = False
@@ -93,7 +93,7 @@ class WorthFirst:
             is_placed_alike = (before.geometry, before.frame) == (given.geometry, given.frame)
             if is_placed_alike and np.array_equal(before.cells, given.cells):
                 return False
-        self.given, self._told = given, None
+        self.given, self._on_cells = given, None
         return self.choose_anew()
 
     def choose_anew(self) -> bool:
@@ -164,25 +164,25 @@ class WorthFirst:
 
     def _priorities(self, window: Window) -> NDArray[np.uint8] | None:
         """Return the priority of each cell, uint8 (rows, cols); None if all are alike."""
-        zone, told = self._zone(), None
+        zone, on_cells = self._zone(), None
         if zone is not None and self.given is not None and self.given.frame == self._frame():
-            told = self._told_on(window, self.given)
-        if zone is None or not (zone.ranked or told is not None):
+            on_cells = self._given_on(window, self.given)
+        if zone is None or not (zone.ranked or on_cells is not None):
             return None
         rooms = room_priorities(zone.ranked, zone.worth, window, self._cell_m)
-        return rooms if told is None else np.where(told < 0, rooms, told.view(np.uint8))
+        return rooms if on_cells is None else np.where(on_cells < 0, rooms, on_cells.view(np.uint8))
 
-    def _told_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
-        if self._told is None or self._told[0] != window:
+    def _given_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
+        if self._on_cells is None or self._on_cells[0] != window:
             # In blocks of rows: places take far more than cells.
             step, shifted = max(1, BLOCK // max(window.cols, 1)), given.cells + np.int8(1)
-            told = np.empty((window.rows, window.cols), np.int8)
+            on_cells = np.empty((window.rows, window.cols), np.int8)
             for first in range(0, window.rows, step):
                 last = min(window.row0 + first + step, window.row1)
                 part = Window(window.row0 + first, window.col0, last, window.col1)
                 places = np.stack(centres(part, self._cell_m), axis=1)
                 # Beyond the grid it returns 0.
                 values = given.geometry.values_at(shifted, places) - np.int8(1)
-                told[first : first + part.rows] = values.reshape(part.rows, part.cols)
-            self._told = window, told
-        return self._told[1]
+                on_cells[first : first + part.rows] = values.reshape(part.rows, part.cols)
+            self._on_cells = window, on_cells
+        return self._on_cells[1]
