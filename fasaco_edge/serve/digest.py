@@ -255,7 +255,7 @@ def areas(settings: KnownSettings, report: MissionReport) -> Digest:
 
 
 def _areas(found: Iterable[tuple[str, Corners, str]]) -> Iterator[Digest]:
-    """Yield areas, by name, polygon and kind, that can be drawn: so many at most."""
+    """Yield areas, by name, polygon and kind, that can be drawn, up to a limit."""
     drawn = (area for area in found if _is_polygon(area[1]))
     for name, polygon, kind in islice(drawn, 2 * MOST_AREAS):
         yield {"name": name, "polygon": polygon, "is": kind}

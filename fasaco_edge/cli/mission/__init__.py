@@ -63,7 +63,7 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
   return_home: true           # at the end: mission.home, mission.dock, or where the mission began
   keep_covered: false         # true: skip what is already covered in the first pass
   unknown: refuse             # wait: for a room of a zone's name, if there is none yet
-  until_min: 40               # the robot is home after so many minutes, whatever is left
+  until_min: 40               # minutes after which the robot is home
 
 evening.geojson, as a drawing program writes it: each polygon is a zone with the properties name and
 passes; one with "keep_out": true is not touched. Coordinates are metres in the frame of the map.
@@ -167,7 +167,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
         "--until-min",
         type=float,
         metavar="MIN",
-        help="turn back in time to be home after so many minutes; a robot in its dock, or on its "
+        help="turn back in time to be home after this many minutes; a robot in its dock, or on its "
         "way there, ends in the dock, and a paused one stays; 0 for no limit (default: "
         "mission.until_min of the daemon's configuration)",
     )

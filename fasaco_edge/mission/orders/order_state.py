@@ -206,7 +206,7 @@ class OrderState:
         return replace(self, order=order)
 
     def out_of_time(self, minutes: float) -> OrderState:
-        """Return the state in which it ends, as its time of so many minutes is up."""
+        """Return the state in which it ends, as its time limit [min] is up."""
         late = f"time is up after {minutes:g} min"
         if self.order is not None and self.stage is Stage.COVERING:
             zone, to_come = self.order.zones[self.zone], self.order.zones[self.zone + 1 :]

@@ -413,7 +413,7 @@ class Sequencer:
         self.order_state = replace(state, spent_s=state.spent_s + seconds)
 
     def run_out_of_time(self, minutes: float) -> None:
-        """End the order, as its time of so many minutes is up: at home; of a robot on an errand, or
+        """End the order, as its time limit [min] is up: at home; of a robot on an errand, or
         sent home before, at once."""
         self._run.retry_at = None
         self.scope.worth.begin()

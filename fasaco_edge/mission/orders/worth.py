@@ -110,7 +110,7 @@ class WorthFirst:
         self.least, self._is_given_up = 0, True
 
     def are_too_many(self, cells: int) -> bool:
-        """Return whether there is no time for so many cells."""
+        """Return whether there is no time for a number of cells."""
         return cells * self._cell_s > self.may_work_s
 
     def first(self, cells: NDArray[np.bool_], window: Window) -> NDArray[np.bool_]:

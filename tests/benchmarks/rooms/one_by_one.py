@@ -28,7 +28,7 @@ KINDS = ("home", "office")
 POLICIES: tuple[ByRoom, ...] = ("never", "auto")
 FOOTPRINT, PACE, RANGE_M = Footprint(0.3, 0.18), Pace(0.25, 1.5), 3.0
 PROPOSALS, SPARE_SHARE = 200_000, 0.05
-# A stay in a room is one to sweep if so many cells are new: fewer are passed on the way through.
+# A stay in a room is one to sweep if it has at least this many new cells; ways through have fewer.
 LEAST_CELLS = 4
 GOAL_TIME, GOAL_SHARE = 1.01, 1 / 3
 HEADER = ("floor", "by_room", "missions", "time", "came back", "also through", "crossings")
