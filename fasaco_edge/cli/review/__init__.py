@@ -47,10 +47,10 @@ examples:
 """
 
 OF_A_FLEET = (
-    "Of a fleet it holds: fleet, duration_s, makespan_s, busy_balance, swept_balance, swept_m2 (by "
-    "cells), through_m2, again_m2, again_share, waited_s, divisions, and robots: each with name, "
-    "state, busy_s, waited_s, waits, longest_wait_s, driven_m, swept_m2, through_m2, again_m2, "
-    "messages_s, kb_s, peak_kb_s, plans, plan_ms_p50, plan_ms_p99."
+    "Of a fleet it holds: fleet, time_scale, duration_s, makespan_s, busy_balance, swept_balance, "
+    "swept_m2 (by cells), through_m2, again_m2, again_share, waited_s, divisions, and robots: each "
+    "with name, state, busy_s, waited_s, waits, longest_wait_s, driven_m, swept_m2, through_m2, "
+    "again_m2, messages_s, kb_s, peak_kb_s, plans, plan_ms_p50, plan_ms_p99."
 )
 
 

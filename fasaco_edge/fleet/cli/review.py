@@ -10,6 +10,7 @@ from rich.table import Table
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.fleet.review.report import FleetFigures, review_fleet
 from fasaco_edge.review.wording import clock
@@ -52,6 +53,8 @@ def print_fleet(args: argparse.Namespace) -> int:
 def _print(figures: FleetFigures) -> None:
     console = terminal.out()
     console.print(f"fleet {one_line(figures.fleet)}: {len(figures.robots)} robots", style="bold")
+    if simulated := scale_words(figures.time_scale):
+        console.print(f"{simulated}: times are the robots'")
     console.print(
         terminal.figures(
             [
@@ -100,6 +103,6 @@ def _print(figures: FleetFigures) -> None:
     console.print(table)
     console.print(
         "through, again: m2 that another had swept. kB/s: messages to the fleet (most over 5 s). "
-        "plan ms: median, 99 %. Times are by the recorder's clock, not by simulated robots'.",
+        "plan ms: median, 99 %, by the recorder's clock.",
         style="dim",
     )

@@ -21,12 +21,13 @@ from msgspec import Meta
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.fleet.observer.cells import Place
 from fasaco_edge.fleet.observer.members import GONE, Member
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.frames import chunks, column
 from fasaco_edge.recording.read.repair import HINT, open_part
 from fasaco_edge.wire.documents.fleet import CellEdge, CellTile
+from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status
 
 NOTES_VERSION: Final = 1
@@ -68,6 +69,8 @@ class Note(msgspec.Struct, array_like=True):
         passes: cells it entered since.
         swept, ground: whole tiles that have changed since; all tiles if ``in_force``.
         in_force: whether this note repeats the content of earlier parts.
+        stamp_ms: stamp of its newest pose; 0 without one, and in recordings of before.
+        time_scale: intended seconds of a simulated robot per second; 1 for a real one.
     """
 
     robot: Count
@@ -86,6 +89,8 @@ class Note(msgspec.Struct, array_like=True):
     swept: list[CellTile]
     ground: list[CellTile]
     in_force: bool = False
+    stamp_ms: Count = 0
+    time_scale: float = 1.0
 
 
 class NotedRobot(msgspec.Struct, frozen=True, array_like=True):
@@ -119,6 +124,8 @@ class Unnoted:
     """Poses, plans and cells of a robot since its last note."""
 
     _pose: Pose2D | None = None
+    _stamp_ms: int = 0
+    _time_scale: float = 1.0
     _cell: Place | None = None
     _passes: list[Pass] = field(default_factory=list)
     _plans_ms: list[float] = field(default_factory=list)
@@ -127,8 +134,10 @@ class Unnoted:
     _swept: dict[Place, CellTile] = field(default_factory=dict)
     _ground: dict[Place, CellTile] = field(default_factory=dict)
 
-    def move(self, cell: Place, pose: Pose2D, at_ms: int) -> None:
+    def move(self, cell: Place, stamped: StampedPose, at_ms: int) -> None:
         """Take in a pose in the robot's map frame, and its cell there."""
+        pose = stamped.pose
+        self._stamp_ms = max(stamped.stamp_ns, 0) // 1_000_000
         if self._pose is not None:
             step_m = math.dist((pose.x, pose.y), (self._pose.x, self._pose.y))
             # A correction of its pose does not count as driven.
@@ -139,7 +148,9 @@ class Unnoted:
             self._passes.append(Pass(at_ms, *cell))
 
     def note_status(self, status: Status) -> None:
-        """Take in a status: the time of a plan that was made since the last."""
+        """Take in a status: the time of a plan that was made since the last, and its clock."""
+        if status.config:
+            self._time_scale = known_settings(status.config).robot.time_scale
         plans, took_ms = status.plan.plans, status.latency_ms.plan
         if plans != self._plans and took_ms is not None and len(self._plans_ms) < MOST_PLANS:
             self._plans_ms.append(took_ms)
@@ -174,6 +185,8 @@ class Unnoted:
             passes=self._passes,
             swept=list(self._swept.values()),
             ground=list(self._ground.values()),
+            stamp_ms=self._stamp_ms,
+            time_scale=self._time_scale,
         )
         self._driven_m = 0.0
         self._passes, self._plans_ms, self._swept, self._ground = [], [], {}, {}

@@ -202,7 +202,7 @@ class FleetRecorder:
             if stamped is not None:
                 pose, seat = stamped.pose, member.seat
                 cell = seat.cell_at(pose.x, pose.y)
-                self._unnoted[robot].move(cell, pose, self._ms(arrival.wall_ns))
+                self._unnoted[robot].move(cell, stamped, self._ms(arrival.wall_ns))
                 self._scene.add_pose(member, pose)
         elif arrival.topic == PATH.name:
             self._scene.add_path(member, decode_path(sample.payload).xy)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import draw_line, draw_unswept, in_pieces
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
@@ -181,5 +182,7 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
         f"{figures.busy_balance:.2f}; waited {figures.waited_s:.0f} s in all",
         f"{figures.swept_m2:.1f} m2 swept, {figures.again_share:.1%} of it swept again",
     ]
+    if simulated := scale_words(figures.time_scale):
+        lines.insert(0, f"{simulated}: times are the robots'")
     title = f"Fleet {figures.fleet}: {len(figures.robots)} robots"
     return Sheet(title, lines, key, None, plot.view.scale).around(plot.finished())

@@ -3,6 +3,9 @@
 A cell that two robots passed is swept again, or only driven through. While a robot is on floor that
 others have swept, its steps from entry to exit are counted. The shortest way between the two counts
 as driving through; all further steps count as sweeping again.
+
+Durations are by the robots' own clocks, which are faster than the recorder's where they are
+simulated; which robot was first on some floor is decided by the recorder's.
 """
 
 from __future__ import annotations
@@ -30,6 +33,7 @@ from fasaco_edge.fleet.observer.cells import (
 )
 from fasaco_edge.fleet.recording.notes import Note, NoteBatch, NotedRobot, read_notes
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.recording.read.robot_clock import RobotClock
 
 AT_WORK = ("planning", "covering", "degraded")
 # Messages are counted over this time for their highest rate [s].
@@ -37,6 +41,8 @@ PEAK_S = 5.0
 # Notes come once a second: a longer interval means that no message arrived [s].
 LONGEST_NOTE_S = 3.0
 NEVER_MS = math.inf
+# Longer than robots of a fleet work one after another [s].
+AROUND_S = 1e6
 
 
 class FleetRobotFigures(msgspec.Struct, frozen=True):
@@ -81,6 +87,7 @@ class FleetFigures(msgspec.Struct, frozen=True):
 
     Attributes:
         fleet: its name.
+        time_scale: intended seconds of the first robot per second: 1, unless it is simulated.
         duration_s: of the recording [s].
         makespan_s: from when the first robot works until the last has ended [s].
         busy_balance: the least busy robot's time at work over the busiest one's.
@@ -94,6 +101,7 @@ class FleetFigures(msgspec.Struct, frozen=True):
     """
 
     fleet: str
+    time_scale: float
     duration_s: float
     makespan_s: float
     busy_balance: float
@@ -118,6 +126,7 @@ class RobotTrack:
         passes: the cells it entered, in order, int64 (n, 3): time [ms], row, col.
         again: the cells of ``swept_ms`` that another robot had swept before: for each the share of
             the passes around it that counts as sweeping again.
+        clock: its seconds since the recording began.
     """
 
     name: str
@@ -126,6 +135,7 @@ class RobotTrack:
     swept_ms: dict[Place, int] = field(default_factory=dict)
     passes: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     again: dict[Place, float] = field(default_factory=dict)
+    clock: RobotClock = field(default_factory=lambda: RobotClock(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +196,24 @@ def _tracks(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack],
                 passes.setdefault(robot.name, []).append(passed)
     for name, pieces in passes.items():
         tracks[name].passes = np.concatenate(pieces)
+    for track in tracks.values():
+        track.clock = _clock(track.notes)
     return sorted(tracks.values(), key=lambda track: track.name), together(ground)
+
+
+def _clock(notes: Sequence[Note]) -> RobotClock:
+    """Return the clock of a robot, by the stamps of its poses if it is simulated.
+
+    Before and after those it is as fast as intended: others may be at work then.
+    """
+    stamped = [note for note in notes if note.stamp_ms]
+    scale = stamped[-1].time_scale if stamped else 1.0
+    if scale == 1.0 or not 0.0 < scale < math.inf:
+        return RobotClock(0)
+    times_s = 1e-3 * np.array([(note.at_ms, note.stamp_ms) for note in stamped])
+    around_s = [times_s[end] + (sign * AROUND_S, sign * scale * AROUND_S)
+                for end, sign in ((0, -1.0), (-1, 1.0))]  # fmt: skip
+    return RobotClock.by_stamps(0, scale, *np.vstack([around_s[0], times_s, around_s[1]]).T)
 
 
 def find_again(tracks: Sequence[RobotTrack], ground: Cells) -> None:
@@ -242,8 +269,6 @@ def _share_again(way: Sequence[Place], known: NDArray[np.bool_], window: Window)
 def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigures:
     cell_m2 = seat.cell_m**2
     robots = [_robot(track, cell_m2) for track in tracks]
-    worked = [note.at_ms for track in tracks for note in track.notes if note.state in AT_WORK]
-    ends = [note.at_ms for track in tracks for note in track.notes]
     swept = {cell for track in tracks for cell in track.swept_ms}
     through_m2, again_m2 = (
         sum(getattr(robot, name) for robot in robots) for name in ("through_m2", "again_m2")
@@ -251,8 +276,9 @@ def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigur
     swept_m2 = len(swept) * cell_m2
     return FleetFigures(
         fleet=fleet,
-        duration_s=round(max(ends, default=0) / 1000, 1),
-        makespan_s=round((max(worked) - min(worked)) / 1000, 1) if worked else 0.0,
+        time_scale=tracks[0].clock.scale if tracks else 1.0,
+        duration_s=_until_last(tracks),
+        makespan_s=_until_last(tracks, AT_WORK),
         busy_balance=_balance([robot.busy_s for robot in robots]),
         swept_balance=_balance([robot.swept_m2 for robot in robots]),
         swept_m2=round(swept_m2, 2),
@@ -265,14 +291,33 @@ def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigur
     )
 
 
+def _until_last(tracks: Sequence[RobotTrack], states: Sequence[str] = ()) -> float:
+    """Return the time from the beginning, or the first note in ``states``, to the last note [s].
+
+    By the clock of the robot that was last.
+    """
+    at = [(note.at_ms, track) for track in tracks for note in track.notes
+          if not states or note.state in states]  # fmt: skip
+    if not at:
+        return 0.0
+    first_ms = min(at_ms for at_ms, _ in at) if states else 0
+    last_ms, track = max(at, key=lambda one: one[0])
+    return round(float(np.diff(_seconds(track.clock, [first_ms, last_ms])).item()), 1)
+
+
+def _seconds(clock: RobotClock, at_ms: Sequence[int]) -> NDArray[np.float64]:
+    return clock.all_seconds(1_000_000 * np.array(at_ms, np.int64))
+
+
 def _balance(values: Sequence[float]) -> float:
     return round(min(values) / max(values), 3) if values and max(values) > 0 else 1.0
 
 
 def _robot(track: RobotTrack, cell_m2: float) -> FleetRobotFigures:
     notes = track.notes
-    times = [note.at_ms / 1000 for note in notes]
-    lasting = [min(b - a, LONGEST_NOTE_S) for a, b in pairwise(times)] + [0.0]
+    times = _seconds(track.clock, [note.at_ms for note in notes]).tolist()
+    longest_s = LONGEST_NOTE_S * track.clock.scale
+    lasting = [min(b - a, longest_s) for a, b in pairwise(times)] + [0.0]
     waits: list[float] = []
     was_waiting = False
     for note, seconds in zip(notes, lasting, strict=True):
@@ -300,19 +345,19 @@ def _robot(track: RobotTrack, cell_m2: float) -> FleetRobotFigures:
         again_m2=round(again * cell_m2, 2),
         messages_s=round(sum(note.messages for note in notes) / recorded_s, 2),
         kb_s=round(sum(note.bytes for note in notes) / recorded_s / 1000, 2),
-        peak_kb_s=_peak_kb_s(notes),
+        peak_kb_s=_peak_kb_s(notes, times),
         plans=len(plans),
         plan_ms_p50=round(float(np.percentile(plans, 50)), 1) if plans else None,
         plan_ms_p99=round(float(np.percentile(plans, 99)), 1) if plans else None,
     )
 
 
-def _peak_kb_s(notes: Sequence[Note]) -> float:
-    """Return the highest rate of messages over some seconds [kB/s]."""
+def _peak_kb_s(notes: Sequence[Note], times: Sequence[float]) -> float:
+    """Return the highest rate of messages over some seconds [kB/s], of notes at ``times`` [s]."""
     most, first, total = 0.0, 0, 0
-    for note in notes:
+    for note, at_s in zip(notes, times, strict=True):
         total += note.bytes
-        while note.at_ms - notes[first].at_ms > 1000 * PEAK_S:
+        while at_s - times[first] > PEAK_S:
             total -= notes[first].bytes
             first += 1
         most = max(most, total)

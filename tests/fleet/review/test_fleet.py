@@ -15,7 +15,7 @@ CELL_M = 0.5
 GROUND = [(row, col) for row in range(8) for col in range(12)]
 
 
-def noted(robot, way, begin_s, *, waits=()):
+def noted(robot, way, begin_s, *, waits=(), scale=1.0):
     """Return notes of a robot that comes into a cell a second, and has swept it then."""
     swept, notes = [], []
     for second, cell in enumerate(way):
@@ -26,6 +26,7 @@ def noted(robot, way, begin_s, *, waits=()):
                 robot, at_ms, "covering", 0.0, 0.0, "other" if second in waits else "", 3, 9, 2,
                 500, CELL_M, [4.0], [Pass(at_ms, *cell)], list(tiles(swept)),
                 list(tiles(GROUND)) if not second else [],
+                stamp_ms=7_000 + round(scale * at_ms), time_scale=scale,
             )
         )  # fmt: skip
     return notes
@@ -37,14 +38,14 @@ def lane(row, first, last):
     return [(row, col) for col in range(first, last + step, step)]
 
 
-def reviewed(monkeypatch, *ways, waits=(), begin_s=0):
+def reviewed(monkeypatch, *ways, waits=(), begin_s=0, scale=1.0):
     """Return the review of robots that drive one after another."""
     robots = [
         NotedRobot(f"r{number + 1}", 0.2, CELL_M, 0.0, 0.0, 0.0, 0.0) for number in range(len(ways))
     ]
     notes = []
     for number, way in enumerate(ways):
-        notes += noted(number, way, begin_s, waits=waits if number else ())
+        notes += noted(number, way, begin_s, waits=waits if number else (), scale=scale)
         begin_s += len(way)
     batch = NoteBatch(NOTES_VERSION, 1, "house", robots, notes)
     monkeypatch.setattr(fleet, "read_notes", lambda paths: [batch])
@@ -91,3 +92,17 @@ def test_makespan_balance_waiting_and_messages(monkeypatch):
     assert (first.messages_s, first.kb_s) == (2.2, 0.55)
     assert first.driven_m == 11 * CELL_M
     assert (first.plans, first.plan_ms_p99) == (11, 4.0)
+
+
+def test_durations_are_the_simulated_robots(monkeypatch):
+    ways = lane(0, 0, 10), lane(4, 0, 10)
+    real = reviewed(monkeypatch, *ways, waits=(2, 3, 7))
+    figures = reviewed(monkeypatch, *ways, waits=(2, 3, 7), scale=10.0)
+    assert (real.time_scale, figures.time_scale) == (1.0, 10.0)
+    assert (figures.makespan_s, figures.duration_s) == (210.0, 210.0)
+    first, second = figures.robots
+    assert (second.waits, second.waited_s, second.longest_wait_s) == (2, 30.0, 20.0)
+    assert (first.busy_s, second.busy_s) == (100.0, 70.0)
+    assert (first.messages_s, first.kb_s) == (0.22, 0.06)
+    assert figures.again_m2 == real.again_m2
+    assert first.plan_ms_p99 == 4.0
