@@ -1,7 +1,7 @@
-"""Tiles of floor: one bit per pixel, and lookup from other rasters.
+"""Tiles: rasters without bounds, copied on write; tiles of floor, and lookup from other rasters.
 
-The pixels lie fixed in the map frame, whatever a map's origin, yaw and resolution: pixel (row, col)
-begins at y = row * PIXEL_M, x = col * PIXEL_M.
+Tiles of floor have one bit per pixel. The pixels lie fixed in the map frame, whatever a map's
+origin, yaw and resolution: pixel (row, col) begins at y = row * PIXEL_M, x = col * PIXEL_M.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,66 @@ Bits = NDArray[np.uint8]
 """Eight pixels of a row per byte, the first highest; a tile is (FLOOR_TILE, ROW_BYTES)."""
 Tiles = Mapping[Place, Bits]
 Mask = NDArray[np.bool_]
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+class SharedTiles(dict[Place, NDArray[Scalar]]):
+    """Tiles by place (row, col), shared with snapshots until they change.
+
+    Only tiles with content are stored, so a map that jumps far away costs nothing in between.
+
+    Args:
+        most: limit on the number of tiles.
+        dropped: number of tiles dropped at once at the limit.
+        blank: an empty tile.
+        tiles: initial tiles.
+    """
+
+    def __init__(
+        self,
+        most: int,
+        dropped: int,
+        blank: NDArray[Scalar],
+        tiles: Mapping[Place, NDArray[Scalar]] = MappingProxyType({}),
+    ) -> None:
+        super().__init__(tiles)
+        self._most, self._dropped, self._blank = most, dropped, blank
+        # Tiles that no snapshot shares.
+        self._own: set[Place] = set()
+
+    def snapshot(self) -> Mapping[Place, NDArray[Scalar]]:
+        """Return the present tiles; a tile is copied once it changes."""
+        for place in self._own:
+            self[place].flags.writeable = False
+        self._own.clear()
+        return MappingProxyType(dict(self))
+
+    def make_room(self, place: Place) -> list[NDArray[Scalar]]:
+        """Drop the tiles farthest from ``place`` if there is no room for one there; return them."""
+        if place in self or len(self) < self._most:
+            return []
+
+        def distance(other: Place) -> tuple[int, Place]:
+            return max(abs(other[0] - place[0]), abs(other[1] - place[1])), other
+
+        farthest = sorted(self, key=distance)[-self._dropped :]
+        return [self.drop(far) for far in farthest]
+
+    def writable(self, place: Place) -> NDArray[Scalar]:
+        """Return the tile at a place, created if missing; no snapshot shares it."""
+        if place not in self._own:
+            self.put(place, self.get(place, self._blank).copy())
+        return self[place]
+
+    def put(self, place: Place, tile: NDArray[Scalar]) -> None:
+        """Take ownership of a tile."""
+        self[place] = tile
+        self._own.add(place)
+
+    def drop(self, place: Place) -> NDArray[Scalar]:
+        """Remove a tile and return it."""
+        self._own.discard(place)
+        return self.pop(place)
 
 
 class Similarity(NamedTuple):
