@@ -130,10 +130,8 @@ def blocked_pixels(
 
 
 def strips(part: Window) -> Iterator[Window]:
-    """Yield windows of a few rows that together are ``part``."""
-    rows = max(STRIP // max(part.cols, 1), 1)
-    for row in range(part.row0, part.row1, rows):
-        yield Window(row, part.col0, min(row + rows, part.row1), part.col1)
+    """Return windows of a few rows that together are ``part``."""
+    return part.strips(STRIP)
 
 
 def raster_to_map(geometry: GridGeometry, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,7 +10,6 @@ by whole words of its bits.
 from __future__ import annotations
 
 import math
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -145,29 +144,6 @@ class FloorMap:
             self._look(grids[1], parts, self.touched.row0, self.touched.row1)
         self._settle(plain, near | new_cells(before.window, plain.window))
         return self._compared(before)
-
-    def keeping_out(
-        self, polygons: tuple[Polygon, ...], grid: OccupancyGrid, plain: CoverageLattice
-    ) -> FloorMap:
-        """Return the floor of the same map with polygons that the robot must not touch.
-
-        Equals a new computation, but only cells near the polygons are recomputed. To be called on a
-        floor without keep-out polygons.
-        """
-        geometry, parts = self._geometry_of(grid)
-        if geometry != self.geometry:
-            return FloorMap(grid, plain, self._footprint, self.discs, self._most_pixels, polygons)
-        other = copy(self)
-        other._keep_out, other._kept_out = polygons, None
-        other.blocked, other.places = self.blocked.copy(), self.places.copy()
-        stale = self._reach.cells_near(polygons, grid.geometry.resolution, plain.window)
-        near = self._reach.pixels_of(stale, plain.window, geometry)
-        if near is not None:
-            other.shift = 0, 0
-            other._look(grid, parts, near.row0, near.row1)
-            other._settle(plain, stale)
-        other.shift, other.touched = None, Window(0, 0, geometry.rows, geometry.cols)
-        return other
 
     def stand_xy(self, cell: Cell) -> Point | None:
         """Return the stand of a cell, x, y [m]; None for none."""

@@ -6,6 +6,7 @@ Does not import numpy at run time, so that a program that only needs poses stays
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -111,6 +112,12 @@ class Window:
             -(-self.row1 // chunk) * chunk,
             -(-self.col1 // chunk) * chunk,
         )
+
+    def strips(self, most: int) -> Iterator[Window]:
+        """Yield windows of whole rows that together are this one, of about ``most`` cells each."""
+        rows = max(most // max(self.cols, 1), 1)
+        for row in range(self.row0, self.row1, rows):
+            yield Window(row, self.col0, min(row + rows, self.row1), self.col1)
 
     def contains(self, other: Window) -> bool:
         """Return whether another rectangle, not empty, lies inside."""

@@ -153,12 +153,12 @@ def known_bounds(grid: OccupancyGrid) -> Bounds | None:
 
 
 def marked_window(
-    shape: tuple[int, ...], marked: Callable[[slice], NDArray[np.bool_]]
+    shape: tuple[int, int], marked: Callable[[slice], NDArray[np.bool_]]
 ) -> Window | None:
     """Return the window of marked pixels; ``marked`` returns the mask, bool, of some rows."""
-    some, found = max(BLOCK_PIXELS // max(shape[1], 1), 1), None
-    for start in range(0, shape[0], some):
-        here = Window.of(marked(slice(start, start + some)))
+    found = None
+    for strip in Window(0, 0, *shape).strips(BLOCK_PIXELS):
+        here = Window.of(marked(slice(strip.row0, strip.row1)))
         if here is not None:
-            found = Window.around(found, here.moved(start, 0))
+            found = Window.around(found, here.moved(strip.row0, 0))
     return found

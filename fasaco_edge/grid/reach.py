@@ -7,14 +7,13 @@ corner. Whatever lies farther from a change than that need not be recomputed.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.fine_raster import RobotDiscs, stand_placement
-from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window, polygon_bounds
+from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 
 # A step may bend over places this far from the centres of its two cells; one pixel for rounding.
@@ -73,28 +72,6 @@ class Reach:
         if found is None:
             return None
         return self.box(found.moved(window.row0, window.col0), geometry, self._margin(geometry))
-
-    def cells_near(
-        self, polygons: Sequence[Polygon], resolution: float, window: Window
-    ) -> NDArray[np.bool_]:
-        """Return the cells whose stands or steps polygons may affect, bool (rows, cols).
-
-        Args:
-            polygons: in the map frame.
-            resolution: edge of a pixel of the map [m].
-            window: window of the lattice.
-        """
-        # The distance within which a changed pixel of the map has effects, at any yaw.
-        reach_m = self.discs.clear_m + (REACH_CELLS + 1.0) * self.cell_m
-        reach_m = (reach_m + (REACH_PX + 1.0) * resolution) * math.sqrt(2.0)
-        near, cell_m = np.zeros((window.rows, window.cols), np.bool_), self.cell_m
-        for polygon in polygons:
-            x0, y0, x1, y1 = polygon_bounds(polygon)
-            low = math.floor((y0 - reach_m) / cell_m), math.floor((x0 - reach_m) / cell_m)
-            high = math.ceil((y1 + reach_m) / cell_m), math.ceil((x1 + reach_m) / cell_m)
-            if box := Window(*low, *high).intersection(window):
-                near[box.slices_in(window)] = True
-        return near
 
     def lost(
         self, grids: tuple[OccupancyGrid, OccupancyGrid], geometry: GridGeometry, parts: int

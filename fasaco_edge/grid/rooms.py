@@ -9,7 +9,7 @@ served too: a room is one as soon as enough of its floor has been seen through t
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,8 +86,9 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
     del open_floor
     sizes = _counted(labels, free) * geometry.resolution**2
     rooms, count = _numbered(_joined(doors, beside_cuts(labels, doors), sizes))
-    for rows in _blocks(labels):
-        labels[rows] = rooms[labels[rows]]
+    whole = Window(0, 0, *labels.shape)
+    for strip in whole.strips(BLOCK):
+        labels[strip.slices_in(whole)] = rooms[labels[strip.slices_in(whole)]]
     grow(labels, ~solid)
     labels[~free] = 0
     return FoundRooms(geometry, labels, count)
@@ -112,17 +113,13 @@ def _solid_and_doors(
     return solid, find_doors(pixels, _DIRECTIONS, limits)
 
 
-def _blocks(pixels: NDArray[np.int32]) -> Iterator[slice]:
-    """Yield slices of rows that are worked on at once, which bounds memory."""
-    step = max(BLOCK // pixels.shape[1], 1)
-    yield from (slice(first, first + step) for first in range(0, pixels.shape[0], step))
-
-
 def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return how many free pixels each region has, float64 (n,)."""
     counts = np.zeros(int(labels.max()) + 1)
-    for rows in _blocks(labels):
-        counts += np.bincount(labels[rows][free[rows]], minlength=len(counts))
+    whole = Window(0, 0, *labels.shape)
+    for strip in whole.strips(BLOCK):
+        at = strip.slices_in(whole)
+        counts += np.bincount(labels[at][free[at]], minlength=len(counts))
     return counts
 
 

@@ -223,35 +223,6 @@ def test_a_robot_stands_clear_of_what_it_keeps_out_of():
     assert apart.min() < 0.18 + 0.05
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.3])
-@pytest.mark.parametrize("seed", range(4))
-def test_what_is_kept_out_later_leads_where_a_new_look_does(seed, yaw):
-    rng = np.random.default_rng(seed)
-    grid = room(6.0, 5.0, yaw)
-    plain, floor, zones = CoverageLattice.from_map(grid, FOOTPRINT), over(grid), []
-    for _ in range(1 + 2 * seed):
-        x, y = rng.uniform(-1.5, 7.0, 2)
-        width, height = rng.choice([0.05, 0.5, 1.3], 2)
-        zones.append(((x, y), (x + width, y), (x + width, y + height)))
-    kept = floor.keeping_out(tuple(zones), grid, plain)
-    assert_same(kept, over(grid, tuple(zones)))
-    assert_same(floor, over(grid))
-    assert (kept.shift, kept.touched) == (None, floor.touched)
-    cells = grid.cells.copy()
-    cells[40:44, 30:50] = 100
-    new = OccupancyGrid(grid.geometry, cells)
-    kept.change((grid, new), LatticeChange.between((grid, new), plain, FOOTPRINT).after)
-    assert_same(kept, over(new, tuple(zones)))
-    assert_same(floor, over(grid))
-
-
-def test_zones_far_from_the_map_change_nothing():
-    grid = room(3.0, 2.0)
-    far = ((90.0, 90.0), (91.0, 90.0), (91.0, 91.0))
-    kept = over(grid).keeping_out((far,), grid, CoverageLattice.from_map(grid, FOOTPRINT))
-    assert_same(kept, over(grid))
-
-
 def test_the_floor_in_reach_of_some_cells():
     floor = over(room(3.0, 2.0))
     whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)

@@ -17,7 +17,7 @@ nothing on where it is. Rooms that the map does not show stay as they are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,17 +63,12 @@ def common_counts(labels: Labels, slots: Ids, most: int) -> NDArray[np.int64]:
     """Return how many squares each region and each slot have in common, int64 (n, most + 1)."""
     wide, regions = most + 1, int(labels.max(initial=0)) + 1
     counts = np.zeros(regions * wide, np.int64)
-    for rows in _blocks(labels):
-        keys = labels[rows].astype(np.int64).ravel() * wide + slots[rows].ravel()
+    whole = Window(0, 0, *labels.shape)
+    for strip in whole.strips(BLOCK):
+        at = strip.slices_in(whole)
+        keys = labels[at].astype(np.int64).ravel() * wide + slots[at].ravel()
         counts += np.bincount(keys, minlength=regions * wide)
     return counts.reshape(regions, wide)
-
-
-def _blocks(squares: Labels) -> Iterator[slice]:
-    """Yield slices of rows that are worked on at once, which bounds memory."""
-    rows, cols = squares.shape
-    step = max(BLOCK // max(cols, 1), 1)
-    yield from (slice(first, first + step) for first in range(0, rows, step))
 
 
 @dataclass(slots=True)
@@ -133,8 +128,9 @@ class Matching:
             if what == "move":
                 label = self._shown_by[self._rooms.index(other)]
                 self._becomes[label, self._rooms.index(room)] = other
-        for rows in _blocks(self._labels):
-            self._part[rows] = self._becomes[self._labels[rows], self._slots[rows]]
+        for strip in self._window.strips(BLOCK):
+            at = strip.slices_in(self._window)
+            self._part[at] = self._becomes[self._labels[at], self._slots[at]]
         self._keep_cuts(before)
         for label in self._to_divide:
             self._divide(label)
