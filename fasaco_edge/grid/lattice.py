@@ -133,6 +133,10 @@ class CoverageLattice:
         window = self.window
         return window.row0 <= row < window.row1 and window.col0 <= col < window.col1
 
+    def is_coverable(self, cell: Cell) -> bool:
+        """Return whether ``cell`` is coverable."""
+        return self.contains(cell) and bool(self.states[self.local(cell)] == COVERABLE)
+
     def local(self, cell: Cell) -> Cell:
         """Return the index of ``cell`` in the arrays."""
         return cell[0] - self.window.row0, cell[1] - self.window.col0

@@ -1,7 +1,7 @@
 """Tool sight: the floor that a tool wider than the robot touches, without floor behind walls.
 
 Side brushes, a wide deck or a lamp reach over the rim of the robot's disc. As in
-``grid.tool_reach``, a pixel counts if free pixels connect it with the disc, about within the tool.
+``grid.floor``, a pixel counts if free pixels connect it with the disc, about within the tool.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fasaco_edge.grid.floor import tool_steps
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.tool_reach import tool_steps
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
 
 
