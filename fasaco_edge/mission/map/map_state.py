@@ -248,11 +248,7 @@ class MapState(Ground):
         if lattice is None or self.pose is None:
             return None
         # A polished line runs beside its cells.
-        if (
-            cell is not None
-            and lattice.contains(cell)
-            and lattice.states[lattice.local(cell)] == COVERABLE
-        ):
+        if cell is not None and lattice.is_coverable(cell):
             return cell
         pose, dock = self.pose.pose, self.places.dock
         own = anchor_cell(lattice, pose)

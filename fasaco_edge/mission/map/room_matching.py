@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.rooms.regions import grow
 from fasaco_edge.mission.map.room_book import (
+    LEAST_M2,
     MOST_NUMBER,
     MOST_ROOMS,
     Room,
@@ -42,8 +43,6 @@ HOLD_NEW, HOLD_CHANGE = 4, 8
 SETTLED = 2 * HOLD_CHANGE
 # An update without a change takes this from its score.
 PENALTY = 2
-# Least area of a room, and of a part that is more than the border moving to and fro [m2].
-LEAST_M2 = 1.0
 # A region shows a room if it has this area of it [m2], or half of a smaller room; and this share of
 # the smaller of the two.
 LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
