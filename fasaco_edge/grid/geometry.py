@@ -223,17 +223,20 @@ class GridGeometry:
         u, v = col * self.resolution, row * self.resolution
         return self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
 
-    def values_at(self, values: NDArray[_Pixel], xy: NDArray[np.float64]) -> NDArray[_Pixel]:
-        """Return the values of the pixels at points (x, y) [m], float64 (n, 2); 0 beyond the grid.
+    def values_at(
+        self, values: NDArray[_Pixel], xy: NDArray[np.float64], beyond: int = 0
+    ) -> NDArray[_Pixel]:
+        """Return the values of the pixels at points (x, y) [m], float64 (n, 2).
 
-        ``values``: (rows, cols), of any dtype, which the result, (n,), has too.
+        ``values``: (rows, cols), of any dtype, which the result, (n,), has too; ``beyond`` the grid
+        it has that value.
         """
         col, row = self.to_pixels(xy[:, 0], xy[:, 1])
         # Without numpy, which processes that never get here do not load.
         cols, rows = (col // 1).astype(int), (row // 1).astype(int)
         inside = (rows >= 0) & (cols >= 0) & (rows < self.rows) & (cols < self.cols)
         found = cols.astype(values.dtype)
-        found.fill(0)
+        found.fill(beyond)
         found[inside] = values[rows[inside], cols[inside]]
         return found
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import product
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
-from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR, FloorSnapshot, SharedTiles
+from fasaco_edge.mission.coverage.floor_tiles import (
+    NO_FLOOR,
+    FloorSnapshot,
+    SharedTiles,
+    assembled,
+)
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 if TYPE_CHECKING:
@@ -82,7 +86,7 @@ class LedgerSnapshot:
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
-        return _visits(self.tiles, window)
+        return assembled(self.tiles, window, TILE, np.uint16)
 
 
 class CoverageLedger:
@@ -186,7 +190,7 @@ class CoverageLedger:
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
-        return _visits(self._tiles, window)
+        return assembled(self._tiles, window, TILE, np.uint16)
 
     def has_visited(self, cell: Cell) -> bool:
         """Return whether the tool has passed over ``cell``."""
@@ -242,21 +246,6 @@ class CoverageLedger:
             if math.hypot(px - along * dx, py - along * dy) < half:
                 cells.append(cell)
         return frozenset(cells)
-
-
-def _visits(tiles: Tiles, window: Window) -> NDArray[np.uint16]:
-    result = np.zeros((window.rows, window.cols), np.uint16)
-    rows = range(window.row0 // TILE, -(-window.row1 // TILE))
-    cols = range(window.col0 // TILE, -(-window.col1 // TILE))
-    # For a window far larger than what is covered, iterate over the tiles instead.
-    many = len(rows) * len(cols) > len(tiles)
-    for tile_row, tile_col in tiles if many else product(rows, cols):
-        row, col = tile_row * TILE, tile_col * TILE
-        place = Window(row, col, row + TILE, col + TILE)
-        tile, common = tiles.get((tile_row, tile_col)), window.intersection(place)
-        if tile is not None and common is not None:
-            result[common.slices_in(window)] = tile[common.slices_in(place)]
-    return result
 
 
 def _span(low: float, high: float, cell_m: float) -> range:

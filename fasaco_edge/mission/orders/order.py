@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
+from typing import Annotated, Literal, NamedTuple, TypeVar, get_args
 
 import msgspec
 from msgspec import Meta
@@ -30,6 +30,7 @@ from fasaco_edge.mission.orders.room_requests import (
     RoomRequest,
 )
 from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
+from fasaco_edge.text import misfit
 
 MOST_ZONES = 100
 Minutes = Annotated[float, Meta(ge=0, le=1440)]
@@ -312,15 +313,12 @@ def converted(document: object, kind: type[_Read]) -> _Read:
 
 def _explained(message: str, document: object) -> str:
     """Turn ``Expected `int` >= 1 - at `$.passes``` into member, expectation and value."""
-    what, _, where = message.replace("`", "").partition(" - at $")
-    what = what[0].lower() + what[1:].partition(", got ")[0]
+    where, what, value = misfit(message, document)
+    where = where.lstrip(".")
     if match := re.fullmatch(r"object (contains unknown|missing required) field (.*)", what):
         kind = "unknown" if match[1].endswith("unknown") else "missing"
-        return f"{where.lstrip('.') or 'the order'}: {kind} member {match[2]}"
-    value: Any = document
-    for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", where):
-        value = value[name] if name else value[int(index)]
+        return f"{where or 'the order'}: {kind} member {match[2]}"
     if what.startswith("invalid enum value"):
         member = re.sub(r"\[\d+\]$", "", where).rpartition(".")[2]
         what = f"expected {', '.join(get_args(_WORDS.get(member, CommandName)))}"
-    return f"{where.lstrip('.') or 'the order'}: {what}, got {value!r:.60}"
+    return f"{where or 'the order'}: {what}, got {value!r:.60}"

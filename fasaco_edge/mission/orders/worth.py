@@ -175,11 +175,9 @@ class WorthFirst:
     def _given_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
         if self._on_cells is None or self._on_cells[0] != window:
             # In blocks of rows: places take far more than cells.
-            shifted = given.cells + np.int8(1)
             on_cells = np.empty((window.rows, window.cols), np.int8)
             for part in window.strips(BLOCK):
-                # Beyond the grid it returns 0.
-                values = given.geometry.values_at(shifted, centres(part, self._cell_m)) - np.int8(1)
+                values = given.geometry.values_at(given.cells, centres(part, self._cell_m), -1)
                 on_cells[part.slices_in(window)] = values.reshape(part.rows, part.cols)
             self._on_cells = window, on_cells
         return self._on_cells[1]
