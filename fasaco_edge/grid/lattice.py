@@ -196,6 +196,18 @@ def mask_of(cells: Iterable[Cell], window: Window) -> NDArray[np.bool_]:
     return found
 
 
+def beside(cells: NDArray[np.bool_], *, beyond: bool = False) -> NDArray[np.bool_]:
+    """Return which cells share an edge with some, bool (rows, cols).
+
+    ``beyond``: whether those beyond the border are among these.
+    """
+    around = np.pad(cells, 1, constant_values=beyond)
+    found: NDArray[np.bool_] = around[:-2, 1:-1] | around[2:, 1:-1]
+    found |= around[1:-1, :-2]
+    found |= around[1:-1, 2:]
+    return found
+
+
 def pixels_of(grid: OccupancyGrid) -> Pixels:
     """Return a map as a window of its raster, in the memory layout of the kernels."""
     cells = np.ascontiguousarray(grid.cells)

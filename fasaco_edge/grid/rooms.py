@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.lattice import beside
+from fasaco_edge.grid.occupancy import OccupancyGrid, highest
 from fasaco_edge.grid.walls import THRESHOLDS
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.kernels.rooms.clearance import clearances
@@ -148,8 +149,7 @@ def _kinds(grid: OccupancyGrid) -> tuple[GridGeometry, NDArray[np.uint8]]:
     kinds[part][(seen >= 0) & (seen <= THRESHOLDS.free)] = _FREE
     kinds[part][seen >= THRESHOLDS.occupied] = _WALL
     if joined > 1:
-        shape = known.rows // joined, joined, known.cols // joined, joined
-        kinds = kinds.reshape(shape).max(axis=(1, 3))
+        kinds = highest(kinds, joined)
     if _beside_free(kinds, _UNKNOWN) > MOST_UNMARKED * _beside_free(kinds, _WALL):
         kinds[kinds == _UNKNOWN] = _WALL
     x, y = given.to_map(known.col0, known.row0)
@@ -173,13 +173,8 @@ def _unseen(kinds: NDArray[np.uint8], pixel_m: float) -> NDArray[np.bool_]:
     Free floor is open to those parts nearby; walls alone border on what is behind furniture.
     """
     unknown, free = kinds == _UNKNOWN, kinds == _FREE
-    is_open = np.zeros_like(free)
-    is_open[1:] |= free[1:] & unknown[:-1]
-    is_open[:-1] |= free[:-1] & unknown[1:]
-    is_open[:, 1:] |= free[:, 1:] & unknown[:, :-1]
-    is_open[:, :-1] |= free[:, :-1] & unknown[:, 1:]
     reach = round(OPEN_M / pixel_m)
-    near: NDArray[np.bool_] = clearances(is_open, reach) < reach * reach
+    near: NDArray[np.bool_] = clearances(free & beside(unknown), reach) < reach * reach
     near &= unknown
     return near
 

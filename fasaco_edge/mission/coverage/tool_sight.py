@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from fasaco_edge.grid.floor import tool_steps
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.lattice import beside
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
 from fasaco_edge.mission.map.room_raster import centres
@@ -55,12 +56,7 @@ class ToolSight:
         open_ = under & _free_on(grid, self._free_at_most, window)
         found = inner & under
         for _ in range(self._steps):
-            more = found.copy()
-            more[:, 1:] |= found[:, :-1]
-            more[:, :-1] |= found[:, 1:]
-            more[1:] |= found[:-1]
-            more[:-1] |= found[1:]
-            more = (more & open_) | found
+            more = found | (beside(found) & open_)
             if (more == found).all():
                 break
             found = more
