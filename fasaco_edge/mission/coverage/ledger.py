@@ -147,7 +147,7 @@ class CoverageLedger:
         near = self._near(last, pose, place_of or self._centre)
         entered = self._swept(last, pose, near) - self._under_tool
         for cell in entered:
-            self._visit(cell)
+            self.visit(cell)
         self._under_tool = self._swept(pose, pose, near)
         self._last = pose
         return entered
@@ -179,7 +179,7 @@ class CoverageLedger:
                     self._tiles.writable(place)[tuple(at[part].T)] = 0
         for cell in self._under_tool:
             if not self.has_visited(cell):
-                self._visit(cell)
+                self.visit(cell)
 
     def _districts(self) -> list[list[Cell]]:
         """Return the tiles, grouped by district."""
@@ -198,17 +198,14 @@ class CoverageLedger:
         tile = self._tiles.get((row // TILE, col // TILE))
         return tile is not None and bool(tile[row % TILE, col % TILE])
 
-    def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell whose floor is swept, though the robot missed its point."""
-        self._visit(cell)
-
     def open_again(self, cell: Cell) -> None:
         """Forget the visits to a cell: the tool missed floor in it."""
         row, col = cell
         if self.has_visited(cell):
             self._tiles.writable((row // TILE, col // TILE))[row % TILE, col % TILE] = 0
 
-    def _visit(self, cell: Cell) -> None:
+    def visit(self, cell: Cell) -> None:
+        """Count a visit to a cell."""
         row, col = cell
         self.total += 1
         place = (row // TILE, col // TILE)

@@ -198,7 +198,7 @@ class MissionLedger:
 
     def credit(self, cell: Cell) -> None:
         """Count a visit to a cell whose floor is swept, though the robot missed its point."""
-        self.current.credit(cell)
+        self.current.visit(cell)
 
     def may_open_again(self, cell: Cell) -> bool:
         """Return whether a cell may be counted as not covered once more."""
