@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import re
 import reprlib
+from typing import Any
 
 MOST = 2_000
 """What is shown of a text at most [characters]; longer texts are cut."""
@@ -76,3 +77,15 @@ def duration(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"
+
+
+def misfit(message: str, document: object) -> tuple[str, str, object]:
+    """Return where a parsed document does not fit, what was expected there, and what it has.
+
+    ``message``: of a ``msgspec.ValidationError``, as "Expected `int` >= 1 - at `$.passes[0]`".
+    """
+    what, _, where = message.replace("`", "").partition(" - at $")
+    value: Any = document
+    for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", where):
+        value = value[name] if name else value[int(index)]
+    return where, what[0].lower() + what[1:].partition(", got ")[0], value

@@ -12,7 +12,7 @@ from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.cli.geojson import rooms_collection
-from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.documents.rooms import Rooms

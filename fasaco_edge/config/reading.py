@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -16,7 +15,7 @@ import yaml
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
-from fasaco_edge.text import shown
+from fasaco_edge.text import misfit, shown
 
 FOLDER = "CREDENTIALS_DIRECTORY"
 # Keys of earlier releases: why each was removed, and its replacement. An empty one asked for
@@ -145,16 +144,8 @@ def _value_fault(kind: object, value: object, key: str) -> Fault | None:
     try:
         msgspec.convert(value, wanted)
     except msgspec.ValidationError as error:
-        # "Expected `int` >= 1 - at `$[0]`"
-        match = re.fullmatch(r"(?P<what>.*?)(?: - at `\$(?P<at>[^`]*)`)?", str(error), re.DOTALL)
-        assert match is not None
-        at = match["at"] or ""
-        part: Any = value
-        for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", at):
-            part = part[name] if name else part[int(index)]
-        value = part
-        what = match["what"].replace("`", "")
-        expected = _choices(kind) or what[0].lower() + what[1:].partition(", got")[0]
+        at, expected, value = misfit(str(error), value)
+        expected = _choices(kind) or expected
         if expected == "expected str":
             expected += ", in quotes"  # YAML 1.1 takes 8:1 for a number
         return _fault(key + at, f"{key}{at}: {expected}, got {shown(value)}")

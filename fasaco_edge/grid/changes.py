@@ -1,15 +1,13 @@
 """Lattice changes: incremental update of the coverage lattice to a new map.
 
-If the new map lies on the raster of the previous one (it was patched, it has grown, or its origin
-has moved by whole pixels), pixels are compared, and only cells near changed pixels are
-reclassified. On another raster (its origin has moved by a fraction of a pixel, or was rotated) all
-cells are reclassified. Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of
-the new map.
+If the new map shows all of the previous one on its raster (it was patched, or has grown by whole
+pixels), pixels are compared, and only cells near changed pixels are reclassified. Otherwise (it was
+cut, its origin has moved by a fraction of a pixel, or was rotated) all cells are reclassified.
+Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of the new map.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Self, TypeVar
 
@@ -28,7 +26,7 @@ from fasaco_edge.grid.lattice import (
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.changes import mark_stale
 from fasaco_edge.kernels.lattice.classification import Cells, classify_cells
-from fasaco_edge.kernels.lattice.footprint import Box, Placement, Thresholds, reach_of
+from fasaco_edge.kernels.lattice.footprint import Box, Placement, Thresholds
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -135,27 +133,13 @@ class LatticeChange:
         return cls(before, after, changed)
 
 
-def _regions_to_compare(
-    grids: tuple[OccupancyGrid, OccupancyGrid],
-    window: Window,
-    placement: Placement,
-    within: Window | None,
-) -> tuple[Window, ...] | None:
-    """Return rectangles of the raster that contain all pixels in which two maps may differ.
+def shown_before(grids: tuple[OccupancyGrid, OccupancyGrid]) -> tuple[Window, Window] | None:
+    """Return the windows of the previous map and of the new one on their raster.
 
-    Each is shown by both maps, or by only one. Of the part that only the old map shows, only pixels
-    that affect cells of ``window`` are included. None if the maps are on different rasters.
+    None if they lie on different rasters, or if the new one does not show all of the previous one.
     """
     (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
-    if raster != old_raster:
-        return None
-    if old == new:
-        return (new if within is None else within.moved(new.row0, new.col0),)
-    around = _pixels_around(window, placement)
-    common = old.intersection(new)
-    shared = () if common is None else (common,)
-    lost = (part.intersection(around) for part in old.without(new))
-    return (*shared, *new.without(old), *(part for part in lost if part is not None))
+    return (old, new) if raster == old_raster and new.contains(old) else None
 
 
 def carried(array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0) -> NDArray[Scalar]:
@@ -205,9 +189,13 @@ def cells_near_changes(
         thresholds: thresholds of free and occupied.
         within: see ``LatticeChange.between``.
     """
-    regions = _regions_to_compare(grids, window, placement, within)
-    if regions is None:
+    shown = shown_before(grids)
+    if shown is None:
         return np.ones((window.rows, window.cols), np.bool_)
+    old, new = shown
+    regions = (old, *new.without(old))
+    if old == new and within is not None:
+        regions = (within.moved(new.row0, new.col0),)
     near = np.zeros((window.rows, window.cols), np.bool_)
     before, after = (pixels_of(grid) for grid in grids)
     for region in regions:
@@ -232,23 +220,6 @@ def new_cells(old: Window, new: Window) -> NDArray[np.bool_]:
     ones unless nearby pixels changed: outside of a window is outside of its map, and unknown.
     """
     return ~carried(np.ones((old.rows, old.cols), np.bool_), old, new)
-
-
-def _pixels_around(window: Window, placement: Placement) -> Window:
-    """Return the window of pixels of the raster that may affect the cells of a window."""
-    ux, uy, reach = placement.ux, placement.uy, reach_of(placement) + 2.0
-    corners = [
-        (col * ux - row * uy + placement.x0, col * uy + row * ux + placement.y0)
-        for row in (window.row0, window.row1)
-        for col in (window.col0, window.col1)
-    ]
-    xs, ys = zip(*corners, strict=True)
-    return Window(
-        math.floor(min(ys) - reach),
-        math.floor(min(xs) - reach),
-        math.ceil(max(ys) + reach),
-        math.ceil(max(xs) + reach),
-    )
 
 
 def _cells_where(mask: NDArray[np.bool_], window: Window) -> NDArray[np.int32]:

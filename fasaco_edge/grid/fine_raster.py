@@ -1,7 +1,8 @@
-"""Fine raster of a map: divided pixels with a border of unknown ones, and polygons on it.
+"""Fine raster of a map: its pixels, polygons on it, and which pixels a change of others affects.
 
-The strip that a tool leaves along a wall is narrower than a pixel of most maps. Pixel (i, j) of the
-raster is the unit square around the point (y = i, x = j).
+The strip that a tool leaves along a wall is narrower than a pixel of most maps: pixels are divided,
+with a border of unknown ones. Pixel (i, j) of the raster is the unit square around the point
+(y = i, x = j).
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ FINE_M = 0.025
 DECIMALS = 6
 # Approximate number of pixels processed at once in arrays of a byte or more per pixel.
 STRIP = 1 << 20
+# A step may bend over places this far from the centres of its two cells; one pixel for rounding.
+REACH_CELLS, REACH_PX = 2.5, 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,10 +133,8 @@ def blocked_pixels(
 
 
 def strips(part: Window) -> Iterator[Window]:
-    """Yield windows of a few rows that together are ``part``."""
-    rows = max(STRIP // max(part.cols, 1), 1)
-    for row in range(part.row0, part.row1, rows):
-        yield Window(row, part.col0, min(row + rows, part.row1), part.col1)
+    """Return windows of a few rows that together are ``part``."""
+    return part.strips(STRIP)
 
 
 def raster_to_map(geometry: GridGeometry, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -215,3 +216,64 @@ def _touched_by(corners: NDArray[np.float64], part: Window) -> NDArray[np.bool_]
     turn_inside(corners, part.row0, part.col0, 1.0, inside)
     touched: NDArray[np.bool_] = (np.cumsum(starts, axis=1)[:, :-1] > 0) | inside
     return touched
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """Reach of a robot: which pixels and cells a change of others affects.
+
+    Disc and tool reach beyond the pixel or cell that they stand on, and a step may bend around a
+    corner.
+
+    Attributes:
+        discs: robot and tool.
+        cell_m: edge of a cell [m].
+    """
+
+    discs: RobotDiscs
+    cell_m: float
+
+    def box(self, cells: Window, geometry: GridGeometry, margin: int) -> Window | None:
+        """Return the bounding box in pixels of a window of cells; None for none on the raster.
+
+        Args:
+            cells: window of the lattice.
+            geometry: of the raster.
+            margin: added on each side [pixels].
+        """
+        placement = stand_placement(geometry, self.cell_m, self.discs.radius_m)
+        corners = [
+            (
+                placement.x0 + placement.ux * col - placement.uy * row,
+                placement.y0 + placement.uy * col + placement.ux * row,
+            )
+            for row in (cells.row0, cells.row1)
+            for col in (cells.col0, cells.col1)
+        ]
+        xs, ys = zip(*corners, strict=True)
+        box = Window(
+            math.ceil(min(ys)) - margin,
+            math.ceil(min(xs)) - margin,
+            math.ceil(max(ys)) + margin,
+            math.ceil(max(xs)) + margin,
+        )
+        return box.intersection(Window(0, 0, geometry.rows, geometry.cols))
+
+    def pixels_of(
+        self, cells: NDArray[np.bool_], window: Window, geometry: GridGeometry
+    ) -> Window | None:
+        """Return a window of pixels around cells that robot and tool reach; None without any.
+
+        Args:
+            cells: bool (rows, cols) of the window.
+            window: window of the lattice.
+            geometry: of the raster.
+        """
+        found = Window.of(cells)
+        if found is None:
+            return None
+        return self.box(found.moved(window.row0, window.col0), geometry, self._margin(geometry))
+
+    def _margin(self, geometry: GridGeometry) -> int:
+        """Return how far robot and tool reach from a pixel, in pixels."""
+        return int(max(self.discs.clear_m, self.discs.tool_m / 2) / geometry.resolution) + 2

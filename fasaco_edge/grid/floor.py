@@ -1,12 +1,17 @@
 """Floor: the places of the robot on a fine raster of a map, and the floor its tool reaches there.
 
 The reachable floor is everything that the tool's disc touches while the robot's disc is at places
-connected to its start. The lattice over the floor has a cell wherever the robot has a place: its
-stand is the place nearest to the cell's centre, and a step may bend around a corner.
+connected to its start. All that the robot's disc covers is free. If the tool sticks out of it (side
+brushes, a wide deck, a lamp), a pixel of the tool's disc counts if free pixels, about inside that
+disc, connect it with the robot's disc.
+
+The lattice over the floor has a cell wherever the robot has a place: its stand is the place nearest
+to the cell's centre, and a step may bend around a corner.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,14 +29,14 @@ from fasaco_edge.grid.fine_raster import (
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.tool_reach import tool_reach
-from fasaco_edge.kernels.floor.bits import Bits, packed, unpacked
+from fasaco_edge.kernels.floor.bits import LAST, ONE, Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import (
     choose_stands,
     connected,
     disc_rows,
     link_stands,
     places_of,
+    within,
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
@@ -210,6 +215,40 @@ class StandLattice:
         line, numbers = line[there], numbers[there]
         kept = corners(line)
         return line[kept], numbers[kept]
+
+
+def tool_steps(radius: float, tool: float) -> int:
+    """Return how many steps over edges lead from the robot's disc to the rim of the tool's.
+
+    0 for a tool within the robot's disc. Diagonal distances take more steps: the number allows for
+    that.
+
+    Args:
+        radius, tool: radii of robot and tool [pixels].
+    """
+    return math.ceil(math.sqrt(2.0) * (tool - radius)) if tool > radius else 0
+
+
+def tool_reach(places: Bits, blocked: Bits, radius: float, tool: float) -> Bits:
+    """Return the pixels that the tool reaches from places.
+
+    Args:
+        places, blocked: uint64 (rows, words), see ``kernels.floor.bits``.
+        radius, tool: radii of robot and tool [pixels].
+    """
+    reached, free = within(places, tool), ~blocked
+    steps = tool_steps(radius, tool)
+    if not steps:
+        return reached
+    found = within(places, radius)
+    for _ in range(steps):
+        more = found | found << ONE | found >> ONE
+        more[:, 1:] |= found[:, :-1] >> LAST
+        more[:, :-1] |= found[:, 1:] << LAST
+        more[1:] |= found[:-1]
+        more[:-1] |= found[1:]
+        found = more & free
+    return found & reached
 
 
 def states_of(stands: NDArray[np.float64], unknown: NDArray[np.bool_] | None) -> NDArray[np.uint8]:

@@ -1,6 +1,6 @@
 """Floor map: places, stands and the lattice over them, for a map that changes.
 
-If the new map lies on the raster of the previous one, only cells near changed pixels are
+If the new map shows all of the previous one, on its raster, only cells near changed pixels are
 recomputed, see ``grid.changes``. The result equals that of the new map alone.
 
 The raster spans whole chunks of the map's pixels, so a growing map seldom moves it; and if it does,
@@ -10,21 +10,29 @@ by whole words of its bits.
 from __future__ import annotations
 
 import math
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.changes import LatticeChange, carried, cells_near_changes, new_cells
+from fasaco_edge.grid.changes import (
+    LatticeChange,
+    carried,
+    cells_near_changes,
+    new_cells,
+    shown_before,
+)
 from fasaco_edge.grid.fine_raster import (
+    REACH_CELLS,
+    REACH_PX,
     PolygonsOnRaster,
+    Reach,
     RobotDiscs,
     blocked_pixels,
     fine_geometry,
     stand_placement,
 )
-from fasaco_edge.grid.floor import StandLattice, states_of
+from fasaco_edge.grid.floor import StandLattice, states_of, tool_reach, tool_steps
 from fasaco_edge.grid.geometry import GridGeometry, Point, Polygon, Window
 from fasaco_edge.grid.lattice import (
     UNKNOWN,
@@ -34,8 +42,6 @@ from fasaco_edge.grid.lattice import (
     placement_of,
 )
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.reach import REACH_CELLS, REACH_PX, Reach
-from fasaco_edge.grid.tool_reach import tool_reach, tool_steps
 from fasaco_edge.kernels.floor.bits import WORD, Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import (
     disc_rows,
@@ -119,8 +125,8 @@ class FloorMap:
         """
         before = self.stands.lattice
         geometry, parts = self._geometry_of(grids[1])
-        old_raster, raster = (grid.geometry.on_raster()[0] for grid in grids)
-        if old_raster != raster or geometry.resolution != self.geometry.resolution:
+        is_same_raster = geometry.resolution == self.geometry.resolution
+        if not is_same_raster or shown_before(grids) is None:
             self._see(grids[1], plain)
             return self._compared(before)
         wide = placement_of(grids[1].geometry, self._footprint)
@@ -131,10 +137,7 @@ class FloorMap:
         self.revision += 1
         self.shift = geometry.corner_of(self.geometry)
         # A map that grows on two sides has new cells all along these, and little new floor.
-        self.touched = Window.around(
-            self._reach.pixels_of(near, plain.window, geometry),
-            self._reach.lost(grids, geometry, parts),
-        )
+        self.touched = self._reach.pixels_of(near, plain.window, geometry)
         is_same = geometry == self.geometry
         if self.touched is None and is_same and plain.window == before.window:
             return LatticeChange.to(before, self._with_states(plain))
@@ -145,29 +148,6 @@ class FloorMap:
             self._look(grids[1], parts, self.touched.row0, self.touched.row1)
         self._settle(plain, near | new_cells(before.window, plain.window))
         return self._compared(before)
-
-    def keeping_out(
-        self, polygons: tuple[Polygon, ...], grid: OccupancyGrid, plain: CoverageLattice
-    ) -> FloorMap:
-        """Return the floor of the same map with polygons that the robot must not touch.
-
-        Equals a new computation, but only cells near the polygons are recomputed. To be called on a
-        floor without keep-out polygons.
-        """
-        geometry, parts = self._geometry_of(grid)
-        if geometry != self.geometry:
-            return FloorMap(grid, plain, self._footprint, self.discs, self._most_pixels, polygons)
-        other = copy(self)
-        other._keep_out, other._kept_out = polygons, None
-        other.blocked, other.places = self.blocked.copy(), self.places.copy()
-        stale = self._reach.cells_near(polygons, grid.geometry.resolution, plain.window)
-        near = self._reach.pixels_of(stale, plain.window, geometry)
-        if near is not None:
-            other.shift = 0, 0
-            other._look(grid, parts, near.row0, near.row1)
-            other._settle(plain, stale)
-        other.shift, other.touched = None, Window(0, 0, geometry.rows, geometry.cols)
-        return other
 
     def stand_xy(self, cell: Cell) -> Point | None:
         """Return the stand of a cell, x, y [m]; None for none."""

@@ -6,6 +6,7 @@ Does not import numpy at run time, so that a program that only needs poses stays
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -112,6 +113,12 @@ class Window:
             -(-self.col1 // chunk) * chunk,
         )
 
+    def strips(self, most: int) -> Iterator[Window]:
+        """Yield windows of whole rows that together are this one, of about ``most`` cells each."""
+        rows = max(most // max(self.cols, 1), 1)
+        for row in range(self.row0, self.row1, rows):
+            yield Window(row, self.col0, min(row + rows, self.row1), self.col1)
+
     def contains(self, other: Window) -> bool:
         """Return whether another rectangle, not empty, lies inside."""
         return self.intersection(other) == other
@@ -216,17 +223,20 @@ class GridGeometry:
         u, v = col * self.resolution, row * self.resolution
         return self.origin.x + cos * u - sin * v, self.origin.y + sin * u + cos * v
 
-    def values_at(self, values: NDArray[_Pixel], xy: NDArray[np.float64]) -> NDArray[_Pixel]:
-        """Return the values of the pixels at points (x, y) [m], float64 (n, 2); 0 beyond the grid.
+    def values_at(
+        self, values: NDArray[_Pixel], xy: NDArray[np.float64], beyond: int = 0
+    ) -> NDArray[_Pixel]:
+        """Return the values of the pixels at points (x, y) [m], float64 (n, 2).
 
-        ``values``: (rows, cols), of any dtype, which the result, (n,), has too.
+        ``values``: (rows, cols), of any dtype, which the result, (n,), has too; ``beyond`` the grid
+        it has that value.
         """
         col, row = self.to_pixels(xy[:, 0], xy[:, 1])
         # Without numpy, which processes that never get here do not load.
         cols, rows = (col // 1).astype(int), (row // 1).astype(int)
         inside = (rows >= 0) & (cols >= 0) & (rows < self.rows) & (cols < self.cols)
         found = cols.astype(values.dtype)
-        found.fill(0)
+        found.fill(beyond)
         found[inside] = values[rows[inside], cols[inside]]
         return found
 

@@ -133,6 +133,10 @@ class CoverageLattice:
         window = self.window
         return window.row0 <= row < window.row1 and window.col0 <= col < window.col1
 
+    def is_coverable(self, cell: Cell) -> bool:
+        """Return whether ``cell`` is coverable."""
+        return self.contains(cell) and bool(self.states[self.local(cell)] == COVERABLE)
+
     def local(self, cell: Cell) -> Cell:
         """Return the index of ``cell`` in the arrays."""
         return cell[0] - self.window.row0, cell[1] - self.window.col0
@@ -189,6 +193,18 @@ def mask_of(cells: Iterable[Cell], window: Window) -> NDArray[np.bool_]:
     for row, col in cells:
         if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
             found[row - window.row0, col - window.col0] = True
+    return found
+
+
+def beside(cells: NDArray[np.bool_], *, beyond: bool = False) -> NDArray[np.bool_]:
+    """Return which cells share an edge with some, bool (rows, cols).
+
+    ``beyond``: whether those beyond the border are among these.
+    """
+    around = np.pad(cells, 1, constant_values=beyond)
+    found: NDArray[np.bool_] = around[:-2, 1:-1] | around[2:, 1:-1]
+    found |= around[1:-1, :-2]
+    found |= around[1:-1, 2:]
     return found
 
 

@@ -4,7 +4,7 @@ A map file is interpreted as by nav2_map_server (map_io.cpp). Its releases diffe
 pixels in trinary mode: older ones average the alpha channel into the brightness, so that opaque
 black is 75 % occupied (navigation2 issue 4233); newer ones take a transparent pixel for unknown, as
 scale mode always did. Here alpha is never a brightness, and a transparent pixel is unknown. Keys
-that contradict the image, or leave never-seen ground free, are logged (``map_conventions``).
+that contradict the image, or leave never-seen ground free, are logged (``map_images``).
 """
 
 from __future__ import annotations
@@ -29,9 +29,15 @@ from fasaco_edge.grid.geometry import (
     GridGeometry,
     Pose2D,
 )
-from fasaco_edge.grid.map_conventions import settle, yaw_in_degrees
-from fasaco_edge.grid.map_images import MapImage, check_size, read_image
-from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
+from fasaco_edge.grid.map_images import (
+    MapImage,
+    check_size,
+    read_image,
+    settle,
+    values_of,
+    yaw_in_degrees,
+)
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
 from fasaco_edge.host.resources import folder
@@ -102,7 +108,7 @@ def read_map_rows(
     file, mode, origin, negate = keys.image(), keys.mode(), keys.origin(), keys.negate()
     image = read_image(Path(file), most_bytes)
     geometry = GridGeometry(image.rows, image.cols, resolution, origin)
-    values = _values(mode, thresholds, image.white, negate)
+    values = values_of(mode, thresholds, image.white, negate)
     said = settle(image, values, mode, negate=negate, is_mask=is_mask)
     for text in filter(None, (yaw_in_degrees(origin.yaw), said)):
         LOG.warning("%s: %s", path, text, extra={"event": "map_file"})
@@ -141,7 +147,7 @@ def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
     image = read_image(path)
     geometry = GridGeometry(image.rows, image.cols, resolution_m, Pose2D(0, 0, 0))
     mode, thresholds = MODES[0], (FREE_THRESH, OCCUPIED_THRESH)
-    values = _values(mode, thresholds, image.white, negate=False)
+    values = values_of(mode, thresholds, image.white, negate=False)
     return _grid(geometry, _cells(image, values, mode))
 
 
@@ -340,20 +346,3 @@ class _YamlKeys:
         if not os.path.isfile(found):
             raise self.error("image", f"an existing file, sought at {found}")
         return found
-
-
-def _values(
-    mode: str, thresholds: tuple[float, float], white: int, negate: bool
-) -> NDArray[np.int8]:
-    """Return the cell value, int8 (white + 1,), of each brightness level."""
-    brightness = np.arange(white + 1) / white
-    if mode == "raw":
-        value = np.rint(brightness * 255)
-        return np.where(value <= OCCUPIED, value, UNKNOWN).astype(np.int8)
-    occupied = brightness if negate else 1 - brightness
-    free_thresh, occupied_thresh = thresholds
-    between = np.full(white + 1, float(UNKNOWN))
-    if mode == "scale":
-        between = np.rint((occupied - free_thresh) / (occupied_thresh - free_thresh) * 100)
-    below, above = occupied < free_thresh, occupied > occupied_thresh
-    return np.select([below, above], [FREE, OCCUPIED], between).astype(np.int8)

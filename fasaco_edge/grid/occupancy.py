@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import reduce
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError, PatchWithoutBase
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Window
+
+_Value = TypeVar("_Value", np.int8, np.uint8)
 
 UNKNOWN = -1
 FREE = 0
@@ -114,13 +118,17 @@ def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
     rows, cols = -(-grid.cells.shape[0] // factor), -(-grid.cells.shape[1] // factor)
     padded = np.full((rows * factor, cols * factor), UNKNOWN, np.int8)
     padded[: grid.cells.shape[0], : grid.cells.shape[1]] = grid.cells
-    # Slice by slice: many times faster than the maximum over two axes.
-    cells = padded[::factor, ::factor].copy()
-    for row, col in np.ndindex(factor, factor):
-        np.maximum(cells, padded[row::factor, col::factor], out=cells)
+    cells = highest(padded, factor)
     resolution = grid.geometry.resolution * factor
     geometry = replace(grid.geometry, rows=rows, cols=cols, resolution=resolution)
     return replace(grid, geometry=geometry, cells=cells)
+
+
+def highest(values: NDArray[_Value], factor: int) -> NDArray[_Value]:
+    """Return blocks of ``factor`` x ``factor`` values joined: the highest of each."""
+    # Slice by slice: many times faster than the maximum over two axes of a reshaped array.
+    rows = reduce(np.maximum, (values[first::factor] for first in range(factor)))
+    return reduce(np.maximum, (rows[:, first::factor] for first in range(factor)))
 
 
 def without_base(patches: Iterable[MapPatch], *, updates_lost: bool) -> list[FasacoError]:
@@ -153,12 +161,12 @@ def known_bounds(grid: OccupancyGrid) -> Bounds | None:
 
 
 def marked_window(
-    shape: tuple[int, ...], marked: Callable[[slice], NDArray[np.bool_]]
+    shape: tuple[int, int], marked: Callable[[slice], NDArray[np.bool_]]
 ) -> Window | None:
     """Return the window of marked pixels; ``marked`` returns the mask, bool, of some rows."""
-    some, found = max(BLOCK_PIXELS // max(shape[1], 1), 1), None
-    for start in range(0, shape[0], some):
-        here = Window.of(marked(slice(start, start + some)))
+    found = None
+    for strip in Window(0, 0, *shape).strips(BLOCK_PIXELS):
+        here = Window.of(marked(slice(strip.row0, strip.row1)))
         if here is not None:
-            found = Window.around(found, here.moved(start, 0))
+            found = Window.around(found, here.moved(strip.row0, 0))
     return found

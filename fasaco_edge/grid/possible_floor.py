@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.floor import tool_reach
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point
-from fasaco_edge.grid.tool_reach import tool_reach
 from fasaco_edge.kernels.floor.bits import Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import connected, disc_rows, keep_in_cells, places_of
 

@@ -9,14 +9,15 @@ served too: a room is one as soon as enough of its floor has been seen through t
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.lattice import beside
+from fasaco_edge.grid.occupancy import OccupancyGrid, highest
 from fasaco_edge.grid.walls import THRESHOLDS
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.kernels.rooms.clearance import clearances
@@ -86,8 +87,9 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
     del open_floor
     sizes = _counted(labels, free) * geometry.resolution**2
     rooms, count = _numbered(_joined(doors, beside_cuts(labels, doors), sizes))
-    for rows in _blocks(labels):
-        labels[rows] = rooms[labels[rows]]
+    whole = Window(0, 0, *labels.shape)
+    for strip in whole.strips(BLOCK):
+        labels[strip.slices_in(whole)] = rooms[labels[strip.slices_in(whole)]]
     grow(labels, ~solid)
     labels[~free] = 0
     return FoundRooms(geometry, labels, count)
@@ -112,17 +114,13 @@ def _solid_and_doors(
     return solid, find_doors(pixels, _DIRECTIONS, limits)
 
 
-def _blocks(pixels: NDArray[np.int32]) -> Iterator[slice]:
-    """Yield slices of rows that are worked on at once, which bounds memory."""
-    step = max(BLOCK // pixels.shape[1], 1)
-    yield from (slice(first, first + step) for first in range(0, pixels.shape[0], step))
-
-
 def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return how many free pixels each region has, float64 (n,)."""
     counts = np.zeros(int(labels.max()) + 1)
-    for rows in _blocks(labels):
-        counts += np.bincount(labels[rows][free[rows]], minlength=len(counts))
+    whole = Window(0, 0, *labels.shape)
+    for strip in whole.strips(BLOCK):
+        at = strip.slices_in(whole)
+        counts += np.bincount(labels[at][free[at]], minlength=len(counts))
     return counts
 
 
@@ -151,8 +149,7 @@ def _kinds(grid: OccupancyGrid) -> tuple[GridGeometry, NDArray[np.uint8]]:
     kinds[part][(seen >= 0) & (seen <= THRESHOLDS.free)] = _FREE
     kinds[part][seen >= THRESHOLDS.occupied] = _WALL
     if joined > 1:
-        shape = known.rows // joined, joined, known.cols // joined, joined
-        kinds = kinds.reshape(shape).max(axis=(1, 3))
+        kinds = highest(kinds, joined)
     if _beside_free(kinds, _UNKNOWN) > MOST_UNMARKED * _beside_free(kinds, _WALL):
         kinds[kinds == _UNKNOWN] = _WALL
     x, y = given.to_map(known.col0, known.row0)
@@ -176,13 +173,8 @@ def _unseen(kinds: NDArray[np.uint8], pixel_m: float) -> NDArray[np.bool_]:
     Free floor is open to those parts nearby; walls alone border on what is behind furniture.
     """
     unknown, free = kinds == _UNKNOWN, kinds == _FREE
-    is_open = np.zeros_like(free)
-    is_open[1:] |= free[1:] & unknown[:-1]
-    is_open[:-1] |= free[:-1] & unknown[1:]
-    is_open[:, 1:] |= free[:, 1:] & unknown[:, :-1]
-    is_open[:, :-1] |= free[:, :-1] & unknown[:, 1:]
     reach = round(OPEN_M / pixel_m)
-    near: NDArray[np.bool_] = clearances(is_open, reach) < reach * reach
+    near: NDArray[np.bool_] = clearances(free & beside(unknown), reach) < reach * reach
     near &= unknown
     return near
 

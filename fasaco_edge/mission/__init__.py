@@ -27,6 +27,7 @@ Read in this order:
     company              the interface to other robots; here, that of a single robot
 
     orders/sequencer     owns the order: zones, passes, retries, return home
+    orders/present_part  what of the part that is due is planned now, and when it is given up
     orders/order_state   an order and its progress; kept on disk with the ledger
     orders/order         orders, and their JSON or YAML form
     orders/placing       zones by name to standing zones and rooms

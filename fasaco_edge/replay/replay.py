@@ -27,7 +27,7 @@ from fasaco_edge.mission.core.events import (
     PlanRequest,
 )
 from fasaco_edge.mission.core.spare_time import most_s
-from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import AnyOf, WorkLimit, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep

@@ -19,8 +19,9 @@ from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
+from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import MissionOrder, Zone, read_command
+from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment

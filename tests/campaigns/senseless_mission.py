@@ -45,7 +45,7 @@ from fasaco_edge.mission.core.events import (
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.path_exit import PathExit, PublishedPath
 from fasaco_edge.mission.map.ground import Ground
-from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.planner import ColonySnapshot, SearchProgress, StopRecorder
 from fasaco_edge.planners.registry import planner_of

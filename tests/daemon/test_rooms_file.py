@@ -20,7 +20,7 @@ from fasaco_edge.grid.rooms import FoundRooms
 from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
 from fasaco_edge.mission.map.room_edits import split
 from fasaco_edge.mission.map.room_matching import HOLD_CHANGE
-from fasaco_edge.mission.map.room_update import update
+from fasaco_edge.mission.map.room_watch import update
 from fasaco_edge.planners.passes import Pass
 
 

@@ -55,7 +55,7 @@ def test_a_map_that_has_moved_agrees_once_it_is_moved_back(buildings, name):
     before, after = lattice(buildings[name]), lattice(moved(buildings[name], 1.2, -0.9))
     motion = Motion(Pose2D(0.0, 0.0), Pose2D(1.2, -0.9))
     assert Agreement.of(before, after).kappa < FOREIGN
-    found = Agreement.moved(before, after, motion)
+    found = Agreement.of(before, after, motion)
     assert found.kappa == pytest.approx(1.0)
     assert found.known > 0.9 * np.count_nonzero(after.states)
 

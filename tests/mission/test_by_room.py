@@ -10,8 +10,7 @@ from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.coverage.progress import seconds_in
 from fasaco_edge.mission.map.room_cells import RoomCells
-from fasaco_edge.mission.map.room_update import update
-from fasaco_edge.mission.map.room_watch import RoomWatch
+from fasaco_edge.mission.map.room_watch import RoomWatch, update
 from fasaco_edge.mission.orders.by_room import RoomPrice
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem

@@ -176,22 +176,6 @@ def test_another_building_is_said_and_begun_anew():
     assert again.tell(MapReceived(building(*HALL))).faults == ()
 
 
-def test_coverage_since_the_restart_counts_in_the_other_building():
-    first = started(*HALL, cell=(1, 1))
-    first.finish()
-    corner = PILLARS[-2:]
-    again = resumed(after(first), (1, 1), MapReceived(building(*corner)), pose_at(1, 1))
-    assert again.decisions[-1].faults == ()
-    assert again.mission.state is State.DONE, "covered, as far as anybody knows"
-    again.tell(pose_at(1, 2))
-    decision = again.tell(MapReceived(building(*PILLARS)))
-    assert isinstance(decision.faults[0], LedgerMismatchError)
-    assert again.visited == {(1, 1), (1, 2)}
-    assert again.mission.state is not State.DONE
-    again.plan()
-    again.finish()
-
-
 def test_new_furniture_does_not_cost_the_ledger():
     first = started(*HALL, cell=(1, 1))
     first.finish()

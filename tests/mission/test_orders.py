@@ -10,17 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import CommandError, OrderError
+from fasaco_edge.mission.orders.commands import command_document, read_command, read_recorded
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import (
     EVERYTHING_ONCE,
     Command,
     MissionOrder,
     Zone,
-    command_document,
     order_document,
-    read_command,
     read_order,
-    read_recorded,
 )
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.coverage.passed_cells import MOST_PASSED, PassedCells
+from fasaco_edge.mission.coverage.mission_ledger import MOST_PASSED, PassedCells
 
 
 def test_a_cell_is_kept_until_its_floor_is_swept():

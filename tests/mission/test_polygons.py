@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.polygons import polygon_flaw
-from fasaco_edge.mission.orders.zones import cells_inside, cells_near, counts_in, without
+from fasaco_edge.mission.orders.zones import cells_inside, counts_in, near_polygons, without
 from tests import naive
 from tests.support.examples import examples
 
@@ -74,7 +74,7 @@ def test_a_zone_holds_the_cells_whose_centre_it_holds(polygon):
 @given(polygons, st.sampled_from([0.15, 0.18, 0.4]))
 def test_near_is_what_the_polygon_touches(polygon, reach):
     assume(not polygon_flaw(polygon))
-    near = cells(cells_near((polygon,), WINDOW, CELL_M, reach))
+    near = cells(near_polygons((polygon,), WINDOW, CELL_M, reach))
     sure = {cell for cell in all_cells() if comes_near(centre(*cell), polygon, reach - 0.004)}
     possible = {cell for cell in all_cells() if comes_near(centre(*cell), polygon, reach + 0.004)}
     assert sure <= near <= possible
@@ -86,7 +86,7 @@ def test_a_robot_touches_no_keep_out_zone_on_its_way(polygon, radius):
     assume(not polygon_flaw(polygon))
     free = CoverageLattice.from_free(np.ones((WINDOW.rows, WINDOW.cols), bool), CELL_M)
     free = CoverageLattice(WINDOW, CELL_M, free.states.copy(), free.steps.copy())
-    lattice = without(free, cells_near((polygon,), WINDOW, CELL_M, radius))
+    lattice = without(free, near_polygons((polygon,), WINDOW, CELL_M, radius))
     border = [
         (x0 + t * (x1 - x0), y0 + t * (y1 - y0))
         for (x0, y0), (x1, y1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True)
@@ -106,23 +106,23 @@ def test_a_polygon_along_cell_borders_touches_just_its_cells():
     square = ((0.3, 0.3), (1.5, 0.3), (1.5, 1.2), (0.3, 1.2))
     expected = {(row, col) for row in (1, 2, 3) for col in (1, 2, 3, 4)}
     assert cells(cells_inside(square, WINDOW, CELL_M)) == expected
-    assert cells(cells_near((square,), WINDOW, CELL_M, CELL_M / 2)) == expected
+    assert cells(near_polygons((square,), WINDOW, CELL_M, CELL_M / 2)) == expected
 
 
 def test_a_polygon_far_away_or_around_everything():
     far = ((1e5, 1e5), (1e6, 1e5), (1e6, 1e6))
     around = ((-1e6, -1e6), (1e6, -1e6), (1e6, 1e6), (-1e6, 1e6))
-    for count in (cells_inside, lambda polygon, *args: cells_near((polygon,), *args, 0.15)):
+    for count in (cells_inside, lambda polygon, *args: near_polygons((polygon,), *args, 0.15)):
         assert not count(far, WINDOW, CELL_M).any()
         assert count(around, WINDOW, CELL_M).all()
     assert cells_inside(around, Window(0, 0, 0, 3), CELL_M).shape == (0, 3)
-    assert cells_near((around,), Window(0, 0, 3, 0), CELL_M, 0.15).shape == (3, 0)
+    assert near_polygons((around,), Window(0, 0, 3, 0), CELL_M, 0.15).shape == (3, 0)
 
 
 def test_a_sliver_between_centres_is_no_zone_but_keeps_out():
     sliver = ((0.0, 0.31), (2.0, 0.31), (2.0, 0.32), (0.0, 0.32))
     assert not cells_inside(sliver, WINDOW, CELL_M).any()
-    assert cells(cells_near((sliver,), WINDOW, CELL_M, 0.15)) == {(1, col) for col in range(7)}
+    assert cells(near_polygons((sliver,), WINDOW, CELL_M, 0.15)) == {(1, col) for col in range(7)}
 
 
 def brute_crossing(polygon):

@@ -15,7 +15,7 @@ from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import composed
 from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_raster import centres
-from fasaco_edge.mission.map.room_update import update
+from fasaco_edge.mission.map.room_watch import update
 from tests.benchmarks.rooms.homes import home, seen
 
 SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)

@@ -19,15 +19,10 @@ from fasaco_edge.mission.map import room_watch
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.map.room_watch import PERIOD_S
 from fasaco_edge.mission.orders import sequencer
-from fasaco_edge.mission.orders.order import (
-    Command,
-    StandingZone,
-    command_document,
-    order_document,
-    read_command,
-    read_order,
-)
+from fasaco_edge.mission.orders.commands import command_document, read_command
+from fasaco_edge.mission.orders.order import Command, StandingZone, order_document, read_order
 from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.passes import PassDocument
 from fasaco_edge.mission.orders.placing import are_same
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.orders.zones import in_zones
@@ -201,10 +196,9 @@ def test_a_wait_before_anything_else_stands_and_can_be_cancelled():
 def test_settings_of_a_room_are_used_where_the_order_says_nothing():
     drive = settled(*BOTH)
     number = room_at(drive, *IN_EAST).id
-    twice = RoomRequest(number, passes=2, kinds=(Pass(), Pass(lanes="cross")))
-    drive.command("room_set", room=twice)
+    drive.command("room_set", room=RoomRequest(number, passes=["auto", "cross"]))
     start(drive, f"room {number}")
-    assert drive.mission.order_state.order.zones[0].kinds == twice.kinds
+    assert drive.mission.order_state.order.zones[0].kinds == (Pass(), Pass(lanes="cross"))
     start(drive, f"room {number}", passes=1)
     assert drive.mission.order_state.order.zones[0].passes == 1
     # What is not given stays as it was.
@@ -342,10 +336,10 @@ def test_a_room_order_lies_on_a_rotated_lattice_as_on_any():
 def test_documents_are_read_as_they_were_written():
     for asked in (
         RoomRequest(3, name="kitchen"),
-        RoomRequest("kitchen", cut=((0.0, 1.0), (2.0, 1.0))),
-        RoomRequest(3, others=(4, "bath"), name="wet"),
-        RoomRequest(3, passes=2, kinds=(), skip=True, priority=80),
-        RoomRequest(3, passes=2, kinds=(Pass("edge"), Pass(angle_deg=30.0))),
+        RoomRequest("kitchen", cut=[(0.0, 1.0), (2.0, 1.0)]),
+        RoomRequest(3, others=[4, "bath"], name="wet"),
+        RoomRequest(3, passes=2, skip=True, priority=80),
+        RoomRequest(3, passes=["edge", PassDocument(angle_deg=30.0)]),
     ):
         kind = (
             "room_split"

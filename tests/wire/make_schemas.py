@@ -18,7 +18,7 @@ from typing import Any, get_args
 import msgspec
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.mission.orders.order import CommandDocument
+from fasaco_edge.mission.orders.commands import CommandDocument
 from fasaco_edge.wire import documents
 from fasaco_edge.wire.documents.fleet import FleetMember
 from fasaco_edge.wire.documents.replies import Error

@@ -24,7 +24,8 @@ from fasaco_edge.cli.mission.keep_outs import (
 )
 from fasaco_edge.errors import OrderError, WouldForget
 from fasaco_edge.host.plain_yaml import load, read_bounded
-from fasaco_edge.mission.orders.order import FORGETFUL, order_document, read_order
+from fasaco_edge.mission.orders.commands import FORGETFUL
+from fasaco_edge.mission.orders.order import order_document, read_order
 from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import Reply

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from rich.table import Table
 
 from fasaco_edge.cli.console.terminal import out
-from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.wire.documents import replies
 
 EPILOG = """\

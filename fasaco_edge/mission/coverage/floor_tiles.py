@@ -1,16 +1,16 @@
-"""Tiles of floor: one bit per pixel, and lookup from other rasters.
+"""Tiles: rasters without bounds, copied on write; tiles of floor, and lookup from other rasters.
 
-The pixels lie fixed in the map frame, whatever a map's origin, yaw and resolution: pixel (row, col)
-begins at y = row * PIXEL_M, x = col * PIXEL_M.
+Tiles of floor have one bit per pixel. The pixels lie fixed in the map frame, whatever a map's
+origin, yaw and resolution: pixel (row, col) begins at y = row * PIXEL_M, x = col * PIXEL_M.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +40,66 @@ Bits = NDArray[np.uint8]
 """Eight pixels of a row per byte, the first highest; a tile is (FLOOR_TILE, ROW_BYTES)."""
 Tiles = Mapping[Place, Bits]
 Mask = NDArray[np.bool_]
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+class SharedTiles(dict[Place, NDArray[Scalar]]):
+    """Tiles by place (row, col), shared with snapshots until they change.
+
+    Only tiles with content are stored, so a map that jumps far away costs nothing in between.
+
+    Args:
+        most: limit on the number of tiles.
+        dropped: number of tiles dropped at once at the limit.
+        blank: an empty tile.
+        tiles: initial tiles.
+    """
+
+    def __init__(
+        self,
+        most: int,
+        dropped: int,
+        blank: NDArray[Scalar],
+        tiles: Mapping[Place, NDArray[Scalar]] = MappingProxyType({}),
+    ) -> None:
+        super().__init__(tiles)
+        self._most, self._dropped, self._blank = most, dropped, blank
+        # Tiles that no snapshot shares.
+        self._own: set[Place] = set()
+
+    def snapshot(self) -> Mapping[Place, NDArray[Scalar]]:
+        """Return the present tiles; a tile is copied once it changes."""
+        for place in self._own:
+            self[place].flags.writeable = False
+        self._own.clear()
+        return MappingProxyType(dict(self))
+
+    def make_room(self, place: Place) -> list[NDArray[Scalar]]:
+        """Drop the tiles farthest from ``place`` if there is no room for one there; return them."""
+        if place in self or len(self) < self._most:
+            return []
+
+        def distance(other: Place) -> tuple[int, Place]:
+            return max(abs(other[0] - place[0]), abs(other[1] - place[1])), other
+
+        farthest = sorted(self, key=distance)[-self._dropped :]
+        return [self.drop(far) for far in farthest]
+
+    def writable(self, place: Place) -> NDArray[Scalar]:
+        """Return the tile at a place, created if missing; no snapshot shares it."""
+        if place not in self._own:
+            self.put(place, self.get(place, self._blank).copy())
+        return self[place]
+
+    def put(self, place: Place, tile: NDArray[Scalar]) -> None:
+        """Take ownership of a tile."""
+        self[place] = tile
+        self._own.add(place)
+
+    def drop(self, place: Place) -> NDArray[Scalar]:
+        """Remove a tile and return it."""
+        self._own.discard(place)
+        return self.pop(place)
 
 
 class Similarity(NamedTuple):
@@ -153,31 +213,53 @@ def count_bits(bits: Bits) -> int:
     return int.from_bytes(bits.tobytes()).bit_count()
 
 
-def window_of(place: Place) -> Window:
-    """Return the window of pixels of a tile."""
-    row, col = FLOOR_TILE * place[0], FLOOR_TILE * place[1]
-    return Window(row, col, row + FLOOR_TILE, col + FLOOR_TILE)
+def window_of(place: Place, side: int = FLOOR_TILE) -> Window:
+    """Return the window of a tile, ``side`` squares wide."""
+    row, col = side * place[0], side * place[1]
+    return Window(row, col, row + side, col + side)
 
 
-def places_of(window: Window) -> Iterator[Place]:
-    """Yield the places of the tiles that have pixels in ``window``."""
-    for row in range(window.row0 // FLOOR_TILE, -(-window.row1 // FLOOR_TILE)):
-        for col in range(window.col0 // FLOOR_TILE, -(-window.col1 // FLOOR_TILE)):
+def places_of(window: Window, side: int = FLOOR_TILE) -> Iterator[Place]:
+    """Yield the places of the tiles, ``side`` squares wide, that have squares in ``window``."""
+    for row in range(window.row0 // side, -(-window.row1 // side)):
+        for col in range(window.col0 // side, -(-window.col1 // side)):
             yield row, col
+
+
+def assembled(
+    tiles: Mapping[Place, NDArray[Any]],
+    window: Window,
+    side: int,
+    kind: type[Scalar],
+    unpacked: Callable[[NDArray[Any]], NDArray[Any]] = np.asarray,
+) -> NDArray[Scalar]:
+    """Return the values in ``window`` of tiles, 0 elsewhere, (rows, cols).
+
+    Args:
+        tiles: the tiles.
+        window: of the raster.
+        side: edge of a tile, in squares.
+        kind: dtype of the result.
+        unpacked: returns the squares, (side, side), of a tile.
+    """
+    found = np.zeros((window.rows, window.cols), kind)
+    # For a window far larger than what there is, go through the tiles instead.
+    many = window.rows * window.cols > side * side * len(tiles)
+    for place in tiles if many else places_of(window, side):
+        tile, part = tiles.get(place), window_of(place, side)
+        common = window.intersection(part)
+        if tile is not None and common is not None:
+            found[common.slices_in(window)] = unpacked(tile)[common.slices_in(part)]
+    return found
 
 
 def swept_in(tiles: Tiles, window: Window) -> Mask:
     """Return which pixels of ``window`` are marked, bool (rows, cols)."""
-    swept = np.zeros((window.rows, window.cols), np.bool_)
-    many = window.rows * window.cols > FLOOR_TILE * FLOOR_TILE * len(tiles)
-    places: Iterable[Place] = tiles if many else places_of(window)
-    for place in places:
-        tile, part = tiles.get(place), window_of(place)
-        common = window.intersection(part)
-        if tile is not None and common is not None:
-            pixels = np.unpackbits(tile, axis=1).view(np.bool_)
-            swept[common.slices_in(window)] = pixels[common.slices_in(part)]
-    return swept
+    return assembled(tiles, window, FLOOR_TILE, np.bool_, _pixels_of)
+
+
+def _pixels_of(tile: Bits) -> Mask:
+    return np.unpackbits(tile, axis=1).view(np.bool_)
 
 
 def swept_on(swept_in: Callable[[Window], Mask], place: Similarity, window: Window) -> Mask:

@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import product
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
-from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR, FloorSnapshot
-from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
+from fasaco_edge.mission.coverage.floor_tiles import (
+    NO_FLOOR,
+    FloorSnapshot,
+    SharedTiles,
+    assembled,
+)
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 if TYPE_CHECKING:
@@ -83,7 +86,7 @@ class LedgerSnapshot:
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
-        return _visits(self.tiles, window)
+        return assembled(self.tiles, window, TILE, np.uint16)
 
 
 class CoverageLedger:
@@ -144,7 +147,7 @@ class CoverageLedger:
         near = self._near(last, pose, place_of or self._centre)
         entered = self._swept(last, pose, near) - self._under_tool
         for cell in entered:
-            self._visit(cell)
+            self.visit(cell)
         self._under_tool = self._swept(pose, pose, near)
         self._last = pose
         return entered
@@ -176,7 +179,7 @@ class CoverageLedger:
                     self._tiles.writable(place)[tuple(at[part].T)] = 0
         for cell in self._under_tool:
             if not self.has_visited(cell):
-                self._visit(cell)
+                self.visit(cell)
 
     def _districts(self) -> list[list[Cell]]:
         """Return the tiles, grouped by district."""
@@ -187,7 +190,7 @@ class CoverageLedger:
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
         """Return the number of visits, uint16 (rows, cols), of the cells of ``window``."""
-        return _visits(self._tiles, window)
+        return assembled(self._tiles, window, TILE, np.uint16)
 
     def has_visited(self, cell: Cell) -> bool:
         """Return whether the tool has passed over ``cell``."""
@@ -195,17 +198,14 @@ class CoverageLedger:
         tile = self._tiles.get((row // TILE, col // TILE))
         return tile is not None and bool(tile[row % TILE, col % TILE])
 
-    def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell whose floor is swept, though the robot missed its point."""
-        self._visit(cell)
-
     def open_again(self, cell: Cell) -> None:
         """Forget the visits to a cell: the tool missed floor in it."""
         row, col = cell
         if self.has_visited(cell):
             self._tiles.writable((row // TILE, col // TILE))[row % TILE, col % TILE] = 0
 
-    def _visit(self, cell: Cell) -> None:
+    def visit(self, cell: Cell) -> None:
+        """Count a visit to a cell."""
         row, col = cell
         self.total += 1
         place = (row // TILE, col // TILE)
@@ -243,21 +243,6 @@ class CoverageLedger:
             if math.hypot(px - along * dx, py - along * dy) < half:
                 cells.append(cell)
         return frozenset(cells)
-
-
-def _visits(tiles: Tiles, window: Window) -> NDArray[np.uint16]:
-    result = np.zeros((window.rows, window.cols), np.uint16)
-    rows = range(window.row0 // TILE, -(-window.row1 // TILE))
-    cols = range(window.col0 // TILE, -(-window.col1 // TILE))
-    # For a window far larger than what is covered, iterate over the tiles instead.
-    many = len(rows) * len(cols) > len(tiles)
-    for tile_row, tile_col in tiles if many else product(rows, cols):
-        row, col = tile_row * TILE, tile_col * TILE
-        place = Window(row, col, row + TILE, col + TILE)
-        tile, common = tiles.get((tile_row, tile_col)), window.intersection(place)
-        if tile is not None and common is not None:
-            result[common.slices_in(window)] = tile[common.slices_in(place)]
-    return result
 
 
 def _span(low: float, high: float, cell_m: float) -> range:

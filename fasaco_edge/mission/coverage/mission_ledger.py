@@ -3,6 +3,10 @@
 A ledger from before a restart may belong to another building than the map now shows (``fit``).
 Until a map knows enough to decide, the ledger holds, and the next map is compared. From then on
 each map is compared with the building before (``map.building_watch``).
+
+In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
+the rest. The robot that has passed the cell keeps that floor, in whichever robot's part it lies,
+and sweeps it when its line passes near again.
 """
 
 from __future__ import annotations
@@ -10,7 +14,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +22,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import LedgerFullError, LedgerMismatchError
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
-from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.lattice import Cell, CoverageLattice, mask_of
 from fasaco_edge.mission.company import OthersCells
 from fasaco_edge.mission.coverage.fit import Fit, Verdict
 from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, PIXEL_M
@@ -30,7 +34,6 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
     LedgerSnapshot,
 )
-from fasaco_edge.mission.coverage.passed_cells import PassedCells
 from fasaco_edge.mission.coverage.swept_floor import (
     DROPPED_FLOOR_TILES,
     MOST_FLOOR_TILES,
@@ -44,38 +47,13 @@ if TYPE_CHECKING:
 # Share of blocked cells among the known covered ones that furniture never reaches from one map to
 # the next.
 MANY_AT_ONCE = 0.2
+# Limit on the passed cells kept: the oldest are dropped.
+MOST_PASSED = 2_000
 # Limit on the returns to a cell: floor that the robot left unswept in two returns, a third would
 # leave, too.
 MOST_AGAIN = 2
 
 PlaceOf = Callable[[Cell], Point | None]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Covered:
-    """What has been covered since one starting point: cells and floor."""
-
-    cells: CoverageLedger
-    floor: SweptFloor
-
-    def record(
-        self, pose: Pose2D, tool: Pose2D, place_of: PlaceOf | None, farthest_m: float
-    ) -> LedgerFullError | None:
-        """Record driving to ``pose`` with the tool's centre at ``tool``; return a fault if tiles
-        were dropped. ``farthest_m``: see ``MissionLedger.record``."""
-        cells, floor = self.cells, self.floor
-        before = cells.dropped, floor.dropped
-        cells.record(pose, place_of, farthest_m)
-        floor.record(tool, farthest_m)
-        if cells.dropped != before[0]:
-            return _full(MOST_TILES, f"{TILE} x {TILE} cells", DROPPED_TILES)
-        if floor.dropped != before[1]:
-            pixels = f"{FLOOR_TILE} x {FLOOR_TILE} pixels of floor"
-            return _full(MOST_FLOOR_TILES, pixels, DROPPED_FLOOR_TILES)
-        return None
-
-    def snapshot(self) -> LedgerSnapshot:
-        return replace(self.cells.snapshot(), floor=self.floor.snapshot())
 
 
 def _full(most: int, size: str, dropped: int) -> LedgerFullError:
@@ -85,10 +63,46 @@ def _full(most: int, size: str, dropped: int) -> LedgerFullError:
     )
 
 
+class PassedCells:
+    """Cells that the robot has passed, but in which floor is unswept."""
+
+    def __init__(self) -> None:
+        # In the order of their last check.
+        self._cells: dict[Cell, None] = {}
+
+    def clear(self) -> None:
+        """Forget all of them."""
+        self._cells.clear()
+
+    def note(self, cell: Cell) -> None:
+        """Note that the robot has passed a cell."""
+        self._cells[cell] = None
+        if len(self._cells) > MOST_PASSED:
+            self.drop(next(iter(self._cells)))
+
+    def next(self, most: int) -> list[Cell]:
+        """Return the cells to check now: the ones whose last check is longest ago."""
+        cells = list(self._cells)[:most]
+        for cell in cells:
+            del self._cells[cell]
+            self._cells[cell] = None
+        return cells
+
+    def drop(self, cell: Cell) -> None:
+        """Forget a cell: its floor is swept."""
+        self._cells.pop(cell, None)
+
+    def inside(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of a window are passed cells, bool (rows, cols)."""
+        return mask_of(self._cells, window)
+
+
 class MissionLedger:
     """Owns the ledger; one from before a restart holds until a map contradicts it.
 
     Attributes:
+        current: the covered cells.
+        floor: the swept floor.
         first_plan_reason: reason of the first plan.
         reopened: how often covered cells were opened again.
         shared: cells swept by other robots.
@@ -115,22 +129,16 @@ class MissionLedger:
         """
         self._sight = sight
         self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m
-        self._covered = self._nothing("")
+        self.current, self.floor = self._nothing("")
         self.first_plan_reason = "first plan"
         self.reopened = 0
         self.shared = shared or OthersCells()
         self.passed = PassedCells()
         self._opened_again: Counter[Cell] = Counter()
-        # The ledger from before a restart while no map has confirmed it, and what was covered since
-        # the restart, which holds in any building.
-        self._resumed: tuple[LedgerSnapshot, _Covered] | None = None
+        # The ledger from before a restart while no map has confirmed it.
+        self._resumed: LedgerSnapshot | None = None
         # The robot's last pose before the map moved.
         self._pose_before_motion: Pose2D | None = None
-
-    @property
-    def current(self) -> CoverageLedger:
-        """The covered cells."""
-        return self._covered.cells
 
     @property
     def version(self) -> tuple[int, int, int]:
@@ -142,21 +150,13 @@ class MissionLedger:
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
-    @property
-    def floor(self) -> SweptFloor:
-        """The swept floor."""
-        return self._covered.floor
-
     def snapshot(self) -> LedgerSnapshot:
         """Return a copy of the present coverage."""
-        return replace(self._covered.snapshot(), fleet=self.shared.encode())
+        cells, floor = self.current.snapshot(), self.floor.snapshot()
+        return replace(cells, floor=floor, fleet=self.shared.encode())
 
-    @property
-    def _all(self) -> tuple[_Covered, ...]:
-        return (self._covered,) if self._resumed is None else (self._covered, self._resumed[1])
-
-    def _nothing(self, frame: str) -> _Covered:
-        return _Covered(CoverageLedger(self._cell_m, frame), SweptFloor(self._tool_m, self._sight))
+    def _nothing(self, frame: str) -> tuple[CoverageLedger, SweptFloor]:
+        return CoverageLedger(self._cell_m, frame), SweptFloor(self._tool_m, self._sight)
 
     @property
     def is_confirmed(self) -> bool:
@@ -165,9 +165,9 @@ class MissionLedger:
 
     def resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         """Continue the ledger from before a restart; ``is_confirmed``: see the property."""
-        self._resumed = None if is_confirmed else (before, self._nothing(""))
-        floor = SweptFloor.restored(before.floor, self._tool_m, self._sight)
-        self._covered = _Covered(CoverageLedger.restored(before), floor)
+        self._resumed = None if is_confirmed else before
+        self.current = CoverageLedger.restored(before)
+        self.floor = SweptFloor.restored(before.floor, self._tool_m, self._sight)
         self.shared.resume(before.fleet)
         if cells := before.cells:
             self.first_plan_reason = f"first plan, {cells} cells were covered before"
@@ -186,13 +186,19 @@ class MissionLedger:
         if ahead_m := self._ahead_m:
             x = pose.x + ahead_m * math.cos(pose.yaw)
             tool = Pose2D(x, pose.y + ahead_m * math.sin(pose.yaw), pose.yaw)
-        faults = [covered.record(pose, tool, place_of, farthest_m) for covered in self._all]
-        return faults[0]
+        dropped = self.current.dropped, self.floor.dropped
+        self.current.record(pose, place_of, farthest_m)
+        self.floor.record(tool, farthest_m)
+        if self.current.dropped != dropped[0]:
+            return _full(MOST_TILES, f"{TILE} x {TILE} cells", DROPPED_TILES)
+        if self.floor.dropped != dropped[1]:
+            pixels = f"{FLOOR_TILE} x {FLOOR_TILE} pixels of floor"
+            return _full(MOST_FLOOR_TILES, pixels, DROPPED_FLOOR_TILES)
+        return None
 
     def credit(self, cell: Cell) -> None:
         """Count a visit to a cell whose floor is swept, though the robot missed its point."""
-        for covered in self._all:
-            covered.cells.credit(cell)
+        self.current.visit(cell)
 
     def may_open_again(self, cell: Cell) -> bool:
         """Return whether a cell may be counted as not covered once more."""
@@ -200,25 +206,22 @@ class MissionLedger:
 
     def open_again(self, cells: Collection[Cell]) -> None:
         """Count cells as not covered: floor in them is left."""
-        for covered in self._all:
-            for cell in cells:
-                covered.cells.open_again(cell)
+        for cell in cells:
+            self.current.open_again(cell)
         self._opened_again.update(cells)
         self.reopened += 1
         self.shared.note_forgotten()
 
     def break_track(self) -> None:
         """Note that the robot's track to its next pose is unknown."""
-        for covered in self._all:
-            covered.cells.break_track()
-            covered.floor.break_track()
+        self.current.break_track()
+        self.floor.break_track()
 
     def note_map_motion(self, pose: Pose2D) -> None:
         """Note that the map has moved under a robot at ``pose``; the next pose shows how."""
         self._pose_before_motion = pose
-        for covered in self._all:
-            covered.cells.lift_tool()
-            covered.floor.break_track()
+        self.current.lift_tool()
+        self.floor.break_track()
 
     def map_motion(self, pose: Pose2D) -> Motion | None:
         """Return the map's motion, from the first pose after it; None if it did not move."""
@@ -233,9 +236,8 @@ class MissionLedger:
         self._forget_passed()
         before = self.snapshot()
         cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
-        for covered in self._all:
-            covered.cells.forget(cells)
-            covered.floor.leave(floor)
+        self.current.forget(cells)
+        self.floor.leave(floor)
         # Cells of other robots are as uncertain on this map: each robot records them on a map of
         # its own.
         self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
@@ -256,9 +258,8 @@ class MissionLedger:
             return inside(around, self._cell_m)[rows - row0, cols - col0]
 
         self._forget_passed()
-        for covered in self._all:
-            covered.cells.forget(cells_inside)
-            covered.floor.forget(lambda window: inside(window, PIXEL_M))
+        self.current.forget(cells_inside)
+        self.floor.forget(lambda window: inside(window, PIXEL_M))
         self.shared.disregard(cells_inside)
         self.shared.note_forgotten()
 
@@ -270,7 +271,7 @@ class MissionLedger:
             self.current.move_to(frame)
             return None
         cells = self.current.snapshot().cells
-        self._replace(self._nothing(frame))
+        self._replace(frame)
         self.shared.clear()
         if not cells:
             return None
@@ -280,7 +281,7 @@ class MissionLedger:
 
     def reset(self, frame: str) -> None:
         """Forget everything; ``frame`` is that of the poses, "" where none is active."""
-        self._replace(self._nothing(frame))
+        self._replace(frame)
         self.shared.begin_anew()
         self.shared.disregard(lambda rows, _: np.ones(len(rows), np.bool_))
         self.first_plan_reason = "first plan"
@@ -291,12 +292,11 @@ class MissionLedger:
             self.shared.enter(frame)
         if self._resumed is None:
             return None
-        before, since = self._resumed
-        verdict = Fit.of(before, lattice).verdict
+        verdict = Fit.of(self._resumed, lattice).verdict
         if verdict is Verdict.OPEN:
             return None
         self._resumed = None
-        return None if verdict is Verdict.SAME else self._leave_building(before.cells, since, frame)
+        return None if verdict is Verdict.SAME else self._leave_building(frame)
 
     def contradicts(self, lattice: CoverageLattice) -> bool:
         """Return whether a map blocks too many covered cells to be of the same building.
@@ -308,17 +308,13 @@ class MissionLedger:
 
     def begin_elsewhere(self, frame: str) -> LedgerMismatchError:
         """Start over in another building, whose map is in ``frame``; return the fault to report."""
-        cells = self.current.snapshot().cells
-        self._resumed = self._pose_before_motion = None
-        self._forget_passed()
         self.shared.leave_building(frame)
-        return self._leave_building(cells, self._nothing(""), frame)
+        return self._leave_building(frame)
 
-    def _leave_building(self, cells: int, since: _Covered, frame: str) -> LedgerMismatchError:
-        self._covered = since
+    def _leave_building(self, frame: str) -> LedgerMismatchError:
+        cells = self.current.snapshot().cells
+        self._replace(frame)
         self.shared.clear()
-        self.shared.note_forgotten()
-        self.current.move_to(frame)
         return self._begun_anew(
             f"the ledger of {cells} covered cells is of another building than the map"
         )
@@ -328,8 +324,9 @@ class MissionLedger:
         self.passed.clear()
         self._opened_again.clear()
 
-    def _replace(self, covered: _Covered) -> None:
-        self._covered, self._resumed, self._pose_before_motion = covered, None, None
+    def _replace(self, frame: str) -> None:
+        self.current, self.floor = self._nothing(frame)
+        self._resumed = self._pose_before_motion = None
         self._forget_passed()
         self.shared.note_forgotten()
 

@@ -1,4 +1,8 @@
-"""Segments of the track: what of the floor the tool passes for certain from place to place."""
+"""Segments of the track: what of the floor the tool passes for certain from place to place.
+
+Between two places the robot turns once at most, and bases drive where they head: its track stays
+within the triangle of its headings there. It also drives no farther than its speed allows.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fasaco_edge.grid.geometry import Window
+from fasaco_edge.grid.geometry import Point, Window
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
-from fasaco_edge.mission.coverage.steady_track import Place, beside_m, corner_between
+from fasaco_edge.mission.coverage.steady_track import Place
 
 # Error of a heading [rad].
 YAW_RAD = math.radians(1.0)
 # Tolerance, so that rounding does not decide whether a pixel at the rim is swept [m].
 TOUCH_M = 1e-9
+# Up to this length [m] a right angle between two places lies less than a pixel beside the segment.
+SHORT_M = 2.0 * math.sqrt(2.0) * PIXEL_M
+# Sides this near to parallel meet farther away than any room is long.
+LEAST_RAD = 1e-3
 
 
 class Segment(NamedTuple):
@@ -29,29 +37,16 @@ class Segment(NamedTuple):
     reach_m: float
 
 
-def segments_between(
-    before: Place | None, start: Place, end: Place, after: Place | None, tool_m: float
-) -> list[Segment]:
-    """Return the sweeps between two places: along the segment, or only at the places.
+def segments_between(start: Place, end: Place, tool_m: float) -> list[Segment]:
+    """Return the sweeps between two places: along the segment, around its corner, or at its end.
 
-    Args:
-        before, after: places before and after these; None if unknown.
-        start, end: the places.
-        tool_m: width of the tool [m].
+    ``tool_m``: width of the tool [m].
     """
-    away_m = beside_m(
-        start.point,
-        end.point,
-        before and before.point,
-        after and after.point,
-        end.farthest_m,
-        (start.yaw, end.yaw),
-    )
-    reach_m = 0.5 * tool_m - away_m
+    reach_m = 0.5 * tool_m - beside_m(start, end)
     at_end = max(0.5 * tool_m - end.error_m, 0.25 * tool_m)
     if reach_m >= at_end:
         return [Segment(start, end, at_end)]
-    turned = corner_between(start.point, end.point, (start.yaw, end.yaw), end.farthest_m)
+    turned = corner_between(start, end)
     if turned is not None:
         corner = Place(*turned, end.error_m)
         beside = max(math.dist(turned, start.point), math.dist(turned, end.point)) * YAW_RAD
@@ -61,6 +56,44 @@ def segments_between(
             return [*round_it, Segment(end, end, at_end)]
     way = [Segment(start, end, reach_m)] if reach_m > 0.0 else []
     return [*way, Segment(end, end, at_end)]
+
+
+def beside_m(start: Place, end: Place) -> float:
+    """Return how far from the segment between two places the robot may have been [m].
+
+    Where it is not known how far it can have driven, it is taken to have driven straight.
+    """
+    length, farthest_m = math.dist(start.point, end.point), end.farthest_m
+    if length <= SHORT_M or not farthest_m:
+        return 0.0
+    one, other = map(abs, _turns(start, end))
+    height = math.inf
+    if not one or not other:
+        height = 0.0
+    elif one + other < math.pi - LEAST_RAD:
+        height = length * math.sin(one) * math.sin(other) / math.sin(one + other)
+    return (
+        height if length > farthest_m else min(height, 0.5 * math.sqrt(farthest_m**2 - length**2))
+    )
+
+
+def corner_between(start: Place, end: Place) -> Point | None:
+    """Return where the robot turned between two places, x, y [m]; None if that is not known."""
+    one, other = _turns(start, end)
+    if not one * other < 0.0 or abs(one) + abs(other) >= math.pi - LEAST_RAD:
+        return None  # it did not turn once, or did not drive where it heads
+    one, other = abs(one), abs(other)
+    length = math.dist(start.point, end.point)
+    first_m = length * math.sin(other) / math.sin(one + other)
+    if first_m + length * math.sin(one) / math.sin(one + other) > end.farthest_m:
+        return None
+    return start.x + first_m * math.cos(start.yaw), start.y + first_m * math.sin(start.yaw)
+
+
+def _turns(start: Place, end: Place) -> tuple[float, float]:
+    """Return the angles of the headings at two places to the segment between them [rad]."""
+    way = math.atan2(end.y - start.y, end.x - start.x)
+    return math.remainder(start.yaw - way, math.tau), math.remainder(end.yaw - way, math.tau)
 
 
 def window_around(segment: Segment) -> Window:

@@ -1,4 +1,4 @@
-"""Steady track: filtered robot positions from noisy poses, and how far it may bend between them.
+"""Steady track: filtered robot positions from noisy poses.
 
 A place is the mean over a symmetric window of poses. The window is wide enough for an error of a
 quarter of a pixel, and no wider than the tool reaches. Exact poses are taken as they are, without
@@ -11,11 +11,6 @@ timestamp error. Three lateral errors of standard deviation s give a deviation o
 1/4) s, whose median size is 0.674 times that. Corners are rare, so the median over the last
 deviations ignores them. Between poses that are far apart corners are not rare, so these are left
 out. A drift, constant from pose to pose, is not seen.
-
-Between two places the robot turns once at most: its track stays within the triangle of the
-direction in which it came to the first and that in which it left the second. These are known by the
-places before and after, or by its headings: bases drive where they head. It also drives no farther
-than its speed allows.
 """
 
 from __future__ import annotations
@@ -25,7 +20,7 @@ from collections import deque
 from statistics import median
 from typing import NamedTuple
 
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
 
 # The median is over the last POSES; at least FEWEST are needed.
@@ -91,17 +86,17 @@ class Place(NamedTuple):
         x, y: the position [m].
         error_m: error bound to each side [m].
         farthest_m: longest possible drive to it from the previous pose; 0 if not known [m].
-        yaw: heading of the robot there [rad]; NaN if not known.
+        yaw: heading of the robot there [rad].
     """
 
     x: float
     y: float
     error_m: float
     farthest_m: float = 0.0
-    yaw: float = math.nan
+    yaw: float = 0.0
 
     @property
-    def point(self) -> tuple[float, float]:
+    def point(self) -> Point:
         """The position, x, y [m]."""
         return self.x, self.y
 
@@ -186,92 +181,3 @@ class SteadyTrack:
         x, y = sum([pose.x for pose in around]) / count, sum([pose.y for pose in around]) / count
         error_m = SURE * sigma_m / math.sqrt(count)
         return Place(x, y, error_m, self._farthest_m[index], here.yaw)
-
-
-Point = tuple[float, float]
-
-# Up to this length [m] a right angle between two places lies less than a pixel beside the segment.
-SHORT_M = 2.0 * math.sqrt(2.0) * PIXEL_M
-NO_YAWS = math.nan, math.nan
-# Sides this near to parallel meet farther away than any room is long.
-LEAST_RAD = 1e-3
-
-
-def beside_m(
-    start: Point,
-    end: Point,
-    before: Point | None,
-    after: Point | None,
-    farthest_m: float,
-    yaws: tuple[float, float] = NO_YAWS,
-) -> float:
-    """Return how far from the segment between two places the robot may have been [m].
-
-    Args:
-        start, end: the places, x, y [m].
-        before, after: the places before and after them; None where none is known.
-        farthest_m: how far it can have driven from one to the other [m]; 0 if that is not known:
-            then it is taken to have driven straight.
-        yaws: its headings at the two places [rad]; NaN if not known.
-    """
-    length = math.dist(start, end)
-    if length <= SHORT_M or not farthest_m:
-        return 0.0
-    by_turn = length * _height(_bend(before, start, end), _bend(start, end, after))
-    if not any(map(math.isnan, yaws)):
-        by_turn = min(by_turn, length * _height(*_turns(start, end, yaws)))
-    if length > farthest_m:
-        return by_turn
-    return min(by_turn, 0.5 * math.sqrt(farthest_m**2 - length**2))
-
-
-def corner_between(
-    start: Point, end: Point, yaws: tuple[float, float], farthest_m: float
-) -> Point | None:
-    """Return where the robot turned between two places, by its headings there; None if not known.
-
-    See ``beside_m`` for the arguments.
-    """
-    way = math.atan2(end[1] - start[1], end[0] - start[0])
-    one, other = (math.remainder(yaw - way, math.tau) for yaw in yaws)
-    if not one * other < 0.0 or abs(one) + abs(other) >= math.pi - LEAST_RAD:
-        return None  # it did not turn once, or did not drive where it heads
-    one, other = abs(one), abs(other)
-    length = math.dist(start, end)
-    first_m = length * math.sin(other) / math.sin(one + other)
-    if first_m + length * math.sin(one) / math.sin(one + other) > farthest_m:
-        return None
-    return start[0] + first_m * math.cos(yaws[0]), start[1] + first_m * math.sin(yaws[0])
-
-
-def _turns(start: Point, end: Point, yaws: tuple[float, float]) -> tuple[float, float]:
-    """Return the angles between the segment and the headings at its ends [rad]."""
-    way = math.atan2(end[1] - start[1], end[0] - start[0])
-    one, other = (abs(math.remainder(yaw - way, math.tau)) for yaw in yaws)
-    return one, other
-
-
-def _height(one: float | None, other: float | None) -> float:
-    """Return the height of a triangle over a base of 1 with these angles [rad].
-
-    One unknown angle counts as a right angle, two as none.
-    """
-    if one is None and other is None:
-        return 0.0
-    one, other = (0.5 * math.pi if angle is None else angle for angle in (one, other))
-    if not one or not other:
-        return 0.0
-    if one + other >= math.pi - LEAST_RAD:
-        return math.inf
-    return math.sin(one) * math.sin(other) / math.sin(one + other)
-
-
-def _bend(first: Point | None, middle: Point, last: Point | None) -> float | None:
-    """Return the angle between the ways to and from a place [rad]; None if one is not known."""
-    if first is None or last is None or middle in (first, last):
-        return None
-    ax, ay, bx, by = (
-        *(middle[0] - first[0], middle[1] - first[1]),
-        *(last[0] - middle[0], last[1] - middle[1]),
-    )
-    return abs(math.atan2(ax * by - ay * bx, ax * bx + ay * by))

@@ -6,9 +6,9 @@ consecutive poses, and not behind a wall from there (``tool_sight``).
 With noisy poses, the union of tool discs is wider than the strip really swept. So the disc moves
 along the steady track and shrinks by the track's error bound: not at all with exact poses, and
 never to less than half of the tool. Between poses that are far apart it also shrinks by the
-distance that the robot may have driven beside the segment, down to nothing, see ``bends``. Sweeps
-along the newest poses are visible at once; they are stored, and counted, as soon as the track there
-is final.
+distance that the robot may have driven beside the segment, down to nothing, see ``segments``.
+Sweeps along the newest poses are visible at once; they are stored, and counted, as soon as the
+track there is final.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
@@ -28,6 +29,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     Bits,
     FloorSnapshot,
     Mask,
+    SharedTiles,
     Similarity,
     Tiles,
     count_bits,
@@ -45,12 +47,7 @@ from fasaco_edge.mission.coverage.segments import (
     window_around,
     within,
 )
-from fasaco_edge.mission.coverage.shared_tiles import SharedTiles
-from fasaco_edge.mission.coverage.steady_track import (
-    SHORT_M,
-    Place,
-    SteadyTrack,
-)
+from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
@@ -100,12 +97,9 @@ class SweptFloor:
         self.dropped = 0
         self._tool_m = tool_m
         self._track = SteadyTrack(tool_m)
-        # The newest pose. The last place up to which sweeps are stored, and the place before it.
-        # After a long segment, a place waits for the next, which shows whether the robot turned.
+        # The newest pose, and the last place up to which sweeps are stored.
         self._last: Pose2D | None = None
-        self._before: Place | None = None
         self._kept_to: Place | None = None
-        self._waiting: Place | None = None
         # Preliminary sweeps beyond that, None until computed; and a window that contains them.
         self._ahead: tuple[Window, Mask] | None = None
         self._around_ahead: Window | None = None
@@ -234,9 +228,7 @@ class SweptFloor:
         """Store the sweeps up to the newest pose."""
         before = self._around_ahead
         self._keep(self._track.end())
-        if self._waiting is not None:
-            self._store(self._waiting, None)
-        self._before = self._kept_to = self._waiting = None
+        self._kept_to = None
         self._begin_ahead()
         self._note(before)
 
@@ -247,34 +239,20 @@ class SweptFloor:
             self._news.append((self.changes, window))
 
     def _keep(self, places: list[Place]) -> None:
+        """Store the sweeps to places."""
         for place in places:
-            if self._waiting is not None:
-                self._store(self._waiting, place)
-                self._waiting = None
-            start = self._kept_to
-            is_long = start is not None and math.dist(start.point, place.point) > SHORT_M
-            if is_long and place.farthest_m:
-                self._waiting = place
-            else:
-                self._store(place, None)
-
-    def _store(self, place: Place, after: Place | None) -> None:
-        """Store the sweep to a place, after which the robot came to another."""
-        start = self._kept_to
-        for segment in segments_between(self._before, start or place, place, after, self._tool_m):
-            window = window_around(segment)
-            self._mark(window, np.packbits(self._under([segment], window), axis=1))
-        self._before, self._kept_to = start, place
+            for segment in segments_between(self._kept_to or place, place, self._tool_m):
+                window = window_around(segment)
+                self._mark(window, np.packbits(self._under([segment], window), axis=1))
+            self._kept_to = place
 
     def _begin_ahead(self) -> None:
         """Set the window of the preliminary sweeps; they are computed on demand."""
         self._ahead, self._around_ahead = None, None
         box = self._track.box_ahead()
-        corners = [(box[0], box[1]), (box[2], box[3])] if box is not None else []
-        if self._waiting is not None:
-            corners.append(self._waiting.point)
-        if not corners:
+        if box is None:
             return
+        corners = [(box[0], box[1]), (box[2], box[3])]
         if self._kept_to is not None:
             corners.append(self._kept_to.point)
         xs, ys = zip(*corners, strict=True)
@@ -286,7 +264,7 @@ class SweptFloor:
         """Return the preliminary sweeps and their window."""
         if self._ahead is None:
             places = self._track.ahead()
-            segments = self._segments_ahead([*filter(None, [self._waiting]), *places])
+            segments = self._segments_ahead(places)
             windows = [window_around(segment) for segment in segments]
             whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
@@ -303,16 +281,11 @@ class SweptFloor:
 
     def _segments_ahead(self, places: list[Place]) -> list[Segment]:
         """Return the sweeps after the stored ones, to places in their order."""
-        if not places:
-            return []
-        chain = [self._before, self._kept_to or places[0], *places, None]
+        chain = [self._kept_to or places[0], *places] if places else []
         return [
             segment
-            for before, start, end, after in zip(
-                chain, chain[1:], chain[2:], chain[3:], strict=False
-            )
-            if start is not None and end is not None
-            for segment in segments_between(before, start, end, after, self._tool_m)
+            for start, end in pairwise(chain)
+            for segment in segments_between(start, end, self._tool_m)
         ]
 
     def _under(self, segments: Sequence[Segment], window: Window) -> Mask:

@@ -1,19 +1,19 @@
 """Tool sight: the floor that a tool wider than the robot touches, without floor behind walls.
 
 Side brushes, a wide deck or a lamp reach over the rim of the robot's disc. As in
-``grid.tool_reach``, a pixel counts if free pixels connect it with the disc, about within the tool.
+``grid.floor``, a pixel counts if free pixels connect it with the disc, about within the tool.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
+from fasaco_edge.grid.floor import tool_steps
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.tool_reach import tool_steps
+from fasaco_edge.grid.lattice import beside
+from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
+from fasaco_edge.mission.map.room_raster import centres
 
 
 class ToolSight:
@@ -56,12 +56,7 @@ class ToolSight:
         open_ = under & _free_on(grid, self._free_at_most, window)
         found = inner & under
         for _ in range(self._steps):
-            more = found.copy()
-            more[:, 1:] |= found[:, :-1]
-            more[:, :-1] |= found[:, 1:]
-            more[1:] |= found[:-1]
-            more[:-1] |= found[1:]
-            more = (more & open_) | found
+            more = found | (beside(found) & open_)
             if (more == found).all():
                 break
             found = more
@@ -70,13 +65,6 @@ class ToolSight:
 
 def _free_on(grid: OccupancyGrid, free_at_most: int, window: Window) -> Mask:
     """Return which pixels of a window of floor have their centre on free ground of a map."""
-    geometry = grid.geometry
-    x = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M
-    y = ((np.arange(window.row0, window.row1) + 0.5) * PIXEL_M)[:, np.newaxis]
-    cols, rows = geometry.to_pixels(*np.broadcast_arrays(x, y))
-    cols, rows = np.floor(cols).astype(np.int64), np.floor(rows).astype(np.int64)
-    inside = (rows >= 0) & (rows < geometry.rows) & (cols >= 0) & (cols < geometry.cols)
-    free = np.zeros(inside.shape, np.bool_)
-    values = grid.cells[rows[inside], cols[inside]]
-    free[inside] = (values >= 0) & (values <= free_at_most)
-    return free
+    values = grid.geometry.values_at(grid.cells, centres(window, PIXEL_M), UNKNOWN)
+    free: Mask = (values >= 0) & (values <= free_at_most)
+    return free.reshape(window.rows, window.cols)

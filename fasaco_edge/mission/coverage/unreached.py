@@ -17,7 +17,7 @@ from fasaco_edge.mission.map.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import MissionOrder
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
 
@@ -100,19 +100,20 @@ def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return widened
 
 
-class UnreachedFinder:
-    """Finds the uncovered cells of an order; remembers which cells were reachable since it began.
+class OrderReach:
+    """Remembers which cells were reachable since an order began; finds those that stay uncovered.
+
+    Attributes:
+        order_state: the order and its progress.
 
     Masks are bool (rows, cols) on the lattice of the area.
     """
 
     def __init__(self, map_state: MapState, ledger: MissionLedger) -> None:
-        self._map = map_state
-        self._ledger = ledger
-        # Number of paths that left cells over.
-        self._failures = 0
-        # Why the last path left cells over; "" if not known.
-        self._why_left = ""
+        self.order_state = OrderState.idle(NO_ORDER)
+        self._map, self._ledger = map_state, ledger
+        # Number of paths that left cells over, and why the last did; "" if not known.
+        self._failures, self._why_left = 0, ""
         self._newest: ReachableArea | None = None
         # Which cells of a window around all maps received have ever been reachable.
         self._once: tuple[Window, NDArray[np.bool_]] | None = None
@@ -121,7 +122,7 @@ class UnreachedFinder:
         self._have_moved = False
         self._found: tuple[object, Unreached] = (None, Unreached())
 
-    def restart(self, reached: ReachedCells | None) -> None:
+    def _begin_reach(self, reached: ReachedCells | None) -> None:
         """Start another order, or continue one that had reached some cells before a restart."""
         self._failures, self._why_left, self._newest = 0, "", None
         self._once = None if reached is None else (reached.window, reached.mask)
@@ -129,14 +130,17 @@ class UnreachedFinder:
         self._have_moved = reached is not None and reached.have_moved
         self.note_area()
 
-    def succeed(self, before: UnreachedFinder) -> None:
-        """Take over a predecessor's state of the same cells."""
-        self._failures, self._newest, self._once = before._failures, before._newest, before._once
-        self._why_left = before._why_left
+    def succeed(self, before: OrderReach) -> None:
+        """Go on with the same order on the same cells, as another mission left it."""
+        self._failures, self._why_left = before._failures, before._why_left
+        self._newest, self._once = before._newest, before._once
 
     @property
     def reached(self) -> ReachedCells | None:
-        """The cells that have ever been reachable; None for none."""
+        """The cells that have been reachable since the order began; None without one to go on."""
+        return self._reached_cells() if self.order_state.is_open else None
+
+    def _reached_cells(self) -> ReachedCells | None:
         return None if self._once is None else ReachedCells.of(self._once[1], self._once[0])
 
     def note_area(self) -> None:
@@ -156,10 +160,10 @@ class UnreachedFinder:
             self._once, self._newest, self._have_moved = (window, once), area, False
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``move`` gets the motion."""
+        """Note that the newest map has moved; ``move_reached`` gets the motion."""
         self._before_motion = self._before_motion or self._once
 
-    def move(self, motion: Motion) -> None:
+    def move_reached(self, motion: Motion) -> None:
         """Move the cells with the map: areas since were found from a pose before the motion."""
         before, self._before_motion = self._before_motion, None
         if before is not None and not motion.is_still:
@@ -169,7 +173,7 @@ class UnreachedFinder:
             self._newest, self._have_moved = None, True
             self.note_area()
 
-    def shift(self, motion: Motion) -> None:
+    def shift_reached(self, motion: Motion) -> None:
         """Move the cells with the newest map, whose area is not known yet."""
         if self._once is not None and self._map.lattice is not None:
             self._once = moved_mask(*self._once, motion, self._map.lattice.cell_m)
@@ -197,18 +201,21 @@ class UnreachedFinder:
             known &= ~(self._map.free.coverable & ~lattice.coverable)
         return known
 
-    def note_failure(self, why: str) -> None:
+    def _note_failure(self, why: str) -> None:
         """Note that a path left cells over, and why."""
         self._failures, self._why_left = self._failures + 1, why
 
-    def unreached(self, state: OrderState) -> Unreached:
-        """Return uncovered cells; the last result while the robot is on no coverable cell."""
-        area = self._map.area
+    def unreached(self) -> Unreached:
+        """Return the cells that stay uncovered on the present map.
+
+        The last result while the robot is on no coverable cell.
+        """
+        area, state = self._map.area, self.order_state
         if state.order is None:
             return Unreached()
         key = (area, self._ledger.version, state)
         if area is not None and key != self._found[0]:
-            self._found = key, self._list_areas(state.order, area, state)
+            self._found = key, self._list_areas(state.order, area)
         return self._found[1]
 
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
@@ -222,9 +229,9 @@ class UnreachedFinder:
         cell_m2 = area.lattice.cell_m**2
         return np.count_nonzero(area.reachable) * cell_m2, np.count_nonzero(once) * cell_m2
 
-    def ending(self, state: OrderState) -> str:
-        """Return how much of an order is covered, and why the rest is not."""
-        order, area, lattice = state.order, self._map.area, self._map.lattice
+    def _outcome(self) -> str:
+        """Return how much of the order is covered, and why the rest is not."""
+        order, area, lattice = self.order_state.order, self._map.area, self._map.lattice
         if order is None or lattice is None:
             return "the order was carried out"
         zones = "" if order.zones[0].polygon is None else " of the zones"
@@ -242,22 +249,24 @@ class UnreachedFinder:
         if area is None:
             return ending
         causes = np.full(left.shape, Cause.UNKNOWN, np.uint8)
-        causes[lattice.window.slices_in(whole)] = self._causes(order, area, state.stage)
+        causes[lattice.window.slices_in(whole)] = self._causes(order, area)
         counts = np.bincount(causes[left], minlength=len(Cause) + 1)[1:]
         order_of = np.argsort(-counts, kind="stable")
         why = [
-            f"{self._reason(Cause(n + 1), state)} ({counts[n] * cell_m2:.1f} m2)"
+            f"{self._reason(Cause(n + 1))} ({counts[n] * cell_m2:.1f} m2)"
             for n in order_of.tolist()
             if counts[n]
         ]
         return f"{ending}: {', '.join(why)}" if why else ending
 
-    def is_any_left(self, order: MissionOrder) -> bool:
-        """Return whether any cell that was ever reachable, and is asked for, is not covered."""
-        lattice = self._map.lattice
+    def _is_any_left(self) -> bool:
+        """Return whether anything of the order is left that was ever reachable."""
+        lattice, state = self._map.lattice, self.order_state
+        if state.order is None or state.next_pass() is not state:
+            return True
         assert lattice is not None
         whole = self._around(lattice.window)
-        asked = self._asked(order, lattice, whole)
+        asked = self._asked(state.order, lattice, whole)
         return bool((asked & (self._ledger.visits(whole) == 0)).any())
 
     def _asked(
@@ -272,15 +281,18 @@ class UnreachedFinder:
         asked &= in_zones(order.zones, whole, lattice.cell_m)
         return asked
 
-    def _reason(self, cause: Cause, state: OrderState) -> str:
-        if state.late and cause is Cause.LEFT_OVER:
+    def _reason(self, cause: Cause) -> str:
+        if self.order_state.late and cause is Cause.LEFT_OVER:
             return NO_TIME
         tries = "1 try" if self._failures == 1 else f"{self._failures} tries"
         why = f", {self._why_left}" if self._why_left else ""
         return REASONS.get(cause, f"{LEFT_OVER} {tries}{why}")
 
-    def viewpoints(self, order: MissionOrder, area: ReachableArea) -> set[Cell]:
+    def _viewpoints(self) -> set[Cell]:
         """Return the cells (row, col) from which to look at areas that were closed."""
+        order, area = self.order_state.order, self._map.area
+        if order is None or area is None:
+            return set()
         assert self._map.free is not None
         window = area.lattice.window
         kept_out = self._map.free.coverable & ~area.lattice.coverable
@@ -288,20 +300,20 @@ class UnreachedFinder:
         found = viewpoints(closed, area.reachable)
         return {(row + window.row0, col + window.col0) for row, col in found}
 
-    def _list_areas(self, order: MissionOrder, area: ReachableArea, state: OrderState) -> Unreached:
+    def _list_areas(self, order: MissionOrder, area: ReachableArea) -> Unreached:
         window = area.lattice.window
-        areas = find_areas(self._causes(order, area, state.stage))
+        areas = find_areas(self._causes(order, area))
         largest = np.argsort(-areas.cells, kind="stable")[:MOST_AREAS]
         listed = []
         for index in largest.tolist():
             row, col = areas.inner[index].tolist()
             cause = Cause(int(areas.kinds[index]))
             cell = row + window.row0, col + window.col0
-            listed.append(UnreachedArea(int(areas.cells[index]), cell, self._reason(cause, state)))
+            listed.append(UnreachedArea(int(areas.cells[index]), cell, self._reason(cause)))
         cells = int(areas.cells.sum(dtype=np.int64))
         return Unreached(tuple(listed), cells, len(areas.cells) - len(listed))
 
-    def _causes(self, order: MissionOrder, area: ReachableArea, stage: Stage) -> NDArray[np.uint8]:
+    def _causes(self, order: MissionOrder, area: ReachableArea) -> NDArray[np.uint8]:
         """Return the cause of each cell, uint8 (rows, cols); a later one overrides."""
         lattice, reachable, free = area.lattice, area.reachable, self._map.free
         assert free is not None
@@ -318,7 +330,7 @@ class UnreachedFinder:
             cell = row + lattice.window.row0, col + lattice.window.col0
             without_zones = ReachableArea.around(free, cell).reachable
             causes[without_zones & lattice.coverable & ~reachable] = Cause.BEHIND_KEEP_OUT
-        if stage is not Stage.COVERING:
+        if self.order_state.stage is not Stage.COVERING:
             # In earlier stages they are still to come.
             causes[reachable] = Cause.LEFT_OVER
         causes[~self._uncovered(order, area)] = 0
@@ -327,9 +339,8 @@ class UnreachedFinder:
     def _uncovered(self, order: MissionOrder, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells that are asked for and not covered."""
         window = area.lattice.window
-        uncovered: NDArray[np.bool_] = in_zones(order.zones, window, area.lattice.cell_m) & (
-            self._ledger.visits(window) == 0
-        )
+        asked = in_zones(order.zones, window, area.lattice.cell_m)
+        uncovered: NDArray[np.bool_] = asked & (self._ledger.visits(window) == 0)
         return uncovered
 
     def _once_on(self, window: Window) -> NDArray[np.bool_]:

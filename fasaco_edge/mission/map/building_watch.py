@@ -36,7 +36,7 @@ LEAST_SHARE = 0.05
 FOREIGN, ALIKE = 0.3, 0.7
 # Least rise of kappa by a motion of the map that explains the difference of two maps.
 BETTER = 0.1
-# Limit on the cells compared under a motion.
+# Limit on the cells compared.
 MOST_CELLS = 20_000
 # Longest time from a map to the pose that shows its motion, before the robot stops [s].
 GRACE_S = 0.5
@@ -47,6 +47,9 @@ PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
 AGE_S, KNOWN_SHARE = 5.0, 0.5
 # A pose that jumped at most this long before a map counts as moved with it [s].
 JUMP_S = 6.0
+
+# The motion of a map that has not moved.
+STILL = Motion(Pose2D(0.0, 0.0), Pose2D(0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,23 +67,7 @@ class Agreement:
     both: int
 
     @classmethod
-    def of(cls, before: CoverageLattice, after: CoverageLattice) -> Self:
-        """Compare two lattices cell by cell."""
-        common = before.window.intersection(after.window)
-        if common is None:
-            return cls(0, (0, 0), 0)
-        then = before.states[common.slices_in(before.window)]
-        now = after.states[common.slices_in(after.window)]
-        is_known = (then != UNKNOWN) & (now != UNKNOWN)
-        was_blocked, is_blocked = is_known & (then == BLOCKED), is_known & (now == BLOCKED)
-        return cls(
-            int(np.count_nonzero(is_known)),
-            (int(np.count_nonzero(was_blocked)), int(np.count_nonzero(is_blocked))),
-            int(np.count_nonzero(was_blocked & is_blocked)),
-        )
-
-    @classmethod
-    def moved(cls, before: CoverageLattice, after: CoverageLattice, motion: Motion) -> Self:
+    def of(cls, before: CoverageLattice, after: CoverageLattice, motion: Motion = STILL) -> Self:
         """Compare two lattices, the first one moved with the map; large ones by a sample."""
         places = np.flatnonzero(after.states != UNKNOWN)
         stride = 1 + len(places) // MOST_CELLS
@@ -263,7 +250,7 @@ class BuildingWatch:
         """Return whether the newest map shows the previous building, moved as the poses show."""
         if motion.is_still or self._reference is None or self._newest is None:
             return False
-        moved = Agreement.moved(self._reference, self._newest, motion)
+        moved = Agreement.of(self._reference, self._newest, motion)
         is_known = moved.known >= KNOWN_SHARE * seen.known
         return is_known and moved.kappa >= max(FOREIGN, seen.kappa + BETTER)
 

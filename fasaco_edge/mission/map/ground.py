@@ -81,7 +81,7 @@ class Ground:
             self.change, self.lattice = change, change.after
         return plain
 
-    def keep_out(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
+    def close(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
         """Replace the keep-out polygons (x, y) [m]."""
         is_other, self._keep_out = polygons != self._keep_out, polygons
         if grid is not None and (is_other or self.free_floor is None):
@@ -134,10 +134,13 @@ class Ground:
         self.floor = free
         if self._keep_out:
             assert self.plain is not None
-            self.floor = free.keeping_out(self._keep_out, grid, self.plain)
+            self.floor = self._floor_of(grid, self.plain, self._keep_out)
+            assert self.floor is not None
         self.free, self.lattice = free.stands.lattice, self.floor.stands.lattice
 
-    def _floor_of(self, grid: OccupancyGrid, plain: CoverageLattice) -> FloorMap | None:
+    def _floor_of(
+        self, grid: OccupancyGrid, plain: CoverageLattice, keep_out: tuple[Polygon, ...] = ()
+    ) -> FloorMap | None:
         sweeping, footprint = self._config.sweeping, self._config.footprint
         if sweeping is None:
             return None
@@ -147,7 +150,7 @@ class Ground:
             footprint.free_at_most,
             sweeping.clearance_m,
         )
-        return FloorMap(grid, plain, footprint, discs, sweeping.most_pixels)
+        return FloorMap(grid, plain, footprint, discs, sweeping.most_pixels, keep_out)
 
     def _without_kept_out(self, free: CoverageLattice) -> CoverageLattice:
         if not self._keep_out:

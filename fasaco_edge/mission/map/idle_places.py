@@ -8,7 +8,6 @@ and a map may still grow.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window, polygon_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -86,14 +85,17 @@ class IdlePlaces:
 
     def _texts(self, grid: OccupancyGrid, areas: list[_Named], *, is_theirs: bool) -> Iterator[str]:
         idle, spent = [], 0
+        # Places this near to free pixels have an effect [pixels].
+        reach = 0.5 + self._footprint.robot_radius_m / grid.geometry.resolution
         for area in areas:
             if area in self._used:
                 continue
             for polygon in area[1]:
-                pixels = _Pixels.of(polygon, grid.geometry, self._footprint.robot_radius_m)
-                spent += POLYGON_PIXELS + pixels.window.rows * pixels.window.cols
+                corners = tuple(grid.geometry.to_pixels(x, y) for x, y in polygon)
+                window = _around(corners, reach, grid.geometry)
+                spent += POLYGON_PIXELS + window.rows * window.cols
                 # The remaining places are not checked, and count as used on this map.
-                if spent > MOST_PIXELS or pixels.touch_free(grid, self._footprint.free_at_most):
+                if spent > MOST_PIXELS or self._touches_free(corners, reach, window, grid):
                     self._used.add(area)
                     break
             else:
@@ -107,38 +109,21 @@ class IdlePlaces:
         if self._blank and is_theirs:
             yield self._blank
 
-
-@dataclass(frozen=True, slots=True)
-class _Pixels:
-    """The pixels of a map in a polygon and near it.
-
-    Attributes:
-        corners: the polygon (col, row) [pixels].
-        reach: the distance that counts as near [pixels].
-        window: window of the map around them.
-    """
-
-    corners: Polygon
-    reach: float
-    window: Window
-
-    @classmethod
-    def of(cls, polygon: Polygon, geometry: GridGeometry, near_m: float) -> _Pixels:
-        corners = tuple(geometry.to_pixels(x, y) for x, y in polygon)
-        reach = 0.5 + near_m / geometry.resolution
-        x0, y0, x1, y1 = polygon_bounds(corners)
-        row0, row1 = _span(y0 - reach, y1 + reach, geometry.rows)
-        col0, col1 = _span(x0 - reach, x1 + reach, geometry.cols)
-        return cls(corners, reach, Window(row0, col0, row1, col1))
-
-    def touch_free(self, grid: OccupancyGrid, free_at_most: int) -> bool:
-        """Return whether one of the pixels is free."""
-        window = self.window
+    def _touches_free(
+        self, corners: Polygon, reach: float, window: Window, grid: OccupancyGrid
+    ) -> bool:
+        """Return whether a free pixel lies in a polygon, by pixels, or near it."""
         values = grid.cells[window.row0 : window.row1, window.col0 : window.col1]
-        free = (values >= 0) & (values <= free_at_most)
-        return bool(
-            free.any() and (free & near_polygons((self.corners,), window, 1.0, self.reach)).any()
-        )
+        free = (values >= 0) & (values <= self._footprint.free_at_most)
+        return bool(free.any() and (free & near_polygons((corners,), window, 1.0, reach)).any())
+
+
+def _around(corners: Polygon, reach: float, geometry: GridGeometry) -> Window:
+    """Return the window of a map around a polygon and what is near it."""
+    x0, y0, x1, y1 = polygon_bounds(corners)
+    row0, row1 = _span(y0 - reach, y1 + reach, geometry.rows)
+    col0, col1 = _span(x0 - reach, x1 + reach, geometry.cols)
+    return Window(row0, col0, row1, col1)
 
 
 def _span(low: float, high: float, size: int) -> tuple[int, int]:

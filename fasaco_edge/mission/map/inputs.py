@@ -178,6 +178,8 @@ class InputMonitor:
             robot's speed; 0 if not known [m].
         on_line_m: the same also where the track between them is unknown: how far ahead on its line
             the robot may be.
+        pose_at, map_at: when the last pose, and the last map or update, came; before that, when
+            they began to be due; None before that.
         driven: selects the poses used for swept floor.
     """
 
@@ -191,40 +193,29 @@ class InputMonitor:
         self._pose: StampedPose | None = None
         # Whether a pose has arrived, in any frame.
         self._has_pose = False
-        # When the last pose and map came; before that, when they began to be due.
-        self._pose_at: float | None = None
-        self._map_at: float | None = None
+        self.pose_at: float | None = None
+        self.map_at: float | None = None
         # Number of the plan requested from the doubtful pose.
         self._answered_by = -1
 
     def begin(self, now: float) -> None:
         """Note that map and pose are due from ``now`` on, unless they have come."""
-        self._pose_at = now if self._pose_at is None else self._pose_at
-        self._map_at = now if self._map_at is None else self._map_at
+        self.pose_at = now if self.pose_at is None else self.pose_at
+        self.map_at = now if self.map_at is None else self.map_at
 
     def succeed(self, before: InputMonitor) -> None:
         """Go on with the times of another monitor."""
-        self._has_pose, self._pose_at = before._has_pose, before._pose_at
-        self._map_at = before._map_at
-
-    @property
-    def pose_at(self) -> float | None:
-        """When the last pose came; before that, when it began to be due; None before that."""
-        return self._pose_at
-
-    @property
-    def map_at(self) -> float | None:
-        """When the last map or update came; before that, when it began to be due, or None."""
-        return self._map_at
+        self._has_pose, self.pose_at = before._has_pose, before.pose_at
+        self.map_at = before.map_at
 
     def note_map(self, now: float) -> None:
         """Note a map or an update."""
-        self._map_at = now
+        self.map_at = now
 
     def note_pose(self, stamped: StampedPose, now: float) -> bool:
         """Note a pose; return whether the track from the last one is unknown."""
         last, lost, pose = self._pose, self.is_pose_lost(now), stamped.pose
-        self._pose, self._pose_at, self._has_pose = stamped, now, True
+        self._pose, self.pose_at, self._has_pose = stamped, now, True
         self.farthest_m = self.on_line_m = 0.0
         if last is None:
             return False
@@ -254,7 +245,7 @@ class InputMonitor:
 
     def forget_pose(self, now: float) -> None:
         """Forget the last pose: the next one is in another frame, and due from now on."""
-        self._pose, self._pose_at, self.doubt = None, now, ""
+        self._pose, self.pose_at, self.doubt = None, now, ""
         self.driven.break_track()
 
     def clear_doubt(self) -> None:
@@ -272,11 +263,11 @@ class InputMonitor:
 
     def pose_silent_s(self, now: float) -> float:
         """Return the time since the last pose, or since the beginning [s]."""
-        return 0.0 if self._pose_at is None else now - self._pose_at
+        return 0.0 if self.pose_at is None else now - self.pose_at
 
     def map_silent_s(self, now: float) -> float:
         """Return the time since the last map or update, or since the beginning [s]."""
-        return 0.0 if self._map_at is None else now - self._map_at
+        return 0.0 if self.map_at is None else now - self.map_at
 
     def is_pose_lost(self, now: float) -> bool:
         """Return whether poses have timed out."""

@@ -22,7 +22,14 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Pose2D, Window
-from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
+from fasaco_edge.grid.lattice import (
+    BLOCKED,
+    COVERABLE,
+    UNKNOWN,
+    CoverageLattice,
+    Footprint,
+    beside,
+)
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor import certain as kernels
 from fasaco_edge.kernels.floor.certain import FloorTiles, Whereabouts
@@ -283,7 +290,5 @@ def small_shift(before: OccupancyGrid, after: OccupancyGrid, footprint: Footprin
 
 def _wall_faces(cells: NDArray[np.int8], footprint: Footprint) -> NDArray[np.bool_]:
     """Return which pixels are occupied and beside a free one, bool (rows, cols)."""
-    free = np.pad((cells >= 0) & (cells <= footprint.free_at_most), 1)
-    beside = free[:-2, 1:-1] | free[2:, 1:-1] | free[1:-1, :-2] | free[1:-1, 2:]
-    faces: NDArray[np.bool_] = beside & (cells >= footprint.occupied_at_least)
-    return faces
+    free = (cells >= 0) & (cells <= footprint.free_at_most)
+    return beside(free) & (cells >= footprint.occupied_at_least)

@@ -18,8 +18,7 @@ from fasaco_edge.errors import (
     WrongFrame,
 )
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.floor_map import FloorMap
-from fasaco_edge.grid.geometry import Point, Polygon, StampedPose, Window, polygon_bounds
+from fasaco_edge.grid.geometry import Polygon, StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
 from fasaco_edge.grid.rotation import rotated_geometry
@@ -45,8 +44,8 @@ from fasaco_edge.mission.orders.order import MissionOrder
 IN_DOCK_M = 0.5
 
 
-class MapState:
-    """Takes in maps and poses.
+class MapState(Ground):
+    """Takes in maps and poses; the lattice and the floor are those of the newest map.
 
     Attributes:
         grid: the newest map, with all updates and obstacles; None before there is one.
@@ -67,6 +66,7 @@ class MapState:
     """
 
     def __init__(self, config: MissionConfig) -> None:
+        super().__init__(config)
         self.grid: OccupancyGrid | None = None
         self.given: OccupancyGrid | None = None
         self.obstacles = Obstacles(config.footprint.robot_radius_m)
@@ -80,9 +80,7 @@ class MapState:
         self.frames = FrameSelector()
         self.building = BuildingWatch()
         self.places = StandingPlaces(config.policy, config.given or config.policy)
-        self._config = config
         self.path_cell: Cell | None = None
-        self._ground = Ground(config)
         self._patches_lost = False
         # Why the newest map was refused; "" if it was not.
         self._refused = ""
@@ -177,12 +175,12 @@ class MapState:
     def _take_map(self, given: OccupancyGrid, within: Window | None = None) -> None:
         grid, lattice, before = self.obstacles.on(given), self.lattice, self.given
         if self.grid is None or self.grid.frame != grid.frame:
-            change = self._ground.begin(grid)
+            change = self.begin(grid)
             if self.grid is not None:
                 self.building.begin_anew()
             self.area = self._shown = None
         else:
-            change = self._ground.follow((self.grid, grid), within)
+            change = self.follow((self.grid, grid), within)
         self._compare(change)
         self.shift = None
         is_other = lattice is not None and self.lattice is not lattice and self.shows_floor
@@ -209,49 +207,7 @@ class MapState:
 
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
         """Replace the keep-out polygons (x, y) [m]."""
-        self._ground.keep_out(polygons, self.grid)
-
-    @property
-    def plain(self) -> CoverageLattice | None:
-        """The lattice of cell centres, without keep-out zones; None before there is a map."""
-        return self._ground.plain
-
-    @property
-    def free(self) -> CoverageLattice | None:
-        """The lattice without keep-out zones; None before there is a map."""
-        return self._ground.free
-
-    @property
-    def lattice(self) -> CoverageLattice | None:
-        """The lattice with the cells of keep-out zones removed."""
-        return self._ground.lattice
-
-    @property
-    def change(self) -> LatticeChange | None:
-        """Change from the previous ``lattice``; None where unknown."""
-        return self._ground.change
-
-    @property
-    def floor(self) -> FloorMap | None:
-        """The floor under ``lattice``; None before there is a map, and where cells are counted."""
-        return self._ground.floor
-
-    @property
-    def free_floor(self) -> FloorMap | None:
-        """The floor without keep-out zones."""
-        return self._ground.free_floor
-
-    def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
-        """Return for which cells the map shows whether the robot fits, see ``Ground``."""
-        return self._ground.is_decided(window)
-
-    def place_of(self, cell: Cell) -> Point | None:
-        """Return the robot's position for a cell, x, y [m]; None if it cannot stand there."""
-        return self._ground.place_of(cell)
-
-    def places_of(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
-        """Return the robot's positions for cells, see ``Ground``."""
-        return self._ground.places_of(cells)
+        self.close(polygons, self.grid)
 
     def take_pose(self, pose: StampedPose) -> None:
         """Take in a pose.
@@ -274,7 +230,7 @@ class MapState:
         cell, before, self.area = self.robot_cell(), self.area, None
         if cell is None or self.lattice is None:
             return
-        change = self._ground.change
+        change = self.change
         if before is not None and before.lattice is self.lattice and before.contains(cell):
             self.area = before  # as with every pose: steps lead there and back
         elif before is None or change is None or change.after is not self.lattice:
@@ -292,11 +248,7 @@ class MapState:
         if lattice is None or self.pose is None:
             return None
         # A polished line runs beside its cells.
-        if (
-            cell is not None
-            and lattice.contains(cell)
-            and lattice.states[lattice.local(cell)] == COVERABLE
-        ):
+        if cell is not None and lattice.is_coverable(cell):
             return cell
         pose, dock = self.pose.pose, self.places.dock
         own = anchor_cell(lattice, pose)

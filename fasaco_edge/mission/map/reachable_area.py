@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange, carried, carried_copy
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, update_reach
 
@@ -128,8 +128,8 @@ class ReachableArea:
         """
         if not len(cells):
             return 0
-        lattice, first = self.lattice, (int(cells[0, 0]), int(cells[0, 1]))
-        if not lattice.contains(first) or lattice.states[lattice.local(first)] != COVERABLE:
+        lattice = self.lattice
+        if not lattice.is_coverable((int(cells[0, 0]), int(cells[0, 1]))):
             return 0
         allowed = lattice.window.values_at(lattice.steps, cells[:-1], 0)
         # Column by column: this runs over tens of thousands of cells.
@@ -160,7 +160,7 @@ def anchor_cell(lattice: CoverageLattice, pose: Pose2D) -> Cell | None:
     row, col = lattice.cell_at(pose.x, pose.y)
     best, best_distance = None, ANCHOR_CELLS * lattice.cell_m
     for cell in ((row + i, col + j) for i in (0, -1, 1) for j in (0, -1, 1)):
-        if not (lattice.contains(cell) and lattice.states[lattice.local(cell)] == COVERABLE):
+        if not lattice.is_coverable(cell):
             continue
         if cell == (row, col):
             return cell

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # Limits of one sheet; a number needs 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
+# Least area of a room, and of a part that is more than the border moving to and fro [m2].
+LEAST_M2 = 1.0
 # Titles of rooms in a text are cut after so many characters.
 MOST_LISTED = 400
 # Sheets that are kept: floors and buildings.

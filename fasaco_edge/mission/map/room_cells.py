@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.map.room_raster import BLOCK, NOWHERE, RoomRaster
+from fasaco_edge.mission.map.room_raster import BLOCK, NOWHERE, RoomRaster, centres
 from fasaco_edge.mission.map.room_watch import RoomWatch
 
 
@@ -35,17 +36,14 @@ class RoomCells:
             return None
         if sheet.raster is not self._raster or lattice.window != self._window:
             self._raster, self._window = sheet.raster, lattice.window
-            self._rooms = self._read(lattice)
+            self._rooms = self._read(lattice.window, lattice.cell_m)
         return self._rooms
 
-    def _read(self, lattice: CoverageLattice) -> NDArray[np.uint16]:
-        window, rooms = lattice.window, np.zeros(lattice.states.shape, np.uint16)
-        step = max(1, BLOCK // max(window.cols, 1))
-        for first in range(0, window.rows, step):
-            part = rooms[first : first + step]
-            rows, cols = np.indices(part.shape, np.int32)
-            cells = np.stack((rows + (window.row0 + first), cols + window.col0), axis=-1)
-            centres = lattice.centres(cells.reshape(-1, 2))
-            places = rotated_points(centres, self._lattice_deg) if self._lattice_deg else centres
-            part[:] = self._raster.at(places).reshape(part.shape)
+    def _read(self, window: Window, cell_m: float) -> NDArray[np.uint16]:
+        rooms = np.zeros((window.rows, window.cols), np.uint16)
+        for part in window.strips(BLOCK):
+            places = centres(part, cell_m)
+            places = rotated_points(places, self._lattice_deg) if self._lattice_deg else places
+            found = self._raster.at(places).reshape(part.rows, part.cols)
+            rooms[part.slices_in(window)] = found
         return rooms

@@ -17,7 +17,7 @@ nothing on where it is. Rooms that the map does not show stay as they are.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.rooms.regions import grow
 from fasaco_edge.mission.map.room_book import (
+    LEAST_M2,
     MOST_NUMBER,
     MOST_ROOMS,
     Room,
@@ -42,8 +43,6 @@ HOLD_NEW, HOLD_CHANGE = 4, 8
 SETTLED = 2 * HOLD_CHANGE
 # An update without a change takes this from its score.
 PENALTY = 2
-# Least area of a room, and of a part that is more than the border moving to and fro [m2].
-LEAST_M2 = 1.0
 # A region shows a room if it has this area of it [m2], or half of a smaller room; and this share of
 # the smaller of the two.
 LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
@@ -63,17 +62,12 @@ def common_counts(labels: Labels, slots: Ids, most: int) -> NDArray[np.int64]:
     """Return how many squares each region and each slot have in common, int64 (n, most + 1)."""
     wide, regions = most + 1, int(labels.max(initial=0)) + 1
     counts = np.zeros(regions * wide, np.int64)
-    for rows in _blocks(labels):
-        keys = labels[rows].astype(np.int64).ravel() * wide + slots[rows].ravel()
+    whole = Window(0, 0, *labels.shape)
+    for strip in whole.strips(BLOCK):
+        at = strip.slices_in(whole)
+        keys = labels[at].astype(np.int64).ravel() * wide + slots[at].ravel()
         counts += np.bincount(keys, minlength=regions * wide)
     return counts.reshape(regions, wide)
-
-
-def _blocks(squares: Labels) -> Iterator[slice]:
-    """Yield slices of rows that are worked on at once, which bounds memory."""
-    rows, cols = squares.shape
-    step = max(BLOCK // max(cols, 1), 1)
-    yield from (slice(first, first + step) for first in range(0, rows, step))
 
 
 @dataclass(slots=True)
@@ -133,8 +127,9 @@ class Matching:
             if what == "move":
                 label = self._shown_by[self._rooms.index(other)]
                 self._becomes[label, self._rooms.index(room)] = other
-        for rows in _blocks(self._labels):
-            self._part[rows] = self._becomes[self._labels[rows], self._slots[rows]]
+        for strip in self._window.strips(BLOCK):
+            at = strip.slices_in(self._window)
+            self._part[at] = self._becomes[self._labels[at], self._slots[at]]
         self._keep_cuts(before)
         for label in self._to_divide:
             self._divide(label)

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Point, Polygon, Window
-from fasaco_edge.grid.polygons import polygon_flaw
+from fasaco_edge.grid.polygons import area_m2, is_near, polygon_flaw
 from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.mission.map.room_book import LEAST_M2, MOST_NUMBER, Room, RoomBook, RoomSheet
 from fasaco_edge.mission.map.room_raster import Ids
 
 Mask = NDArray[np.bool_]
 
+# Outlines follow once so much has changed [m2]: pixels along walls flicker.
+STALE_M2 = 0.1
 MOST_CORNERS = 100
 # How far a corner that is left out lies beside the outline at most [m], the first that serves.
 TOLERANCES_M = (0.12, 0.06, 0.0, 0.25, 0.5, 1.0)
@@ -144,3 +149,61 @@ def joined(ids: Ids, square_m: float) -> dict[int, tuple[int, ...]]:
             found.setdefault(one, set()).add(other)
             found.setdefault(other, set()).add(one)
     return {room: tuple(sorted(others)) for room, others in found.items()}
+
+
+def stale(sheet: RoomSheet, before: Ids) -> list[int]:
+    """Return the rooms whose outlines are outdated, as enough of their squares have changed."""
+    after = sheet.raster.ids
+    squares = np.bincount(after.ravel(), minlength=MOST_NUMBER + 1)
+    other = before != after
+    changed = np.bincount(np.concatenate((before[other], after[other])), minlength=1)
+    for room in np.flatnonzero(changed).tolist():
+        sheet.stale[room] = sheet.stale.get(room, 0) + int(changed[room])
+    least = STALE_M2 / sheet.raster.square_m**2
+    return [
+        number
+        for number, room in sheet.rooms.items()
+        if sheet.stale.get(number, 0) >= least or bool(room.outline) != bool(squares[number])
+    ]
+
+
+def refresh(book: RoomBook, changed: Iterable[int]) -> None:
+    """Derive outline, area and neighbours anew of rooms whose squares have changed."""
+    sheet = book.sheet
+    rooms = set(changed)
+    if sheet is None or not rooms:
+        return
+    for room in rooms:
+        sheet.stale.pop(room, None)
+    square_m = sheet.raster.square_m
+    beside, shapes = joined(sheet.raster.ids, square_m), list[Room]()
+    for known in book.rooms:
+        shape = replace(known, neighbours=beside.get(known.id, ()), encloses=())
+        if known.id in rooms:
+            window, mask = sheet.raster.squares(known.id)
+            shape = replace(
+                shape,
+                outline=outline(window, mask, square_m) if mask.any() else (),
+                area_m2=round(int(np.count_nonzero(mask)) * square_m**2, 2),
+            )
+        shapes.append(shape)
+    # Outlines with a hole that a room fits in.
+    rings = {
+        each.id
+        for each in shapes
+        if each.outline and area_m2(each.outline) > each.area_m2 + LEAST_M2
+    }
+    inner = {each.id: _inner_point(sheet, each.id) for each in shapes if rings and each.outline}
+    for each in shapes:
+        encloses: list[int] = []
+        if each.id in rings:
+            encloses = [at for at, point in inner.items() if is_near(each.outline, point, 0.0)]
+        book.put(replace(each, encloses=tuple(at for at in encloses if at != each.id)))
+
+
+def _inner_point(sheet: RoomSheet, room: int) -> Point:
+    """Return the centre of a square of a room, away from its border."""
+    window, mask = sheet.raster.squares(room)
+    row, col = find_areas(largest_part(mask).astype(np.uint8)).inner[0].tolist()
+    square_m = sheet.raster.square_m
+    return (window.col0 + col + 0.5) * square_m, (window.row0 + row + 0.5) * square_m

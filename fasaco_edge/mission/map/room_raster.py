@@ -103,30 +103,16 @@ class RoomRaster:
         if whole.rows * whole.cols > MOST_SQUARES:
             return self
         ids = np.zeros((whole.rows, whole.cols), np.uint16)
-        step = max(BLOCK // whole.cols, 1)
-        for first in range(0, whole.rows, step):
-            part = Window(whole.row0 + first, whole.col0, 0, whole.col1)
-            part = replace(part, row1=min(part.row0 + step, whole.row1))
-            x, y = motion.back(1.0, *centres(part, side))
-            cells = np.stack((np.floor(y / side), np.floor(x / side)), axis=1).astype(np.int32)
-            found = _values_at(self, cells)
-            ids[first : first + part.rows] = found.reshape(part.rows, part.cols)
+        for part in whole.strips(BLOCK):
+            found = self.at(np.stack(motion.back(1.0, *centres(part, side).T), axis=1))
+            ids[part.slices_in(whole)] = found.reshape(part.rows, part.cols)
         return replace(self, window=whole, ids=ids).cropped()
 
 
-def _values_at(raster: RoomRaster, cells: NDArray[np.int32]) -> Ids:
-    window = raster.window
-    rows, cols = cells[:, 0] - window.row0, cells[:, 1] - window.col0
-    inside = (rows >= 0) & (rows < window.rows) & (cols >= 0) & (cols < window.cols)
-    found = np.zeros(len(cells), np.uint16)
-    found[inside] = raster.ids[rows[inside], cols[inside]]
-    return found
-
-
-def centres(window: Window, square_m: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the centres x, y [m] of a window's squares, float64 (n,) each, row by row."""
+def centres(window: Window, square_m: float) -> NDArray[np.float64]:
+    """Return the centres x, y [m] of a window's squares, float64 (n, 2), row by row."""
     rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
-    return (cols.ravel() + 0.5) * square_m, (rows.ravel() + 0.5) * square_m
+    return (np.stack((cols.ravel(), rows.ravel()), axis=1) + 0.5) * square_m
 
 
 def window_over(geometry: GridGeometry, square_m: float) -> Window:
@@ -139,12 +125,9 @@ def sampled(found: FoundRooms, window: Window, square_m: float) -> NDArray[np.in
     """Return the region at the centre of each square of a window, int32 (rows, cols)."""
     geometry = found.geometry
     labels = np.zeros((window.rows, window.cols), np.int32)
-    step = max(BLOCK // window.cols, 1)
-    for first in range(0, window.rows, step):
-        row0 = window.row0 + first
-        part = Window(row0, window.col0, min(row0 + step, window.row1), window.col1)
-        values = geometry.values_at(found.labels, np.stack(centres(part, square_m), axis=1))
-        labels[first : first + part.rows] = values.reshape(part.rows, part.cols)
+    for part in window.strips(BLOCK):
+        values = geometry.values_at(found.labels, centres(part, square_m))
+        labels[part.slices_in(window)] = values.reshape(part.rows, part.cols)
     return labels
 
 
@@ -158,7 +141,7 @@ def cut_window(cut: Cut, square_m: float) -> Window:
 def is_cut(window: Window, square_m: float, cut: Cut) -> NDArray[np.bool_]:
     """Return which squares of a window a cut goes through, bool (rows, cols)."""
     (x0, y0), (x1, y1) = cut
-    x, y = centres(window, square_m)
+    x, y = centres(window, square_m).T
     dx, dy = x1 - x0, y1 - y0
     along = ((x - x0) * dx + (y - y0) * dy) / max(dx * dx + dy * dy, 1e-12)
     along = np.clip(along, 0.0, 1.0)

@@ -20,6 +20,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.exploration import Exploration, frontier, is_in_reach
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
+from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
@@ -29,8 +30,7 @@ class CellsLeft:
 
     Args:
         config, map_state, ledger, company: the sources of the cells.
-        zones: the zones of the order that are due; None without an order.
-        covers: which of their cells are due.
+        state: the order and its progress.
         exploration: the viewpoints.
     """
 
@@ -40,12 +40,11 @@ class CellsLeft:
         map_state: MapState,
         ledger: MissionLedger,
         company: Company,
-        zones: Callable[[], tuple[Zone, ...] | None],
-        covers: Callable[[], Covers],
+        state: Callable[[], OrderState],
         exploration: Callable[[], Exploration],
     ) -> None:
         self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
-        self._zones, self._covers, self._exploration = zones, covers, exploration
+        self._state, self._exploration = state, exploration
         # The edge of an area.
         self._edge: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
 
@@ -57,11 +56,8 @@ class CellsLeft:
 
     def unswept(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` are asked for and not visited."""
-        if self._zones() is None:
-            return np.zeros((window.rows, window.cols), bool)
-        unswept: NDArray[np.bool_] = self.asked_for(window) & (
-            self._ledger.current.visits(window) == 0
-        )
+        asked = self.asked_for(window)
+        unswept: NDArray[np.bool_] = asked & (self._ledger.current.visits(window) == 0)
         return unswept
 
     def open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
@@ -90,7 +86,10 @@ class CellsLeft:
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` this robot has to cover, covered or not."""
-        inside = in_zones(self._zones() or (), window, self._config.footprint.cell_m)
+        state = self._state()
+        zone, order = state.current_zone, state.order
+        due = (zone,) if zone is not None else order.zones if order is not None else ()
+        inside = in_zones(due, window, self._config.footprint.cell_m)
         if self.is_at_edge:
             inside = inside & self.edge(window)
         shared = self._ledger.shared
@@ -99,7 +98,7 @@ class CellsLeft:
     @property
     def is_at_edge(self) -> bool:
         """Whether only cells along walls and furniture are due."""
-        return self._covers() == "edge"
+        return self._state().current_pass.covers == "edge"
 
     def edge(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` lie along walls and furniture, bool (rows, cols)."""

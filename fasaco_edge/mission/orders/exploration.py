@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Polygon, Window
-from fasaco_edge.grid.lattice import UNKNOWN, Cell, mask_of
+from fasaco_edge.grid.lattice import UNKNOWN, Cell, beside, mask_of
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
@@ -25,10 +25,7 @@ LOOKS_S = 6.0
 def frontier(area: ReachableArea) -> NDArray[np.bool_]:
     """Return the reachable cells that have an unknown neighbour, bool (rows, cols)."""
     # Outside of the lattice all is unknown.
-    unknown = np.pad(area.lattice.states == UNKNOWN, 1, constant_values=True)
-    beside = unknown[:-2, 1:-1] | unknown[2:, 1:-1] | unknown[1:-1, :-2] | unknown[1:-1, 2:]
-    found: NDArray[np.bool_] = area.reachable & beside
-    return found
+    return area.reachable & beside(area.lattice.states == UNKNOWN, beyond=True)
 
 
 def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:

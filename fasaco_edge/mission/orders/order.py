@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
+from typing import Annotated, Literal, NamedTuple, TypeVar, get_args
 
 import msgspec
 from msgspec import Meta
@@ -18,24 +18,19 @@ from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     Corners,
     KeepOut,
-    KeepOutDocument,
     PlaceName,
     check_name,
     check_polygons,
-    keep_out_document,
-    keep_out_of,
 )
 from fasaco_edge.mission.orders.passes import Passes, PassWord, passes_document, passes_of
 from fasaco_edge.mission.orders.room_requests import (
     USUAL_PRIORITY,
     Priority,
-    RoomDocument,
     RoomNumber,
     RoomRequest,
-    room_document,
-    room_of,
 )
 from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
+from fasaco_edge.text import misfit
 
 MOST_ZONES = 100
 Minutes = Annotated[float, Meta(ge=0, le=1440)]
@@ -148,8 +143,6 @@ CommandName = Literal[
     "room_merge",
     "room_set",
 ]
-FORGETFUL = ("start", "reset")
-"""The commands that may forget covered cells."""
 # Why a robot drives somewhere outside of its order; "" for none.
 Errand = Literal["", "home", "charge"]
 
@@ -172,18 +165,18 @@ class Command(NamedTuple):
     room: RoomRequest | None = None
 
 
-class _Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Unknown members are errors."""
 
 
-class StandingZone(_Document, frozen=True):
+class StandingZone(Document, frozen=True):
     """A zone of the configuration, referred to by its name."""
 
     name: PlaceName
     polygon: Corners
 
 
-class ZoneDocument(_Document, frozen=True):
+class ZoneDocument(Document, frozen=True):
     """An area to cover; without a polygon, the standing zone or else the room of that name.
 
     Attributes:
@@ -199,7 +192,7 @@ class ZoneDocument(_Document, frozen=True):
     priority: Priority | None = None
 
 
-class OrderDocument(_Document, frozen=True):
+class OrderDocument(Document, frozen=True):
     """What to cover. Without zones: everything the robot can reach.
 
     Attributes:
@@ -220,25 +213,7 @@ class OrderDocument(_Document, frozen=True):
     until_min: Minutes | None = None
 
 
-class CommandDocument(_Document, frozen=True):
-    """A command to a mission.
-
-    Attributes:
-        order: for `start` only.
-        keep_out: for `keep_out_add` and, by its name alone, `keep_out_remove`.
-        discard: for `start` and `reset`: whether they may forget what is covered. Without it, a
-            command that would forget covered cells is refused (`would_forget`).
-        room: for `room_name`, `room_split`, `room_merge` and `room_set` only.
-    """
-
-    command: CommandName
-    order: OrderDocument | None = None
-    keep_out: KeepOutDocument | None = None
-    discard: bool = False
-    room: RoomDocument | None = None
-
-
-_Read = TypeVar("_Read", bound=_Document)
+_Read = TypeVar("_Read", bound=Document)
 # The words of members other than ``command``.
 _WORDS: dict[str, object] = {
     "passes": PassWord,
@@ -254,40 +229,7 @@ def read_order(document: object) -> MissionOrder:
     Raises:
         OrderError: naming the member, what was expected and what came.
     """
-    return order_of(_converted(document if document is not None else {}, OrderDocument))
-
-
-def read_command(document: object) -> Command:
-    """Return the command in a parsed document.
-
-    Raises:
-        OrderError: naming the member, what was expected and what came.
-    """
-    asked = _converted(document, CommandDocument)
-    name = asked.command
-    if asked.order is not None and name != "start":
-        raise OrderError(f"order goes with start alone, got it with {name}")
-    if asked.discard and name not in FORGETFUL:
-        raise OrderError(f"discard goes with {' and '.join(FORGETFUL)} alone, got it with {name}")
-    if (asked.keep_out is not None) != (name in ("keep_out_add", "keep_out_remove")):
-        got = f"got it with {name}" if asked.keep_out else f"missing with {name}"
-        raise OrderError(f"keep_out goes with keep_out_add and keep_out_remove, {got}")
-    keep_out = None if asked.keep_out is None else keep_out_of(asked.keep_out)
-    if keep_out is not None and bool(keep_out.polygon) != (name == "keep_out_add"):
-        got = "missing" if name == "keep_out_add" else "got it with keep_out_remove"
-        raise OrderError(f"keep_out.polygon: goes with keep_out_add, {got}")
-    room = room_of(name, asked.room)
-    return Command(name, order_of(asked.order or OrderDocument()), keep_out, asked.discard, room)
-
-
-def read_recorded(document: dict[str, object]) -> Command:
-    """Return a command of a recording; releases before ``discard`` always forgot covered cells.
-
-    Raises:
-        OrderError: as ``read_command``.
-    """
-    forgets = document.get("command") in FORGETFUL
-    return read_command({"discard": True} | document if forgets else document)
+    return order_of(converted(document if document is not None else {}, OrderDocument))
 
 
 def order_document(order: MissionOrder) -> dict[str, object]:
@@ -313,20 +255,6 @@ def _zone_document(zone: Zone) -> dict[str, object]:
     room = {"room": zone.room} if zone.room else {}
     priority = {} if zone.priority is None else {"priority": zone.priority}
     return {"name": zone.name, **passes, **polygon, **room, **priority}
-
-
-def command_document(command: Command) -> dict[str, object]:
-    """Return the document of a command; ``read_command`` reads it."""
-    document: dict[str, object] = {"command": command.name}
-    if command.name == "start":
-        document["order"] = order_document(command.order)
-    if command.name in FORGETFUL:
-        document["discard"] = command.discard
-    if command.keep_out is not None:
-        document["keep_out"] = keep_out_document(command.keep_out)
-    if command.room is not None:
-        document["room"] = room_document(command.room)
-    return document
 
 
 def order_of(document: OrderDocument) -> MissionOrder:
@@ -371,7 +299,12 @@ def order_of(document: OrderDocument) -> MissionOrder:
     return order
 
 
-def _converted(document: object, kind: type[_Read]) -> _Read:
+def converted(document: object, kind: type[_Read]) -> _Read:
+    """Return a parsed document as a kind of document.
+
+    Raises:
+        OrderError: naming the member, what was expected and what came.
+    """
     try:
         return msgspec.convert(document, kind)
     except msgspec.ValidationError as error:
@@ -380,15 +313,12 @@ def _converted(document: object, kind: type[_Read]) -> _Read:
 
 def _explained(message: str, document: object) -> str:
     """Turn ``Expected `int` >= 1 - at `$.passes``` into member, expectation and value."""
-    what, _, where = message.replace("`", "").partition(" - at $")
-    what = what[0].lower() + what[1:].partition(", got ")[0]
+    where, what, value = misfit(message, document)
+    where = where.lstrip(".")
     if match := re.fullmatch(r"object (contains unknown|missing required) field (.*)", what):
         kind = "unknown" if match[1].endswith("unknown") else "missing"
-        return f"{where.lstrip('.') or 'the order'}: {kind} member {match[2]}"
-    value: Any = document
-    for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", where):
-        value = value[name] if name else value[int(index)]
+        return f"{where or 'the order'}: {kind} member {match[2]}"
     if what.startswith("invalid enum value"):
         member = re.sub(r"\[\d+\]$", "", where).rpartition(".")[2]
         what = f"expected {', '.join(get_args(_WORDS.get(member, CommandName)))}"
-    return f"{where.lstrip('.') or 'the order'}: {what}, got {value!r:.60}"
+    return f"{where or 'the order'}: {what}, got {value!r:.60}"

@@ -19,7 +19,9 @@ from fasaco_edge.planners.passes import (
 )
 
 
-class PassDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class PassDocument(
+    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True
+):
     """A pass of an order.
 
     Attributes:

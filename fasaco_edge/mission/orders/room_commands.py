@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fasaco_edge.errors import CommandError
 from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
+from fasaco_edge.mission.orders.passes import passes_of
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 
 # Commands that need the map, and kernels.
@@ -30,14 +31,12 @@ def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
     """
     match command:
         case "room_name":
-            book.name(asked.id, asked.name)
+            book.name(asked.id, asked.name or "")
         case "room_set":
             before = book.room(asked.id).settings
-            passes, kinds = (
-                (before.passes, before.kinds)
-                if asked.passes is None
-                else (asked.passes, asked.kinds)
-            )
+            passes, kinds = before.passes, before.kinds
+            if asked.passes is not None:
+                passes, kinds = passes_of(asked.passes, "room.passes")
             skip = before.skip if asked.skip is None else asked.skip
             priority = before.priority if asked.priority is None else asked.priority
             book.set(asked.id, RoomSettings(passes, kinds, skip, priority))
@@ -47,6 +46,7 @@ def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
 
             if command == "room_split":
                 assert asked.cut is not None
-                split(book, asked.id, asked.cut)
+                start, end = asked.cut
+                split(book, asked.id, (start, end))
             else:
-                merge(book, [asked.id, *asked.others], asked.name)
+                merge(book, [asked.id, *(asked.others or ())], asked.name or "")

@@ -1,19 +1,17 @@
-"""Requests of people about rooms: to name, split, merge and set them; their documents."""
+"""Requests of people about rooms: to name, split, merge and set them."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
-from fasaco_edge.grid.geometry import FARTHEST_M, Point
+from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.mission.orders.keep_outs import PlaceName
-from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_of
-from fasaco_edge.planners.passes import Pass
+from fasaco_edge.mission.orders.passes import Passes, passes_of
 
 # A merge joins at most this many rooms with one.
 MOST_MERGED = 50
@@ -25,7 +23,7 @@ RoomNumber = Annotated[int, Meta(ge=1, le=65_000)]
 Corner = Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]
 
 
-class RoomDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class RoomRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A room, and what to change.
 
     Attributes:
@@ -52,24 +50,6 @@ class RoomDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     priority: Priority | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RoomRequest:
-    """A room, and what to change; members as in ``RoomDocument``.
-
-    Attributes:
-        passes, kinds: number of passes, None for unchanged; what is special about each.
-    """
-
-    id: int | str
-    name: str = ""
-    cut: tuple[Point, Point] | None = None
-    others: tuple[int | str, ...] = ()
-    passes: int | None = None
-    kinds: tuple[Pass, ...] = ()
-    skip: bool | None = None
-    priority: int | None = None
-
-
 # Members that each command takes beside the room itself, and those of them that it must have.
 _TAKES: dict[str, tuple[set[str], set[str]]] = {
     "room_name": ({"name"}, {"name"}),
@@ -79,50 +59,25 @@ _TAKES: dict[str, tuple[set[str], set[str]]] = {
 }
 
 
-def room_of(command: str, document: RoomDocument | None) -> RoomRequest | None:
+def checked_room(command: str, asked: RoomRequest | None) -> RoomRequest | None:
     """Return the request of a command; None for a command that takes none.
 
     Raises:
         OrderError: naming the member that is missing, of another command, or wrong.
     """
-    if command not in _TAKES:
-        if document is not None:
-            raise OrderError(f"room goes with {', '.join(_TAKES)}, got it with {command}")
+    if (asked is not None) != (command in _TAKES):
+        got = "missing" if asked is None else "got it"
+        raise OrderError(f"room goes with {', '.join(_TAKES)}, {got} with {command}")
+    if asked is None:
         return None
-    if document is None:
-        raise OrderError(f"room goes with {', '.join(_TAKES)}, missing with {command}")
     takes, needs = _TAKES[command]
-    given = {
-        name
-        for name in RoomDocument.__struct_fields__
-        if name != "id" and getattr(document, name) is not None
-    }
+    members = msgspec.structs.asdict(asked).items()
+    given = {name for name, value in members if value is not None and name != "id"}
     if other := sorted(given - takes):
         raise OrderError(f"room.{other[0]}: does not go with {command}")
     if missing := sorted(needs - given or (takes if not given else set())):
         raise OrderError(f"room.{' or '.join(missing)}: missing with {command}")
-    if any(not math.hypot(x, y) <= FARTHEST_M for x, y in document.cut or ()):
+    if any(not math.hypot(x, y) <= FARTHEST_M for x, y in asked.cut or ()):
         raise OrderError(f"room.cut: must be finite and within {FARTHEST_M:g} m of 0")
-    passes, kinds = (
-        (None, ()) if document.passes is None else passes_of(document.passes, "room.passes")
-    )
-    cut = None if document.cut is None else (document.cut[0], document.cut[1])
-    others = tuple(document.others or ())
-    settings = passes, kinds, document.skip, document.priority
-    return RoomRequest(document.id, document.name or "", cut, others, *settings)
-
-
-def room_document(request: RoomRequest) -> dict[str, object]:
-    """Return the document of a request; ``room_of`` reads it."""
-    members: dict[str, object | None] = {
-        "name": request.name or None,
-        "cut": None if request.cut is None else [list(end) for end in request.cut],
-        "others": list(request.others) or None,
-        "passes": None
-        if request.passes is None
-        else passes_document(request.passes, request.kinds),
-        "skip": request.skip,
-        "priority": request.priority,
-    }
-    given = {name: value for name, value in members.items() if value is not None}
-    return {"id": request.id, **given}
+    passes_of(asked.passes or 1, "room.passes")
+    return asked

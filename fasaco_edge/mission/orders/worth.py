@@ -175,14 +175,9 @@ class WorthFirst:
     def _given_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
         if self._on_cells is None or self._on_cells[0] != window:
             # In blocks of rows: places take far more than cells.
-            step, shifted = max(1, BLOCK // max(window.cols, 1)), given.cells + np.int8(1)
             on_cells = np.empty((window.rows, window.cols), np.int8)
-            for first in range(0, window.rows, step):
-                last = min(window.row0 + first + step, window.row1)
-                part = Window(window.row0 + first, window.col0, last, window.col1)
-                places = np.stack(centres(part, self._cell_m), axis=1)
-                # Beyond the grid it returns 0.
-                values = given.geometry.values_at(shifted, places) - np.int8(1)
-                on_cells[first : first + part.rows] = values.reshape(part.rows, part.cols)
+            for part in window.strips(BLOCK):
+                values = given.geometry.values_at(given.cells, centres(part, self._cell_m), -1)
+                on_cells[part.slices_in(window)] = values.reshape(part.rows, part.cols)
             self._on_cells = window, on_cells
         return self._on_cells[1]

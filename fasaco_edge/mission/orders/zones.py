@@ -62,6 +62,7 @@ def counts_in(
     return counts
 
 
+@lru_cache(maxsize=2)
 def kept_out(
     polygons: tuple[Polygon, ...], window: Window, cell_m: float, robot_radius_m: float
 ) -> NDArray[np.bool_]:
@@ -69,7 +70,9 @@ def kept_out(
 
     These are the cells that a polygon touches, or in which the robot would touch one.
     """
-    return cells_near(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
+    cells = near_polygons(polygons, window, cell_m, max(0.5 * cell_m, robot_radius_m))
+    cells.flags.writeable = False
+    return cells
 
 
 def cells_inside(polygon: Polygon, window: Window, cell_m: float) -> NDArray[np.bool_]:
@@ -126,25 +129,15 @@ def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDA
     return np.stack([np.packbits(cells_inside(polygon, window, cell_m)) for polygon in polygons])
 
 
-@lru_cache(maxsize=2)
-def cells_near(
+def near_polygons(
     polygons: tuple[Polygon, ...], window: Window, cell_m: float, reach_m: float
 ) -> NDArray[np.bool_]:
-    """Return which cells of ``window`` are near a polygon, bool (rows, cols), read-only.
+    """Return which cells of ``window`` are near a polygon, bool (rows, cols).
 
     A cell is near if a polygon touches the square of half-width ``reach_m`` [m] around its centre,
     or contains it. With half a cell or more, a disc of that radius can drive between the centres of
     the other cells without touching a polygon.
     """
-    cells = near_polygons(polygons, window, cell_m, reach_m)
-    cells.flags.writeable = False
-    return cells
-
-
-def near_polygons(
-    polygons: tuple[Polygon, ...], window: Window, cell_m: float, reach_m: float
-) -> NDArray[np.bool_]:
-    """Return the same as ``cells_near``, which remembers it."""
     starts = np.zeros((window.rows, window.cols + 1), np.int32)
     inside = np.zeros((window.rows, window.cols), bool)
     for polygon in polygons:

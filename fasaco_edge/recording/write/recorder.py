@@ -20,7 +20,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import memory_limit, resident_mb
-from fasaco_edge.mission.orders.order import read_command
+from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription

@@ -23,7 +23,7 @@ from fasaco_edge.grid.rotation import composed
 from fasaco_edge.mission.map.loop_closure import Motion
 from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_edits import move
-from fasaco_edge.mission.map.room_update import update
+from fasaco_edge.mission.map.room_watch import update
 from tests.benchmarks.rooms.homes import RESOLUTION_M, Home, growing, home
 
 KINDS = ("home", "office")

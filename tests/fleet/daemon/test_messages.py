@@ -164,7 +164,7 @@ def test_a_robot_sends_pace_and_all_tiles_after_it_forgets_cells():
     robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
     ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
     for row in range(TILES):
-        ledger.credit((64 * row, 0))
+        ledger.visit((64 * row, 0))
     robot.mission.company.step_s = 7.5
     for now in (0.0, 1.0, 2.0):
         robot.mission.shared.note_forgotten()
@@ -176,14 +176,14 @@ def test_a_robot_sends_pace_and_all_tiles_after_it_forgets_cells():
 def test_a_robot_sends_which_known_cells_precede_their_epoch():
     robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
     ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
-    ledger.credit((64, 0))
+    ledger.visit((64, 0))
     sender.publish(robot.mission, 0.0)
     before = {tile.row: tile for tile in listener.heard[-1].swept}
     assert listener.heard[-1].kept is None
     robot.mission.shared.note_forgotten()
     sender.publish(robot.mission, 1.0)
-    ledger.credit((64, 9))
-    ledger.credit((128, 0))
+    ledger.visit((64, 9))
+    ledger.visit((128, 0))
     sender.publish(robot.mission, 2.0)
     told = listener.heard[-1]
     assert {64 * tile.row for tile in told.swept} >= {64, 128}

@@ -482,7 +482,7 @@ def tiles_of(cells):
     """Cells as a robot tells them."""
     ledger = CoverageLedger(1.0)
     for cell in cells:
-        ledger.credit(cell)
+        ledger.visit(cell)
     return SweptQueue().next(ledger.snapshot().tiles, 100)
 
 

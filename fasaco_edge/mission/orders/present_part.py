@@ -1,0 +1,198 @@
+"""Present part of an order: what of it is planned now, and when the robot gives it up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.company import Company
+from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.coverage.unreached import OrderReach
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import anchor_cell
+from fasaco_edge.mission.orders.by_room import RoomPrice
+from fasaco_edge.mission.orders.cells_left import CellsLeft
+from fasaco_edge.mission.orders.exploration import Exploration
+from fasaco_edge.mission.orders.order import Errand
+from fasaco_edge.mission.orders.order_state import Stage
+from fasaco_edge.mission.orders.plan_scope import PlanScope
+from fasaco_edge.planners.problem import CoverageProblem
+
+# After this many paths in a row that cover no further cell, the cells left wait for the retry: the
+# robot may stop short of its path's end, with the last cell out of the tool's reach.
+MAX_IN_VAIN = 3
+
+
+class PresentPart(OrderReach):
+    """Poses the problems of the part of an order that is due. Times are [s].
+
+    Attributes:
+        cells: the cells left of it.
+        scope: which of these are planned now, and how.
+    """
+
+    def __init__(
+        self,
+        config: MissionConfig,
+        map_state: MapState,
+        ledger: MissionLedger,
+        company: Company,
+        room_price: RoomPrice,
+    ) -> None:
+        super().__init__(map_state, ledger)
+        self._config, self._company = config, company
+        self._exploration = Exploration()
+        # Number of cells done by the end of the last path, -1 before the first, and of paths in a
+        # row that did not increase it.
+        self._done, self._in_vain = -1, 0
+        # Whether the next plan is the first of a pass of its own kind.
+        self._is_laid_anew = False
+        self.cells = CellsLeft(
+            *(config, map_state, ledger, company),
+            state=lambda: self.order_state,
+            exploration=lambda: self._exploration,
+        )
+        self.scope = PlanScope(
+            config, map_state, self.cells, company, room_price, lambda: self.order_state
+        )
+
+    def _begin_part(self) -> None:
+        """Forget what was found on the way to another part."""
+        self._exploration, self._is_laid_anew = Exploration(), False
+        self._done, self._in_vain = -1, 0
+        self.scope.worth.begin()
+
+    @property
+    def can_plan(self) -> bool:
+        """Whether a plan would have anything to cover."""
+        return self.order_state.stage is not Stage.RETURNING and self.cells.left() > 0
+
+    @property
+    def waits_for_others(self) -> bool:
+        """Whether only parts of other robots are left, and these make progress."""
+        return self._company.others_go_on and not self.cells.left_to_me()
+
+    def goal(self, errand: Errand = "home") -> Cell | None:
+        """Return the destination cell (row, col) of an errand; None for none."""
+        places, lattice = self._map.places, self._map.lattice
+        place = places.place(errand)
+        if place is None or lattice is None:
+            is_elsewhere = errand == "charge" and places.why_no_dock
+            return None if is_elsewhere else self.order_state.home
+        pose = place.stand
+        return anchor_cell(lattice, pose) or lattice.cell_at(pose.x, pose.y)
+
+    @property
+    def ends_home(self) -> bool:
+        """Whether the present path has to end at the robot's home."""
+        return self.order_state.returns_home_next
+
+    def note_cell(self, cell: Cell) -> None:
+        """Note that the robot is in ``cell``."""
+        self._exploration.note_cell(cell)
+
+    def problem(
+        self, cell: Cell, before: NDArray[np.int32], *, attempt: int = 0
+    ) -> CoverageProblem:
+        """Return the planning problem of the cells that are open now.
+
+        Args:
+            cell: the robot's cell.
+            before: int32 (n, 2), the current path from there on.
+            attempt: see ``CoverageProblem``.
+
+        Raises:
+            NothingToCover: no cell is open.
+        """
+        area = self._map.area
+        assert area is not None
+        self._exploration.end_if_reached(self.order_state.current_zone, area)
+        problem = self.scope.problem(cell, before, self.goal(), attempt)
+        # The walk of another pass has other lanes: a repair would keep them.
+        is_full, self._is_laid_anew = self._is_laid_anew, False
+        return replace(problem, is_full=is_full)
+
+    def explore(self, cell: Cell) -> str:
+        """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
+        exploration, zone = self._exploration, self.order_state.current_zone
+        area = self._map.area
+        free = None if area is None else self.scope.passable(area, cell)
+        if reason := exploration.seek(zone, area, free, cell):
+            return reason
+        viewpoints = self._company.viewpoints(self.cells.open_cells, cell)
+        return next(filter(None, (exploration.look_beyond(at, cell) for at in viewpoints)), "")
+
+    def why_standing(self, now: float) -> str:
+        """Return why the robot stands, though a plan is wanted, or ""."""
+        if self.waits_for_others:
+            return "others sweep what is left"
+        return self._why_shut() if self._exploration.is_shut_still(now) else ""
+
+    def why_looking(self, cell: Cell, now: float) -> str:
+        """Return why the robot stands where it has nothing to cover, or "".
+
+        It looks at ground that others see, or waits for others that stand in the way to its zone:
+        as long as the retries of an order take.
+        """
+        exploration, policy = self._exploration, self._config.policy
+        if exploration.waits_for_way(now, policy.retries * policy.retry_s):
+            return self._why_shut()
+        is_looking = exploration.is_looking(cell, now)
+        return "looks for its part, which others see" if is_looking else ""
+
+    def _why_shut(self) -> str:
+        zone = self.order_state.current_zone
+        return "others stand in the way" + (f" to zone {zone.name!r}" if zone else "")
+
+    def note_path_end(self, why: str) -> bool:
+        """Note the end of a path; return whether the cells it left over must wait for a retry.
+
+        ``why``: why it left them over; "" if that is not known.
+        """
+        cells = self.cells.left_to_me()
+        if cells > 0:
+            self._note_failure(why)
+        # Counted by cells done, not by cells left: a map may show further ones at any time.
+        done = self.done
+        self._in_vain = self._in_vain + 1 if cells and done <= self._done else 1
+        self._done = done
+        is_given_up = cells > 0 and self._in_vain > MAX_IN_VAIN
+        if is_given_up and self._exploration.skip_viewpoint():
+            return False
+        if is_given_up and self.scope.worth.least:
+            self.scope.worth.give_up()
+            return False
+        if is_given_up and self._company.has_company:
+            # Other robots may leave before they have swept their parts: those come first.
+            is_given_up, self._in_vain = self._leave_to_others(), 0
+        return is_given_up
+
+    @property
+    def done(self) -> int:
+        """Number of cells that this robot has covered, or has visited only to look from them."""
+        return self._ledger.current.snapshot().cells + self._exploration.reached
+
+    def _leave_to_others(self) -> bool:
+        """Give up what this robot has tried in vain; return whether nothing untried is left."""
+        area = self._map.area
+        assert area is not None
+        unswept = self.cells.unswept(area.lattice.window) & area.reachable
+        self._company.give_up(self._company.mine(unswept, area), area)
+        return not self._company.untried(unswept, area).any()
+
+    def pass_over_unreachable(self) -> bool:
+        """In a fleet pass over cells that are out of reach now; return whether there were any.
+
+        Cells of others' parts that it can reach come before a retry.
+        """
+        area = self._map.area
+        if area is None or not self._company.has_company:
+            return False
+        unswept = self.cells.unswept(area.lattice.window) & area.reachable
+        mine = self._company.mine(unswept, area)
+        self._company.pass_over(mine, area)
+        return bool(mine.any())
