@@ -152,7 +152,7 @@ class BusClaim(Claim):
         super().__init__(bus.id)
         self.is_settled = False
         self._bus, self._keys, self._topic, self._active = bus, keys, topic, active
-        self._roll = bus.roll(keys.of(topic))
+        self._roll = bus.token_list(keys.of(topic))
         self._token = bus.token(self.key)
         self._others: dict[str, ClaimState] = {}
         self._version = 0

@@ -100,7 +100,7 @@ def session(context: CheckContext) -> Finding:
     silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
     details += [f"{endpoint}: no answer" for endpoint in silent]
     if len(silent) == len(bus.connect) > 0:
-        # A client with credentials ends, as these may be what is wrong; a service starts it again.
+        # A client with credentials exits, as they may be wrong; a service restarts it.
         ends = bus.mode == "client" and bus.security.kind != "none"
         make, then = (fail, "does not start") if ends else (warn, "waits for it")
         found = f"no answer at {', '.join(silent)}: the daemon {then}"
@@ -170,8 +170,8 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
         to_do = f"publish on {keys_lacking}"
         if "map" in lacking and elsewhere.places():
             to_do += (
-                ", or take a map that is seen elsewhere: robot.name, bus.base, ros2.domain and "
-                "ros2.namespace say where this one looks"
+                ", or use a map found elsewhere: robot.name, bus.base, ros2.domain and "
+                "ros2.namespace set where this daemon looks"
             )
         return warn(found, to_do, details)
     if status.troubles:
@@ -184,7 +184,7 @@ class MapsElsewhere:
     """Maps that are published under other names than this daemon's.
 
     Args:
-        bus: where to look, from now on.
+        bus: the session to search, from now on.
         own: keys that the daemon's own map may have.
     """
 

@@ -185,7 +185,7 @@ class ActionClient:
         if ros["kind"] == "rmw_zenoh":
             node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
             self._gid = gid_of(f"{node.token}/{action}")
-            self._roll = bus.roll(server_tokens(self._domain, action))
+            self._roll = bus.token_list(server_tokens(self._domain, action))
 
     @property
     def is_seen(self) -> bool:

@@ -189,7 +189,7 @@ class Nav2Follower(Supervision):
             self._is_canceled = True
             self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)
         else:
-            self._fail(State.NO_NAV2, "it does not know its goal: was it restarted?", now)
+            self._fail(State.NO_NAV2, "Nav2 does not know the goal: was it restarted?", now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without one; if soon, the server is gone."""

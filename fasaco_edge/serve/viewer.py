@@ -120,12 +120,12 @@ class Viewer:
             async with asyncio.timeout(SEND_S):
                 await self._socket.send(message)
         except TimeoutError:
-            LOG.info("a viewer that does not read is dropped")
+            LOG.info("dropped a viewer that does not read")
             self._socket.transport.abort()
 
     async def _carry_out(self, order: Order, role: Role) -> str:
         if role != "operator":
-            why = "this page may only look; its server decides who may command"
+            why = "this page may only view; its server decides who may command"
             return message_text("answer", id=order.id, ok=False, text=why, hint="")
         asked: dict[str, object] = {"command": order.command}
         if order.command == "start":
@@ -152,8 +152,8 @@ class Viewer:
 
 
 @contextlib.asynccontextmanager
-async def ending_oddities(socket: ServerConnection) -> AsyncIterator[None]:
-    """Close the connection of a viewer that sends what no page sends, or asks for lost data."""
+async def closing_on_error(socket: ServerConnection) -> AsyncIterator[None]:
+    """Close the connection if the viewer sends an invalid message, or asks for unreadable data."""
     try:
         yield
     except (msgspec.DecodeError, TimeoutError, RecursionError):

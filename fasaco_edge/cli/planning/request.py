@@ -130,7 +130,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         changes["reverses"] = False
     if line == CELLS and changes.get("turn_radius_m", robot.turn_radius_m):
         raise BadConfiguration(
-            "--turn-radius: a line through the centres of cells has turns on the spot alone",
+            "--turn-radius: a line through the centres of cells only has turns on the spot",
             hint="ask for a line over the floor, quick or thorough; for one robot",
         )
     named = args.config, Path(own.file) if own and own.file else None
