@@ -79,8 +79,8 @@ def compile_kernels(stages: Collection[str] = STAGES) -> float:
         places = {stage: place for place, stage in enumerate(stages)}
 
         def report(stage: str) -> None:
-            said = f"compiling kernels (first run only): {stage}"
-            bar.update(task, description=said, completed=places.get(stage))
+            text = f"compiling kernels (first run only): {stage}"
+            bar.update(task, description=text, completed=places.get(stage))
 
         compile_missing(report, stages)
     return time.monotonic() - started

@@ -143,8 +143,8 @@ class Cancellations:
         return due
 
 
-def said_of(ending: Ending | DockEnding, errors: Mapping[int, str], no_code: str) -> str:
-    """Return what a server says of a goal that failed: code, its name, and its words."""
+def goal_error(ending: Ending | DockEnding, errors: Mapping[int, str], no_code: str) -> str:
+    """Return the error of a failed goal: its code, the code's name, and the server's text."""
     code = f"{ending.code} {errors.get(ending.code, 'no code')}" if ending.code else no_code
     return f"{code}: {ending.message}" if ending.message else code
 

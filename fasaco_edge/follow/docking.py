@@ -26,7 +26,7 @@ from fasaco_edge.follow.actions import (
     CancelGoal,
     Request,
     SendGoal,
-    said_of,
+    goal_error,
 )
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.supervision import Supervision
@@ -164,7 +164,7 @@ class Docking:
         elif ending.status == UNKNOWN:
             self._fail("the docking server does not know the goal: was it restarted?", now)
         else:
-            self._fail(said_of(ending, ERRORS, "no code"), now)
+            self._fail(goal_error(ending, ERRORS, "no code"), now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without one: it is asked for again."""

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, said_of
+from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, goal_error
 from fasaco_edge.follow.pieces import (
     COAST_M,
     LEAST_M,
@@ -184,7 +184,7 @@ class Nav2Follower(Supervision):
             else:
                 path.finish(goal)
         elif ending.status == ABORTED:
-            self._fail(State.GIVEN_UP, said_of(ending, ERRORS, NO_CODE), now)
+            self._fail(State.GIVEN_UP, goal_error(ending, ERRORS, NO_CODE), now)
         elif ending.status == CANCELED:
             self._is_canceled = True
             self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)

@@ -136,7 +136,7 @@ def plan_passes(
         end: where the last pass ends: "anywhere", "home", or a cell.
 
     Raises:
-        BadConfiguration: a value is invalid, or ``plan`` refuses one.
+        BadConfiguration: a value is invalid; further errors are those of ``plan``.
     """
     robot = RobotConfig() if robot is None else robot
     if robot.turn_radius_m > 0.0:

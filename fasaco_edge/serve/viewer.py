@@ -70,13 +70,13 @@ class Viewer:
     async def greet(self) -> Role | None:
         """Return its role; None if it is rejected."""
         async with asyncio.timeout(HELLO_S):
-            said = from_page(await self._socket.recv())
-        role = self._guard.role_of(said.token) if isinstance(said, Hello) else None
+            first = from_page(await self._socket.recv())
+        role = self._guard.role_of(first.token) if isinstance(first, Hello) else None
         if role is None:
             # Rate limit for guessing tokens: one a second on each connection.
             await asyncio.sleep(REFUSED_S)
             await self._send(
-                message_text("denied", asks=isinstance(said, Hello) and not said.token)
+                message_text("denied", asks=isinstance(first, Hello) and not first.token)
             )
             await self._socket.close(DENIED)
             return None
@@ -142,8 +142,8 @@ class Viewer:
                 return message_text("answer", id=order.id, ok=False, text=why, hint="")
             if found[0].is_error:
                 wrong = decode_tolerant(found[0].payload, Error)
-                said = {"text": wrong.message, "hint": wrong.hint, "code": wrong.code}
-                return message_text("answer", id=order.id, ok=False, **said)
+                failure = {"text": wrong.message, "hint": wrong.hint, "code": wrong.code}
+                return message_text("answer", id=order.id, ok=False, **failure)
             answer = decode_tolerant(found[0].payload, Answer)
         except FasacoError as error:
             return message_text("answer", id=order.id, ok=False, text=str(error), hint=error.hint)

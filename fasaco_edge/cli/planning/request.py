@@ -99,7 +99,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     """Return the request of the options; other values are those of ``--config``, if given.
 
     Raises:
-        BadConfiguration: a value is impossible; the error names it.
+        BadConfiguration: a value is invalid; the error names it.
         PlannerFailed: the file of the user's planner raised.
     """
     config = None if args.config is None else load_config(args.config)

@@ -39,7 +39,7 @@ class Received:
 
 @dataclass(slots=True)
 class Traffic:
-    """Messages of a robot to its fleet, their size, and samples that were too large."""
+    """Messages of a robot to its fleet, their bytes, and samples that were too large."""
 
     messages: int = 0
     bytes: int = 0
