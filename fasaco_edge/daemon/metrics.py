@@ -160,7 +160,7 @@ def exposition(status: Status, age_s: float) -> str:
     """Return all metrics of a status of this age [s]."""
     age = Figure(
         "status_age_seconds",
-        "since the daemon's loop made these figures; above some seconds it hangs",
+        "since the daemon's loop made these figures; after some seconds it counts as hung",
         lambda _: [({}, round(age_s, 3))],
     )
     return "".join(line + "\n" for figure in (*FIGURES, age) for line in _lines(figure, status))

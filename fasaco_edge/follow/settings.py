@@ -47,7 +47,7 @@ class FollowSettings:
         cmd_key: key of the velocities.
         ros: kind, domain, namespace, name of the node and topic, if ``cmd_key`` is ROS 2's.
         nav2: if Nav2's controller drives: name of its action, release, names of plugins, and the
-            least distance between two passes of one goal over the same place [m].
+            least distance between separate stretches of one goal's path [m].
         dock: if Nav2's docking server docks: names of its actions, dock, its type, frame, pose x,
             y [m], yaw [rad], and how far in front of it paths end [m].
         scan: if scans are used: where the lidar is (``mount``),

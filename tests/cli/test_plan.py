@@ -427,7 +427,7 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         ("--line cells --swept 0.9", "has no share to choose"),
         *((f"--rooms {to}", "for one pass of one") for to in ("--passes 2", "--robots 0,0 3,3")),
         ("--planner zigzag --line cells --pheromone-png t.png", "leaves no pheromone"),
-        ("--robots 0,0 5,5 --pheromone-png t.png", "of one robot's colony"),
+        ("--robots 0,0 5,5 --pheromone-png t.png", "the colony of one robot"),
     ],
 )
 def test_what_cannot_be_is_refused(capsys, words, said):
