@@ -208,14 +208,14 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
     }
 
 
-def ros_rights(heard: Sequence[str], said: Sequence[str], graph: Sequence[str]) -> Role:
+def ros_rights(inputs: Sequence[str], outputs: Sequence[str], graph: Sequence[str]) -> Role:
     """Return the rights of the other side in a ROS 2 graph.
 
     Args:
-        heard, said: keys the daemon subscribes to, and publishes on.
+        inputs, outputs: keys the daemon subscribes to, and publishes on.
         graph: keys of the liveliness tokens of nodes.
     """
-    return Role(ROLES["ros"].description, speaks=(*heard, *graph), listens=(*said, *graph))
+    return Role(ROLES["ros"].description, speaks=(*inputs, *graph), listens=(*outputs, *graph))
 
 
 def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, Any]:

@@ -152,7 +152,7 @@ class BusClaim(Claim):
         super().__init__(bus.id)
         self.is_settled = False
         self._bus, self._keys, self._topic, self._active = bus, keys, topic, active
-        self._roll = bus.roll(keys.of(topic))
+        self._token_list = bus.token_list(keys.of(topic))
         self._token = bus.token(self.key)
         self._others: dict[str, ClaimState] = {}
         self._version = 0
@@ -172,12 +172,12 @@ class BusClaim(Claim):
         before = self.state
         in_touch = self._bus.keep_in_touch(now)
         is_settled = self.is_settled and not self.is_uncertain(now)
-        self._roll.ask(ASK_PERIOD_S if is_settled else 0.0)
-        if not self._roll.version:
+        self._token_list.ask(ASK_PERIOD_S if is_settled else 0.0)
+        if not self._token_list.version:
             return False
-        if self._roll.version != self._version:
-            self._version = self._roll.version
-            self._others = claims_in(self._roll.there(), self._active)
+        if self._token_list.version != self._version:
+            self._version = self._token_list.version
+            self._others = claims_in(self._token_list.there(), self._active)
             self._others.pop(self._bus.id, None)
             # If none plans, one soon will.
             self.is_settled = ClaimState.PLANS in (self.state, *self._others.values())

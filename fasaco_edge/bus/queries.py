@@ -21,8 +21,8 @@ from fasaco_edge.bus.publisher import encoding_of
 
 # Limit on the tokens that are remembered, in case of a flood.
 MOST_TOKENS = 16_384
-# Timeout of replies from routers [s]. A late reply changes nothing. A query that has not even
-# ended by then is sent again after twice as long [s].
+# Timeout of replies from routers [s]. A late reply changes nothing. A query that has not ended
+# after twice that time is sent again [s].
 ANSWER_S = 2.0
 LOST_S = 2 * ANSWER_S
 # Zenoh's own error for a queryable that did not reply in time.
@@ -32,10 +32,10 @@ TIMEOUT = b"Timeout"
 def ask_for_tokens(
     session: zenoh.Session, key: str, most: int, end: Callable[[list[str], bool], None]
 ) -> bool:
-    """Query the tokens that match a key; return whether the query was sent: the session may end.
+    """Query the tokens that match a key; return False if the session is closed.
 
-    ``end`` is called with their keys, ``most`` at most, and whether all replies were good, on a
-    Zenoh thread, within ``ANSWER_S``.
+    ``end`` is called on a Zenoh thread within ``ANSWER_S``, with the keys of ``most`` tokens at
+    most, and whether all replies were valid.
     """
     found, wrong = dict[str, None](), list[zenoh.Reply]()
 
@@ -54,7 +54,7 @@ def ask_for_tokens(
     return True
 
 
-class Roll:
+class TokenList:
     """The tokens that match a key.
 
     Attributes:
@@ -75,7 +75,7 @@ class Roll:
         return self._there
 
     def ask(self, period_s: float) -> None:
-        """Query the tokens if the last query is this long ago [s]; the reply updates the roll."""
+        """Query the tokens if the last query is this long ago [s]; the reply updates the list."""
         now = time.monotonic()
         with self._lock:
             if now - self._asked_at < (LOST_S if self._is_asking else period_s):
@@ -88,8 +88,8 @@ class Roll:
     def _take(self, found: list[str], is_whole: bool) -> None:
         with self._lock:
             self._is_asking = False
-            # A partial reply names tokens that exist; others may exist, too. The first reply counts
-            # as it is: waiting for a frozen peer may never end.
+            # After an incomplete reply, further tokens may exist. The first reply counts even so: a
+            # frozen peer may never reply.
             there = frozenset(found)
             if not is_whole and len(there | self._there) <= MOST_TOKENS:
                 there |= self._there
@@ -110,9 +110,9 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A message that is published and kept for queries: its payload is in Zenoh's memory once.
+    """A message that is published and kept for queries: Zenoh holds its payload once.
 
-    A path of half a million poses has 40 MB; each put of bytes would copy it.
+    A path of half a million poses takes 40 MB; each put of bytes would copy it.
     """
 
     payload: zenoh.ZBytes
@@ -170,7 +170,7 @@ def matches(key: str, other: str) -> bool:
 
 def request_of(query: zenoh.Query) -> Request:
     """Return the content of a query."""
-    listed: Any = query.parameters  # no mapping by the stubs
+    listed: Any = query.parameters  # the stubs declare no mapping
     parameters = {str(name): str(value) for name, value in listed}
     own = {name: value for name, value in parameters.items() if not name.startswith("_")}
     payload = query.payload.to_bytes() if query.payload is not None else b""

@@ -21,7 +21,7 @@ import zenoh
 ASK_PERIOD_S = 1.0
 # Limit on the publishers of a key that are queried; samples of the others are still received.
 MOST_PUBLISHERS = 16
-# Time that a reply with a gap before it waits [s]; where several samples count, since the last.
+# Time that a reply after a gap waits [s]; with a depth above 1, counted from the last sample.
 UNDER_WAY_S = 0.5
 # Limit on the publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
@@ -151,11 +151,11 @@ class SampleOrder:
         # When that was published, by the publisher's clock; 0 if unknown.
         self._stamps = OrderedDict[str, int]()
         # The marks of publishers without a token. Used only to drop cached replies that were
-        # received already: a reset of such a clock would go unnoticed.
+        # received already: a reset of the publisher's clock would go unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
         # A reply that overtook published samples: until when it waits [s], publisher, mark.
         self._ahead: tuple[float, str, int, zenoh.Sample] | None = None
-        # Where several samples count, they wait for earlier ones, which were queried.
+        # With a depth above 1: samples that wait for earlier ones, which were queried.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
         # Until when samples wait after a reply with a gap [s]; None without any.
@@ -237,7 +237,7 @@ class SampleOrder:
             self._hold(name, mark, sample)
         elif _is_newer(mark, last):
             self._deliver(name, mark, sample)
-            # More earlier samples may be under way; other publishers' samples do not show that.
+            # A missing sample of this publisher has come: others may be under way, too.
             if self._gap_until is not None and any(one[0] == name for one in self._held):
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 
@@ -252,9 +252,9 @@ class SampleOrder:
             self._deliver(name, mark, sample)
 
     def _deliver_held(self, *, over_gaps: bool = False) -> None:
-        """Deliver waiting samples, except after a reply with a gap: a cache may hold fewer.
+        """Deliver waiting samples, except those after a gap: the missing ones may be under way.
 
-        Those wait until the missing samples have come, or their time is over (``over_gaps``).
+        Those wait until the missing ones have come, or their time is over (``over_gaps``).
         """
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0

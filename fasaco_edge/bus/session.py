@@ -23,8 +23,8 @@ from fasaco_edge.bus.queries import (
     Question,
     Reply,
     Request,
-    Roll,
     Shared,
+    TokenList,
     reply_of,
     request_of,
     send,
@@ -242,9 +242,9 @@ class Bus:
         self._declared.remove(declared)
         declared.undeclare()
 
-    def roll(self, key: str) -> Roll:
-        """Return the roll of the liveliness tokens that match ``key``."""
-        return Roll(self._session, key)
+    def token_list(self, key: str) -> TokenList:
+        """Return the list of the liveliness tokens that match ``key``."""
+        return TokenList(self._session, key)
 
     def is_linked(self, session: str) -> bool:
         """Return whether another session, by its id, is connected to this one directly."""

@@ -17,7 +17,7 @@ from typing import NoReturn
 
 from fasaco_edge import __version__
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
-from fasaco_edge.cli.console.logs import begin_logging, say_why
+from fasaco_edge.cli.console.logs import begin_logging, report_error
 from fasaco_edge.cli.console.parser import Parser
 from fasaco_edge.cli.console.streams import clean_streams, open_missing_streams
 from fasaco_edge.errors import BadConfiguration, DiskFailed, FasacoError, PlannerFailed
@@ -46,9 +46,9 @@ COMMANDS = {
 }
 """Each command, and its line in the list of them."""
 
-# A faulty or full disk, a computer without free files or memory. Its exit code differs from that of
-# an invalid configuration, so that a service is restarted.
-_PASSING = frozenset(
+# A faulty or full disk, no memory or file descriptors left. The exit code differs from that of an
+# invalid configuration, so that a service is restarted.
+_TRANSIENT = frozenset(
     (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 )
 
@@ -66,11 +66,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def program() -> NoReturn:
     """Run one command as a separate process, and exit with the command's code.
 
-    A session of Zenoh leaves threads behind that still release callbacks after it was closed (Zenoh
-    1.10). Where the interpreter ends meanwhile, the C library aborts the process with "FATAL:
-    exception not rethrown", or the interpreter waits for ever. So the process then exits without
-    the interpreter's own end, except with Rerun, which writes its last data there. Nor does a check
-    of ``doctor`` that hangs hold it up.
+    Threads of a closed Zenoh session still release callbacks for a while (Zenoh 1.10). If the
+    interpreter shuts down meanwhile, the C library aborts the process with "FATAL: exception not
+    rethrown", or the shutdown waits for ever. So the process exits without it, except with Rerun,
+    which writes its last data during it. Nor can a hanging check of ``doctor`` delay the exit.
     """
     code = main()
     if "zenoh" not in sys.modules or "rerun" in sys.modules:
@@ -85,7 +84,7 @@ def program() -> NoReturn:
 
 def run_command(parser: Parser, words: Sequence[str]) -> int:
     """Run the command that ``parser`` finds in ``words``; report errors; return the exit code."""
-    # For any mask of the caller, no other user may change the files written here.
+    # Whatever the caller's umask, no other user may change the files written here.
     os.umask(os.umask(0o022) | 0o022)
     open_missing_streams()
     clean_streams()
@@ -98,22 +97,22 @@ def run_command(parser: Parser, words: Sequence[str]) -> int:
     try:
         code: int = args.command(args)
     except FasacoError as error:
-        return _fail(DiskFailed(str(error)) if _may_pass(error) else error)
+        return _fail(DiskFailed(str(error)) if _is_transient(error) else error)
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except SystemError as error:
-        # What numba makes of Ctrl-C while a kernel runs.
+        # Numba's error for Ctrl-C while a kernel runs.
         if isinstance(error.__cause__, KeyboardInterrupt):
             return Exit.INTERRUPTED
         raise
     except BrokenPipeError:
-        # The reader has seen enough (``| head``); nothing is left to be flushed to it.
+        # The reader has closed the pipe (``| head``); the interpreter must not flush to it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.ERROR
     except (OSError, MemoryError, RuntimeError) as error:
-        if not _may_pass(error):
+        if not _is_transient(error):
             raise
-        return _fail(_passing(error))
+        return _fail(_transient(error))
     return code
 
 
@@ -142,11 +141,11 @@ def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
     command.add_options(parser)
 
 
-def _may_pass(error: BaseException | None) -> bool:
-    """Return whether an error is transient: not a mistake of the user, and perhaps over soon."""
+def _is_transient(error: BaseException | None) -> bool:
+    """Return whether an error is transient: not a mistake of the user, and may be over soon."""
     # An error of a user's own planner is a mistake of the user.
     while error is not None and not isinstance(error, PlannerFailed):
-        if isinstance(error, OSError) and error.errno in _PASSING:
+        if isinstance(error, OSError) and error.errno in _TRANSIENT:
             return True
         if isinstance(error, MemoryError) or "can't start new thread" in str(error):
             return True
@@ -154,12 +153,12 @@ def _may_pass(error: BaseException | None) -> bool:
     return False
 
 
-def _passing(error: OSError | MemoryError | RuntimeError) -> DiskFailed:
+def _transient(error: OSError | MemoryError | RuntimeError) -> DiskFailed:
     if isinstance(error, OSError):
         return DiskFailed(": ".join(filter(None, (error.filename, error.strerror))))
     return DiskFailed("out of memory or threads", hint=_OUT_OF_MEMORY)
 
 
 def _fail(error: FasacoError) -> int:
-    say_why(error)
+    report_error(error)
     return Exit.CONFIG if isinstance(error, BadConfiguration) else Exit.ERROR

@@ -16,7 +16,7 @@ from fasaco_edge.bench.daemon import DAEMON
 from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
-from fasaco_edge.cli.console.logs import say_why
+from fasaco_edge.cli.console.logs import report_error
 from fasaco_edge.cli.console.streams import print_json
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (PLANNERS, DAEMON)
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print(report, interrupted)
     for fault in report.faults:
-        say_why(fault)
+        report_error(fault)
     for file in args.benchmark.write(args, samples):
         terminal.err().print(f"wrote {file}")
     if interrupted:

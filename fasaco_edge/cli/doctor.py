@@ -20,7 +20,7 @@ from fasaco_edge.text import one_line
 EPILOG = """\
 Nothing is started or changed: it joins the bus for a second, listens, and queries. Run it as the
 daemon's user or as root, so that it can read what the daemon reads. The checks:
-  configuration   whether the file is in order
+  configuration   whether the file is valid
   platform        processor, system, Python; whether there is more than one core
   memory          how much there is, and whether limits on it hold
   clock           whether it is synchronised
@@ -78,7 +78,7 @@ def _print(found: list[tuple[str, Finding]]) -> None:
     console = out()
     wide = max(len(name) for name, _ in found)
     indent = " " * (wide + 8)
-    # A file keeps each line whole.
+    # Lines are wrapped only in a terminal.
     room = max(console.width - len(indent), LEAST_ROOM) if console.is_terminal else sys.maxsize
 
     def fitted(text: str) -> str:

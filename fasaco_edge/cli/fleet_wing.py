@@ -1,6 +1,6 @@
 """Interface to the package ``fleet``: what commands need, loaded only if a fleet is requested.
 
-The one place of the command line that imports the fleet, as ``daemon.fleet_wing`` is of the daemon.
+No other module of the command line imports the fleet; the daemon has ``daemon.fleet_wing``.
 """
 
 from __future__ import annotations

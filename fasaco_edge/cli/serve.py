@@ -66,7 +66,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--allow-commands",
         action="store_true",
-        help="let everybody on this computer command the robot",
+        help="let all users of this computer command the robot",
     )
     parser.add_argument(
         "--tokens",

@@ -34,8 +34,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="X",
-        help="simulated seconds per second; robot.time_scale of the daemon's configuration says it "
-        "to reports of a recording (default: %(default)g)",
+        help="simulated seconds per second; for correct reports of a recording, set the same "
+        "robot.time_scale in the daemon's configuration (default: %(default)g)",
     )
     parser.add_argument(
         "--driver",
@@ -61,7 +61,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="MIN",
-        help="how long its battery lasts [simulated min], charged where it started; 0 for ever "
+        help="battery life [simulated min]; it charges where it started; 0: unlimited "
         "(default: %(default)g)",
     )
     parser.add_argument(

@@ -18,9 +18,9 @@ EPILOG = """\
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Its code is for
 these sources, one version each of numba, llvmlite and Python, and one processor; a daemon that
 finds none compiles it with its first map. Each file is checked before use; a damaged one is
-compiled again. A folder that anybody but root and you could write to or replace is not used, but
-a temporary one instead: `chmod go-w` on the named folder corrects that. A relative $XDG_CACHE_HOME
-is ignored; a user without a home gets the temporary folder, too.
+compiled again. A folder that users other than root and you could write to or replace is not
+used, but a temporary one: `chmod go-w` on the named folder corrects that. A relative
+$XDG_CACHE_HOME is ignored; a user without a home gets the temporary folder, too.
 exit codes: 0 all kernels are there, 1 (--check) some are not
 
 examples:
@@ -41,7 +41,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compile or check, and say where."""
+    """Compile or check the kernels; print the result and their folder."""
     seconds = 0.0 if args.check else compile_kernels()
     folder, passed_over = chosen_folder(STAGES)
     missing = why_missing(folder, STAGES) if folder else "no folder can be used"
@@ -79,8 +79,8 @@ def compile_kernels(stages: Collection[str] = STAGES) -> float:
         places = {stage: place for place, stage in enumerate(stages)}
 
         def report(stage: str) -> None:
-            said = f"compiling kernels (first run only): {stage}"
-            bar.update(task, description=said, completed=places.get(stage))
+            text = f"compiling kernels (first run only): {stage}"
+            bar.update(task, description=text, completed=places.get(stage))
 
         compile_missing(report, stages)
     return time.monotonic() - started

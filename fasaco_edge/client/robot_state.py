@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # The daemon publishes a status once a second.
 SILENCE_S = 3.5
-# A map is complete once it has not grown for so long [s], and for this share of the time in which
+# A map is complete once it has not grown for this long [s], and for this share of the time in which
 # it grew: while a robot sweeps what it has found, minutes pass without anything new.
 COMPLETE_S, COMPLETE_SHARE = 180.0, 0.5
 # If no pose has come on its own key for this long [s], the poses in the status are shown.

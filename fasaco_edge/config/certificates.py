@@ -58,9 +58,9 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
         listening, connecting = _context(files, server=True), _context(files, server=False)
         if not listens:
             connecting.verify_mode = ssl.CERT_NONE
-        said: dict[str, Any] | None = _handshake(listening, connecting).getpeercert()
-        assert said is not None
-        chain: list[dict[str, Any]] = [said, *listening.get_ca_certs()]
+        certificate: dict[str, Any] | None = _handshake(listening, connecting).getpeercert()
+        assert certificate is not None
+        chain: list[dict[str, Any]] = [certificate, *listening.get_ca_certs()]
     except ssl.SSLCertVerificationError as error:
         raise BadConfiguration(
             f"{files.certificate}: {error.verify_message}",
@@ -91,10 +91,10 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
             f"{files.certificate}: certificate has expired, {ends:%Y-%m-%d}",
             hint="have a new one signed (protocol/security.md), or check the clock with `date -u`",
         )
-    names = [value for part in said["subject"] for key, value in part if key == "commonName"]
+    names = [value for part in certificate["subject"] for key, value in part if key == "commonName"]
     return Certificate(
         name=names[-1] if names else "",
-        hosts=tuple(value for _, value in said.get("subjectAltName", ())),
+        hosts=tuple(value for _, value in certificate.get("subjectAltName", ())),
         begins=begins,
         ends=ends,
     )

@@ -98,18 +98,18 @@ class PoseConfig(Section, frozen=True):
 class PlannerConfig(Section, frozen=True):
     """The colony, see ``planners.paper.colony.ColonyConfig``; and the time one plan may take [s].
 
-    While the robot drives, ``spare_share`` of a processor core goes into making the rest of its
-    path better; colony-search alone can do that.
+    While the robot drives, ``spare_share`` of a processor core is used to improve the rest of its
+    path; only colony-search can do that.
 
     colony-search looks for the fewest seconds until the budget ends; ``ants``, ``visibility`` and
-    ``threads`` are for fasaco and aco, whose plans may end before it.
+    ``threads`` are for fasaco and aco, which may end earlier.
 
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
-    The paper's ants see no further than their neighbours; a robot's see what will soon
-    be cut off, which saves it revisits (``tests/benchmarks/RESULTS.md``).
+    ``visibility`` is eta of the paper's ants with ``neighbour``; with ``fewest-open`` they prefer
+    cells that would soon be cut off, which saves revisits (``tests/benchmarks/RESULTS.md``).
 
-    ``align`` is what rows of cells lie along where a line is driven: the building's walls, once
-    the map shows them for certain; the axes of the map frame; or an angle to these [deg].
+    ``align`` is the direction of the rows of cells if a line is driven: that of the building's
+    walls, once the map shows them clearly; of the map frame's axes; or at an angle to these [deg].
     """
 
     name: PlannerName = "colony-search"
@@ -149,7 +149,7 @@ class PlannerConfig(Section, frozen=True):
 class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and where progress is kept.
 
-    ``state_dir`` "" is the folder a service manager or the user has for that.
+    ``state_dir`` "" is the state folder of the service, else of the user.
     """
 
     state_dir: str = ""
@@ -189,17 +189,17 @@ def _home(path: Path) -> Path:
         return path.expanduser()
     except RuntimeError as error:
         raise BadConfiguration(
-            f"mission.state_dir: {path}: there is no home folder", hint="give a path from /"
+            f"mission.state_dir: {path}: there is no home folder", hint="give an absolute path"
         ) from error
 
 
 class FleetConfig(Section, frozen=True):
     """Robots under one ``bus.base`` with this name and one map frame share the work in an area.
 
-    That frame has one origin: only its name is compared. With maps of their own they give one
-    ``frame``, and where the origin of their map lies in it: ``x_m``, ``y_m`` [m], ``yaw_deg``
-    [deg]. That holds for the map in ``map_frame``, or else for the first map that the daemon
-    receives with these values: with another map, as on another floor, the robot takes no part.
+    Only names of frames are compared, so the frame must have the same origin for all. Robots with
+    maps of their own set a common ``frame``, and the pose of their map's origin in it: ``x_m``,
+    ``y_m`` [m], ``yaw_deg`` [deg]. The pose is valid for the map in ``map_frame``, else for the
+    first map received with it: on another map, as of another floor, the robot takes no part.
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -215,11 +215,11 @@ class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):
 
 
 class ScanConfig(Section, frozen=True):
-    """The robot's lidar, by whose scans ``fasaco-edge follow`` stops before what no map shows.
+    """The robot's lidar: ``fasaco-edge follow`` stops before obstacles that only its scans show.
 
-    Where it is mounted: ``x_m`` ahead of the robot's middle, ``y_m`` to its left [m], and where its
-    angle 0 points, ``yaw_deg`` from ahead to the left [deg]; ``upside_down`` turns its angles. The
-    robot stands after ``lost_s`` [s] without a scan. Without the block no scan is used.
+    It is mounted ``x_m`` ahead of the robot's centre, ``y_m`` to its left [m]; its angle 0 points
+    ``yaw_deg`` to the left of straight ahead [deg]; ``upside_down`` reverses its angles. The robot
+    stops after ``lost_s`` [s] without a scan. Without the block no scan is used.
     """
 
     x_m: Annotated[float, Meta(ge=-10, le=10)] = 0.0
@@ -230,7 +230,7 @@ class ScanConfig(Section, frozen=True):
 
 
 class RecordingConfig(Section, frozen=True):
-    """How large and how old a file may become, and what all may take.
+    """Limits on the size and age of a file, and on the size of all files.
 
     The next file begins after ``part_mb`` [MB] or ``part_min`` [min], 0 for never. Above
     ``quota_mb`` [MB] of this robot's files the oldest are deleted; 0 for no limit. Recording pauses
@@ -271,8 +271,8 @@ class MetricsConfig(Section, frozen=True):
 
 
 class DaemonConfig(Section, frozen=True):
-    """The whole configuration; without ``fleet`` the robot is alone, without ``scan`` it sees the
-    map alone, without ``ros2`` nothing is published or subscribed under ROS."""
+    """The whole configuration; without ``fleet`` the robot is alone, without ``scan`` it uses only
+    the map, without ``ros2`` nothing is published or subscribed under ROS."""
 
     robot: RobotConfig = RobotConfig()
     bus: BusConfig = BusConfig()
@@ -289,8 +289,7 @@ class DaemonConfig(Section, frozen=True):
 
     @property
     def cell_m(self) -> float:
-        """Edge of a cell [m]: lanes over the floor overlap, lanes through cell centres lie side by
-        side."""
+        """Edge of a cell [m]: the tool's width, less ``robot.overlap`` if a line is driven."""
         robot = self.robot
         if self.planner.line == "cells":
             return robot.tool_width_m

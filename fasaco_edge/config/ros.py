@@ -177,16 +177,16 @@ class RosConfig(Section, frozen=True):
 
     def rights(self) -> Role:
         """Return the rights of the role ``ros``."""
-        said = [*map(self.output_key, self.outputs.values()), *self._driven_by]
-        said += map(self.input_key, self.commands.values())
-        heard = [*self.inputs.values(), self.keep_out_mask, self.scan]
-        return ros_rights([*map(self.input_key, heard)], said, self._graph)
+        outputs = [*map(self.output_key, self.outputs.values()), *self._driven_by]
+        outputs += map(self.input_key, self.commands.values())
+        inputs = [*self.inputs.values(), self.keep_out_mask, self.scan]
+        return ros_rights([*map(self.input_key, inputs)], outputs, self._graph)
 
     def driver_rights(self) -> Role:
         """Return the rights of the role ``driver``."""
-        heard = [topic for name, topic in self.inputs.items() if name in OF_DRIVER]
-        said = [*map(self.input_key, (*heard, self.scan))]
-        return ros_rights(self._driven_by, said, self._graph)
+        inputs = [topic for name, topic in self.inputs.items() if name in OF_DRIVER]
+        outputs = [*map(self.input_key, (*inputs, self.scan))]
+        return ros_rights(self._driven_by, outputs, self._graph)
 
     @property
     def _driven_by(self) -> list[str]:

@@ -32,7 +32,7 @@ class NameClaim(BusClaim):
     def update(self, now: float) -> bool:
         """Query the others; return whether the state of this daemon has changed.
 
-        The token follows with ``announce``, once the previous path is withdrawn.
+        ``announce`` then replaces the token, once the previous path is withdrawn.
         """
         has_changed = super().update(now)
         if self.rival_yielded:
@@ -40,7 +40,7 @@ class NameClaim(BusClaim):
         return has_changed
 
     def announce(self) -> None:
-        """Show the state by the token, and log it once."""
+        """Declare the token of the state, and log the state once."""
         state = self.state
         if self._was_waiting is not state.is_waiting:
             self._was_waiting = state.is_waiting

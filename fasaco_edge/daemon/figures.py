@@ -21,7 +21,7 @@ LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
 
 
 def log_fault(log: logging.Logger, fault: FasacoError) -> str:
-    """Log a fault, with the traceback of what a mission caught; return its text."""
+    """Log a fault, with a traceback if a mission caught an exception; return its text."""
     text, cause = fault_text(fault), None
     if isinstance(fault, NotPublished):
         cause = fault.__cause__
@@ -112,5 +112,5 @@ class MapLatency:
         self._asked, self._unanswered = self._unanswered, None
 
     def answer(self) -> float | None:
-        """Return the latency until now [s]; None for a plan that no map needed."""
+        """Return the latency until now [s]; None for a plan that no map required."""
         return None if self._asked is None else time.monotonic() - self._asked

@@ -160,7 +160,7 @@ def exposition(status: Status, age_s: float) -> str:
     """Return all metrics of a status of this age [s]."""
     age = Figure(
         "status_age_seconds",
-        "since the daemon's loop made these figures; above some seconds it stands still",
+        "since the daemon's loop made these figures; after some seconds it counts as hung",
         lambda _: [({}, round(age_s, 3))],
     )
     return "".join(line + "\n" for figure in (*FIGURES, age) for line in _lines(figure, status))
@@ -279,8 +279,8 @@ def serve_metrics(address: Address) -> MetricsServer | None:
     try:
         server = MetricsServer(address)
     except OSError as error:
-        said = "metrics.listen: cannot listen on %s port %d, no figures are served: %s"
-        LOG.error(said, *address, error, extra={"event": "metrics"})
+        fault = "metrics.listen: cannot listen on %s port %d, no figures are served: %s"
+        LOG.error(fault, *address, error, extra={"event": "metrics"})
         return None
     LOG.info("figures at %s port %d, %s", *address, PATH, extra={"event": "metrics"})
     return server

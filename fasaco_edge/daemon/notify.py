@@ -122,7 +122,7 @@ class Watchdog:
         self._notified_at = now
         self._manager.alive()
 
-    def tell(self, status: Status) -> None:
+    def show(self, status: Status) -> None:
         """Set a status as the service's status line; log changes of state and troubles."""
         if status.state != self._state:
             self._state = status.state

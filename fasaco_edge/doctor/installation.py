@@ -80,11 +80,11 @@ def _config_faults(context: CheckContext) -> list[Finding]:
     faults = []
     mode = file.stat().st_mode
     if mode & stat.S_IWOTH:
-        found = f"{file}: everybody on this computer may change it"
+        found = f"{file}: all users of this computer may change it"
         faults.append(fail(found, f"chmod o-w {file}"))
     bus = context.config.bus
     if mode & stat.S_IROTH and any("#" in endpoint for endpoint in (*bus.listen, *bus.connect)):
-        found = f"{file}: an endpoint carries settings (#...), which everybody here can read"
+        found = f"{file}: an endpoint carries settings (#...), which all users here can read"
         to_do = f"chmod o-r {file}, or use bus.security, whose secrets are files of their own"
         faults.append(warn(found, to_do))
     return faults
@@ -100,7 +100,7 @@ def _state_faults(context: CheckContext) -> list[Finding]:
         # The folder of a service with its own user, inside a folder that only root can read.
         return [ok(f"{folder}: {error.strerror}")] if context.unit else []
     if status.st_mode & stat.S_IWOTH:
-        found = f"{folder}: everybody on this computer may change what counts as covered"
+        found = f"{folder}: all users of this computer may change what counts as covered"
         return [fail(found, f"chmod o-w {folder}")]
     if context.unit is None and not os.access(folder, os.W_OK):
         return [fail(f"{folder}: this user cannot write there", f"chown {folder}")]

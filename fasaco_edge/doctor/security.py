@@ -15,9 +15,9 @@ from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 
 SHOWS = {
-    "none": "by anybody there",
-    "tls": "by anybody with a certificate of the CA",
-    "user": "by anybody with a password",
+    "none": "without authentication",
+    "tls": "with a certificate of the CA",
+    "user": "with a password",
 }
 
 
@@ -30,7 +30,7 @@ def endpoints(context: CheckContext) -> Finding:
     metrics = context.config.metrics
     if (address := metrics.address()) is not None:
         where = "this computer" if ip_address(address.host).is_loopback else "other computers"
-        details.append(f"http://{metrics.listen}/metrics: figures, from {where}, by anybody there")
+        details.append(f"http://{metrics.listen}/metrics: figures, from {where}, without password")
     beyond = [endpoint for endpoint in bus.listen if not is_local(endpoint)]
     if not beyond:
         where = "on this computer only" if bus.listen else "nowhere"
@@ -38,7 +38,7 @@ def endpoints(context: CheckContext) -> Finding:
     found = f"listens beyond this computer; security: {kind}"
     if kind == "none":
         return warn(
-            f"{found}: anybody who can connect may send maps, poses and commands",
+            f"{found}: every program that can connect may send maps, poses and commands",
             "choose bus.security.kind tls, or use a private network",
             details,
         )
@@ -55,7 +55,7 @@ def roles(context: CheckContext) -> Finding:
     """Check that each role has a name."""
     security = context.config.bus.security
     if security.kind == "none":
-        return ok("no roles: anybody who can connect may do everything")
+        return ok("no roles: every program that can connect may do everything")
     names = security.names()
     details = [
         f"{role} ({', '.join(who) or 'none'}): {ROLES[role].description}"
@@ -73,7 +73,7 @@ def roles(context: CheckContext) -> Finding:
             details,
         )
     count = len({name for who in names.values() for name in who})
-    return ok(f"names with a role: {count}; everybody else may do nothing", details)
+    return ok(f"names with a role: {count}; all others may do nothing", details)
 
 
 def _reach(endpoint: str) -> str:
@@ -133,7 +133,7 @@ def secret_files(context: CheckContext) -> Finding:
         details.append(f"{path}: {stat.filemode(mode)}")
     command = "chmod 600 " + " ".join(map(str, paths))
     if modes & (stat.S_IROTH | stat.S_IWOTH):
-        return fail("can be read by everybody on this computer", command, details)
+        return fail("can be read by all users of this computer", command, details)
     if modes & (stat.S_IRGRP | stat.S_IWGRP):
         return warn("can be read by their group", command, details)
     return ok("read by their owner alone", details)

@@ -100,7 +100,7 @@ def session(context: CheckContext) -> Finding:
     silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
     details += [f"{endpoint}: no answer" for endpoint in silent]
     if len(silent) == len(bus.connect) > 0:
-        # A client with credentials ends, as these may be what is wrong; a service starts it again.
+        # A client with credentials exits, as they may be wrong; a service restarts it.
         ends = bus.mode == "client" and bus.security.kind != "none"
         make, then = (fail, "does not start") if ends else (warn, "waits for it")
         found = f"no answer at {', '.join(silent)}: the daemon {then}"
@@ -139,7 +139,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
         # Each link of a chain of transforms has a publisher of its own.
         chained |= {ros.input_key(topic) for topic in poses if topic.schema == TF_MESSAGE}
     elsewhere = MapsElsewhere(bus, wanted["map"])
-    heard = _listen(bus, wanted, listen_s, chained)
+    received = _listen(bus, wanted, listen_s, chained)
     alive = bus.alive(f"{keys.base}/{VERSION}/*/alive", ASK_S)
     others = sorted(key.split("/")[-2] for key in alive if key != keys.of(topics.ALIVE))
     details = [f"other robots: {', '.join(others)}"] if others else []
@@ -147,12 +147,12 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     claims = claims_in(bus.alive(keys.of(topics.CLAIM), ASK_S))
     details += [f"daemon {own} {stand}" for own, stand in sorted(claims.items())]
     status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
-    for kind, senders in heard.items():
+    for kind, senders in received.items():
         count = senders.total()
         details.append(f"{kind}: {f'{count} in {listen_s:g} s' if count else 'nothing received'}")
-    several = _several(bus, heard)
+    several = _several(bus, received)
     if keys.of(topics.ALIVE) not in alive:
-        found = f"no daemon of robot {keys.robot!r}; {_in_words(heard)}"
+        found = f"no daemon of robot {keys.robot!r}; {_in_words(received)}"
         return warn(f"{found}; {several}", ONE_ONLY, details) if several else ok(found, details)
     if status is None:
         found = "the daemon runs, but does not answer status queries"
@@ -170,8 +170,8 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
         to_do = f"publish on {keys_lacking}"
         if "map" in lacking and elsewhere.places():
             to_do += (
-                ", or take a map that is seen elsewhere: robot.name, bus.base, ros2.domain and "
-                "ros2.namespace say where this one looks"
+                ", or use a map found elsewhere: robot.name, bus.base, ros2.domain and "
+                "ros2.namespace set where this daemon looks"
             )
         return warn(found, to_do, details)
     if status.troubles:
@@ -184,7 +184,7 @@ class MapsElsewhere:
     """Maps that are published under other names than this daemon's.
 
     Args:
-        bus: where to look, from now on.
+        bus: the session to search, from now on.
         own: keys that the daemon's own map may have.
     """
 
@@ -219,12 +219,12 @@ def _listen(
 
     "" stands for unknown sessions, and for those of the keys ``chained``.
     """
-    heard, lock = {kind: Counter[str]() for kind in wanted}, threading.Lock()
+    received, lock = {kind: Counter[str]() for kind in wanted}, threading.Lock()
 
     def counting(kind: str, *, is_chained: bool) -> Callable[[Sample], None]:
         def count(sample: Sample) -> None:
             with lock:
-                heard[kind]["" if is_chained else sample.sender] += 1
+                received[kind]["" if is_chained else sample.sender] += 1
 
         return count
 
@@ -234,20 +234,20 @@ def _listen(
             bus.subscribe(key, take, latched=True)
     time.sleep(listen_s)
     with lock:
-        return {kind: Counter(senders) for kind, senders in heard.items()}
+        return {kind: Counter(senders) for kind, senders in received.items()}
 
 
-def _several(bus: Bus, heard: dict[str, Counter[str]]) -> str:
+def _several(bus: Bus, received: dict[str, Counter[str]]) -> str:
     """Return what comes from several publishers; "" for nothing."""
     counts = {
         kind: sum(1 for each in senders if each and not bus.only_passes_on(each))
-        for kind, senders in heard.items()
+        for kind, senders in received.items()
     }
     return "; ".join(f"{n} publishers of {kind}s" for kind, n in counts.items() if n > 1)
 
 
-def _in_words(heard: dict[str, Counter[str]]) -> str:
-    there = [f"{kind}s" for kind, senders in heard.items() if senders]
+def _in_words(received: dict[str, Counter[str]]) -> str:
+    there = [f"{kind}s" for kind, senders in received.items() if senders]
     return f"{' and '.join(there)} received" if there else "no maps and no poses received"
 
 

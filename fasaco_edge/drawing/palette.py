@@ -20,14 +20,14 @@ COVERED: Colour = (226, 238, 247)
 # Colours by number of visits: two, three, four and more.
 RECOVERED: tuple[Colour, ...] = ((255, 232, 176), (255, 206, 140), (250, 172, 120))
 LEFT_OUT: Colour = (244, 214, 232)
-# Floor that the tool could reach: stronger than the cells left out, of which it may be part.
+# Reachable floor that was not swept: darker than cells left out, as it may lie on them.
 UNSWEPT: Colour = (233, 120, 170)
 UNREACHABLE: Colour = (200, 60, 60)
 
 START: Colour = (13, 128, 92)
 END: Colour = (190, 24, 60)
 
-# Okabe and Ito's colours, safe for colour-blind eyes, without the yellow: it is lost on white.
+# Okabe and Ito's colours, safe for colour-blind eyes, without the yellow: hard to see on white.
 BLUE: Colour = (0, 114, 178)
 VERMILION: Colour = (213, 94, 0)
 GREEN: Colour = (0, 158, 115)
@@ -49,8 +49,8 @@ ROBOTS: tuple[tuple[str, Colour], ...] = (
     ("violet", VIOLET),
 )
 
-# Matplotlib's plasma (CC0) at nine even places of its first four fifths: perceptually
-# uniform, and without the yellow end that is lost on white.
+# Nine colours, evenly spaced over the first four fifths of Matplotlib's plasma (CC0): perceptually
+# uniform, and without the yellow end, which is hard to see on white.
 _GRADIENT = np.array(
     [
         (13, 8, 135),

@@ -143,8 +143,8 @@ class Cancellations:
         return due
 
 
-def said_of(ending: Ending | DockEnding, errors: Mapping[int, str], no_code: str) -> str:
-    """Return what a server says of a goal that failed: code, its name, and its words."""
+def goal_error(ending: Ending | DockEnding, errors: Mapping[int, str], no_code: str) -> str:
+    """Return the error of a failed goal: its code, the code's name, and the server's text."""
     code = f"{ending.code} {errors.get(ending.code, 'no code')}" if ending.code else no_code
     return f"{code}: {ending.message}" if ending.message else code
 
@@ -179,29 +179,29 @@ class ActionClient:
         self._cancellations = Cancellations()
         self._sequence = 0
         self._gid = b""
-        self._roll = None
+        self._token_list = None
         # Replies, from Zenoh's threads.
         self._replies = deque[Callable[[], None]]()
         if ros["kind"] == "rmw_zenoh":
             node = RosNode(self._domain, bus.id, ros["namespace"], ros["node"])
             self._gid = gid_of(f"{node.token}/{action}")
-            self._roll = bus.roll(server_tokens(self._domain, action))
+            self._token_list = bus.token_list(server_tokens(self._domain, action))
 
     @property
     def is_seen(self) -> bool:
         """Whether the graph shows servers, and their types."""
-        return self._roll is not None
+        return self._token_list is not None
 
     def keys(self) -> dict[Call, str]:
         """Return the keys of the server's services; none if the graph shows no server."""
-        if self._roll is None:
+        if self._token_list is None:
             return bridge_keys(self._action)
-        return served_keys(self._domain, self._action, self._roll.there(), self._types)
+        return served_keys(self._domain, self._action, self._token_list.there(), self._types)
 
     def turn(self) -> None:
         """Look for the server and cancel goals, at intervals, and pass on the replies."""
-        if self._roll is not None:
-            self._roll.ask(LOOK_EVERY_S)
+        if self._token_list is not None:
+            self._token_list.ask(LOOK_EVERY_S)
         while self._replies:
             self._replies.popleft()()
         self._cancel()

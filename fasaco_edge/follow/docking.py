@@ -4,7 +4,7 @@ The path ends in front of the dock. There the daemon's state says that the robot
 docking server moves the robot in; before the next path is driven, it moves the robot out again. No
 clock, no session.
 
-``DockingNode`` sends the requests to the server as queries, and takes its replies by cycle.
+``DockingNode`` sends the requests to the server as queries, and handles its replies once a cycle.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fasaco_edge.follow.actions import (
     CancelGoal,
     Request,
     SendGoal,
-    said_of,
+    goal_error,
 )
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.supervision import Supervision
@@ -162,9 +162,9 @@ class Docking:
         elif goal.is_cancelled:
             self._goal = None
         elif ending.status == UNKNOWN:
-            self._fail("it does not know its goal: was it restarted?", now)
+            self._fail("the docking server does not know the goal: was it restarted?", now)
         else:
-            self._fail(said_of(ending, ERRORS, "no code"), now)
+            self._fail(goal_error(ending, ERRORS, "no code"), now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without one: it is asked for again."""

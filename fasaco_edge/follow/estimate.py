@@ -44,7 +44,7 @@ class Limits:
 
     Attributes:
         speed: [m/s].
-        acceleration: up and down [m/s^2].
+        acceleration: and deceleration [m/s^2].
         turn_rate: on the spot [rad/s].
         turn_acceleration: [rad/s^2].
         steered: largest bend that is steered while driving [rad].
@@ -94,8 +94,8 @@ class PoseEstimate:
         self._limits = limits
         self.jump: tuple[float, float] | None = None
         self.delay = FIRST_DELAY_S
-        # By candidate, how unlike the poses are to the commands.
-        self._unlike = [0.0] * len(DELAYS_S)
+        # Mismatch between poses and commands, for each candidate delay.
+        self._mismatches = [0.0] * len(DELAYS_S)
         # The filtered pose, and the arrival of the newest one accepted.
         self._pose, self._pose_at = Pose2D(0.0, 0.0), -math.inf
         self.measured, self.commanded = self._pose, (0.0, 0.0, 0.0)
@@ -105,7 +105,7 @@ class PoseEstimate:
     def take(self, pose: Pose2D, now: float) -> None:
         """Take in a pose on arrival."""
         if now - self._pose_at > FORGET_S:
-            self._believe(pose, pose, now)
+            self._accept(pose, pose, now)
             return
         here = self.at(now - self.delay)
         if _is_near(pose, here):
@@ -113,13 +113,13 @@ class PoseEstimate:
             turn = math.remainder(pose.yaw - here.yaw, math.tau)
             x, y = here.x + share * (pose.x - here.x), here.y + share * (pose.y - here.y)
             blended = Pose2D(x, y, math.remainder(here.yaw + share * turn, math.tau))
-            self._believe(blended, pose, now)
+            self._accept(blended, pose, now)
             return
         self.jump = _apart(pose, here)
         self._agreeing = self._agreeing + 1 if _is_near(pose, self._doubted) else 1
         self._doubted = pose
         if self._agreeing >= AGREEING:
-            self._believe(pose, pose, now)
+            self._accept(pose, pose, now)
 
     def sent(self, command: Command, now: float) -> None:
         """Note the command sent to the base, in force from now on."""
@@ -166,11 +166,11 @@ class PoseEstimate:
             for seconds, command in self._between(self._pose_at - delay, now - delay):
                 turn += seconds * command.turn_rate
                 way += seconds * command.speed
-            unlike = (turned - turn) ** 2 + (went - way) ** 2
-            self._unlike[index] = FORGETTING * self._unlike[index] + unlike
-        self.delay = DELAYS_S[self._unlike.index(min(self._unlike))]
+            mismatch = (turned - turn) ** 2 + (went - way) ** 2
+            self._mismatches[index] = FORGETTING * self._mismatches[index] + mismatch
+        self.delay = DELAYS_S[self._mismatches.index(min(self._mismatches))]
 
-    def _believe(self, pose: Pose2D, measured: Pose2D, now: float) -> None:
+    def _accept(self, pose: Pose2D, measured: Pose2D, now: float) -> None:
         if self._sent and self._pose_at > -math.inf:
             self._measure_delay(measured, now)
             here, (x, y, turned) = self.measured, self.commanded

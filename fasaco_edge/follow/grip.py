@@ -92,10 +92,10 @@ class Grip:
     @property
     def detail(self) -> str:
         """The failed tries in the present direction, in words."""
-        said = f"tried {self._tries.tries(self._toward)} times"
+        text = f"tried {self._tries.tries(self._toward)} times"
         if (least := self._rest.least) >= 2.0 * MOVED_M:
-            said += f"; poses scatter: goes on once moved by {least:.1f} m"
-        return said
+            text += f"; poses scatter: goes on once moved by {least:.1f} m"
+        return text
 
     def is_lost(self, estimate: PoseEstimate, toward: float, now: float) -> bool:
         """Return whether the robot must pause because it did not move.

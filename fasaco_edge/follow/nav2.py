@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, said_of
+from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, goal_error
 from fasaco_edge.follow.pieces import (
     COAST_M,
     LEAST_M,
@@ -184,12 +184,12 @@ class Nav2Follower(Supervision):
             else:
                 path.finish(goal)
         elif ending.status == ABORTED:
-            self._fail(State.GIVEN_UP, said_of(ending, ERRORS, NO_CODE), now)
+            self._fail(State.GIVEN_UP, goal_error(ending, ERRORS, NO_CODE), now)
         elif ending.status == CANCELED:
             self._is_canceled = True
             self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)
         else:
-            self._fail(State.NO_NAV2, "it does not know its goal: was it restarted?", now)
+            self._fail(State.NO_NAV2, "Nav2 does not know the goal: was it restarted?", now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without one; if soon, the server is gone."""

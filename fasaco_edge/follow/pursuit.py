@@ -26,8 +26,8 @@ ARRIVED_M = 0.005
 ALIGNED_RAD, MISALIGNED_RAD = 0.03, 0.2
 # Near a half turn, the robot keeps its direction of turning [rad].
 BACK_RAD = 2.8
-# A cycle counts as at most this many periods long; factor of the largest expected delay from one
-# cycle to the next.
+# A cycle counts as at most this many periods long; decay of the expected delay from one cycle to
+# the next.
 MOST_PERIODS = 4.0
 FORGETTING = 0.98
 
@@ -48,7 +48,7 @@ class Pursuit:
     def __init__(self, limits: Limits, period: float) -> None:
         self._limits = limits
         self._period = period
-        # Whether the robot turns on the spot; and whether the route leads where it cannot turn to.
+        # Whether the robot turns on the spot; and whether it cannot steer to the route.
         self._is_turning, self.is_lost = True, False
         # Time since the last command, and the delay to expect of the next one [s].
         self._seconds, self._late = period, 0.0
@@ -74,7 +74,7 @@ class Pursuit:
         return self.last
 
     def steer(self, pose: Pose2D, route: Route, most: float = math.inf) -> Command:
-        """Return the next command, at most so fast [m/s]; ``STAND`` once the route is driven."""
+        """Return the next command, up to ``most`` [m/s]; ``STAND`` once the route is driven."""
         limits, here, self.is_lost = self._limits, (pose.x, pose.y), False
         route.pass_bends(here)
         # Half a cycle early, so that the robot turns in the middle of a cycle, not after it.
@@ -165,8 +165,8 @@ class Pursuit:
         return limited(last, turn_rate, self._limits.turn_acceleration * seconds)
 
 
-# A curve leads elsewhere where the point ahead is farther off the heading; on it, it is by a third
-# of that [rad].
+# With the point ahead further off the heading than this, the robot has lost the curve [rad]; on the
+# curve it is a third of this at most.
 BESIDE_RAD = math.radians(60.0)
 # On a curve the point ahead is at most this far away [turning radii]: arcs are hardly cut.
 MOST_AHEAD = 0.7
@@ -176,9 +176,9 @@ class CurvePursuit(Pursuit):
     """Drives along curves: pure pursuit by a base that cannot turn on the spot.
 
     No arc is tighter than the base's turning radius, and legs may be driven backward: then the
-    point ahead on the path lies behind the robot, and it steers as if it looked there; ``last`` has
-    the speed in the direction of driving. It comes to rest where the path changes between forward
-    and backward.
+    point ahead on the path lies behind the robot, and it steers as if it faced that point;
+    ``last`` has the speed in the direction of driving. It comes to rest where the path changes
+    between forward and backward.
     """
 
     def __init__(self, limits: Limits, period: float) -> None:

@@ -25,7 +25,7 @@ JOIN_WITHIN_M = 0.3
 # one of them is this near [m].
 BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
-# A path that begins on the last one at a distance ahead between these is a continuation [m].
+# A path is a continuation if it begins on the last one, between these distances ahead [m].
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
 # A corner, or the place where a turn begins, was overshot by more than this [m].
 MISSED_M = 0.03
@@ -38,7 +38,7 @@ CHORD_M = 0.06
 class Joining(enum.Enum):
     """How a new path can be joined."""
 
-    JOINED = "it is"
+    JOINED = "joined"
     AT_REST = "once the robot stands"
     ELSEWHERE = "not from here"
 
@@ -47,10 +47,10 @@ class Route:
     """A path, read as far as it is needed, and the leg of it that the robot is on."""
 
     def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
-        # Greatest speed in the corner that the robot rounds to its leg; 0 for none [m/s].
+        # Greatest speed in the corner that leads to the robot's leg [m/s]; 0 if it rounds none.
         self.rounds = 0.0
         self._limits = limits
-        # The first leg is the one that the robot is on; those that are not needed yet are coming.
+        # Legs read so far, the first is the one that the robot is on; and those still to be read.
         self._legs: list[Leg] = []
         self._coming = self._legs_along(poses)
         # How far the robot was from the corner that it returns to; infinity if it does not return
@@ -199,7 +199,7 @@ class Route:
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
         """Return the legs up to a point that they pass soon; none if they do not.
 
-        None either for a robot that is off its leg, as the leg does not lead it there.
+        A robot that is off its leg gets none, too: the leg does not lead it there.
         """
         way = 0.0
         for index, leg in enumerate(self._ahead()):
@@ -229,7 +229,7 @@ class Route:
         raise AssertionError("the last leg does not bend")
 
     def _ahead(self) -> Iterator[Leg]:
-        """Yield the legs, from that of the robot on."""
+        """Yield the legs, from the one that the robot is on."""
         index = 0
         while (leg := self._leg(index)) is not None:
             yield leg
@@ -253,7 +253,7 @@ class Route:
         return leg_between((start.x, start.y), (end.x, end.y))
 
     def _ending(self, leg: Leg, after: Leg) -> Leg:
-        """Return a leg with what the robot does at its end, where it goes on to another one."""
+        """Return a leg with the speed in the corner at its end, and where the robot turns."""
         turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
         room = 0.5 * min(leg.length, after.length)
         most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
@@ -261,7 +261,7 @@ class Route:
 
 
 class CurveRoute(Route):
-    """A curve, and the leg of it that a robot is on that cannot turn on the spot.
+    """A curve for a robot that cannot turn on the spot, and the leg of it that the robot is on.
 
     Its legs are chords of arcs, and lanes; the robot steers from each to the next. It comes to rest
     only where it changes between forward and backward: a leg is driven backward if the path's

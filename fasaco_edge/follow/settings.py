@@ -46,15 +46,15 @@ class FollowSettings:
         frame: of a TwistStamped, the robot's own.
         cmd_key: key of the velocities.
         ros: kind, domain, namespace, name of the node and topic, if ``cmd_key`` is ROS 2's.
-        nav2: if Nav2's controller drives: name of its action, release, names of plugins, and least
-            distance of goals to themselves [m].
+        nav2: if Nav2's controller drives: name of its action, release, names of plugins, and the
+            least distance between separate stretches of one goal's path [m].
         dock: if Nav2's docking server docks: names of its actions, dock, its type, frame, pose x,
             y [m], yaw [rad], and how far in front of it paths end [m].
         scan: if scans are used: where the lidar is (``mount``),
             ``lost_s``, ``free_at_most``, ``most_pixels`` of a map, and further topics of scans,
             maps and updates: name, key, whether it is latched, depth.
         radius_m: of the robot's disc; 0 if unknown.
-        pace: simulated seconds in a second.
+        pace: simulated seconds per second.
         dry_run: report commands instead of sending them.
     """
 
@@ -84,7 +84,7 @@ class FollowSettings:
 
     @classmethod
     def decode(cls, document: bytes) -> FollowSettings:
-        """Return what ``encode`` made."""
+        """Return the settings in a document of ``encode``."""
         members = json.loads(document)
         members["poses"] = tuple(PoseSource(**source) for source in members["poses"])
         members["limits"] = Limits(**members["limits"])

@@ -200,7 +200,7 @@ def _look_at(
         raise UntrustedFileError(f"{place} belongs to {_user(status.st_uid)}")
     # Entries of an access control list show in the bits of the group.
     if status.st_mode & _OTHERS_WRITE and not may_write:
-        who = "everybody" if status.st_mode & stat.S_IWOTH else "its group"
+        who = "all users" if status.st_mode & stat.S_IWOTH else "its group"
         raise UntrustedFileError(f"{place} may be written by {who}")
 
 

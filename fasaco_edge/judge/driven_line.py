@@ -33,7 +33,7 @@ class DriveLimits:
     """Limits of a robot's motion, beside its speed.
 
     Attributes:
-        acceleration_m_s2: of driving, up and down.
+        acceleration_m_s2: acceleration and deceleration of driving.
         turn_deg_s, turn_deg_s2: rate of turning on the spot, and its acceleration.
         steered_deg: a bend up to this is steered without a stop.
     """

@@ -53,7 +53,7 @@ class PassPlans:
 
     @property
     def names(self) -> list[str]:
-        """What is special about each pass, as text."""
+        """Name of each pass."""
         return [each.name or "auto" for each in self.passes]
 
     @cached_property
@@ -73,7 +73,7 @@ class PassPlans:
         judged = judged_floor(first.map.grid, self.xy, first.robot)
         if judged is None:
             return None
-        # The least time is that of one pass.
+        # A lower bound of the time is known for single passes only.
         return replace(judged.figures, least_s=0.0)
 
     @property
@@ -95,7 +95,7 @@ class PassPlans:
         }
 
     def plot(self, file: str | Path | None = None) -> Image.Image:
-        """Return a picture, RGB, with the passes side by side; as PNG, too."""
+        """Return an RGB picture of the passes side by side; also write it to ``file`` as PNG."""
         count, pairs = len(self.plans), zip(self.names, self.plans, strict=True)
         pictures = [
             picture_of(plan, f"pass {number} of {count}, {name}: ")
@@ -136,13 +136,13 @@ def plan_passes(
         end: where the last pass ends: "anywhere", "home", or a cell.
 
     Raises:
-        BadConfiguration: a value is impossible, also those that ``plan`` raises.
+        BadConfiguration: a value is invalid; further errors are those of ``plan``.
     """
     robot = RobotConfig() if robot is None else robot
     if robot.turn_radius_m > 0.0:
         raise BadConfiguration(
-            "several passes are planned for a robot that turns on the spot alone",
-            hint="plan each pass by itself, with the radius; a mission drives them in one go",
+            "several passes are only planned for a robot that turns on the spot",
+            hint="plan each pass separately; a mission drives one after the other",
         )
     asked = tuple(read_pass(each) if isinstance(each, str) else each for each in passes)
     plans: list[Plan] = []
@@ -177,7 +177,7 @@ def _at_speed(robot: RobotConfig, speed_m_s: float | None) -> RobotConfig:
     """Return a robot that drives at a speed [m/s].
 
     Raises:
-        BadConfiguration: it cannot drive so fast.
+        BadConfiguration: the speed exceeds the robot's.
     """
     if speed_m_s is None:
         return robot

@@ -97,7 +97,7 @@ def plan(
             once at the end of colony-search; not by planners without pheromone.
 
     Raises:
-        BadConfiguration: a value is impossible.
+        BadConfiguration: a value is invalid.
         StartOutsideMap, StartBlocked, EndBlocked: the robot cannot stand there.
         NothingToCover: no cell is coverable.
         PlannerFailed, IllegalWalk: raised by a planner of your own.
@@ -178,7 +178,7 @@ def checked(robot: RobotConfig) -> RobotConfig:
     """Return a robot after checking its values.
 
     Raises:
-        BadConfiguration: one is impossible; the error names it.
+        BadConfiguration: one is invalid; the error names it.
     """
     try:
         members = msgspec.structs.asdict(robot).items()

@@ -49,7 +49,7 @@ class Search:
             worth.
 
     Raises:
-        BadConfiguration: a value is impossible.
+        BadConfiguration: a value is invalid.
     """
 
     planner: str = "colony-search"
@@ -96,7 +96,7 @@ class Search:
         """Return the configuration of the colony.
 
         Raises:
-            BadConfiguration: a value is impossible.
+            BadConfiguration: a value is invalid.
         """
         q0 = SEARCH_Q0 if self.has_local_search else PAPER_Q0
         return ColonyConfig(

@@ -1,7 +1,7 @@
 """Replay by cycles of the recorded daemon's loop: the same decisions bit for bit.
 
 The turn log has the inputs of each cycle of the daemon's loop, with times; plans are stopped at the
-same stop checks as then. The replay ends at the first cycle with a different decision.
+same stop checks as in the recording. The replay ends at the first cycle with a different decision.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from fasaco_edge.wire.topics import TURNS
 
 # A sample that waits longer than this was taken in no cycle [ns].
 KEPT_NS = 60_000_000_000
-# The log comes twice a second: this long after its end nothing else should come [ns].
+# The log comes twice a second: no sample should come later than this after its end [ns].
 SILENT_NS = 5_000_000_000
 
 
@@ -72,12 +72,12 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
     beginning: LogStart | None = None
     kernels, turns, gap = "", 0, ""
     taken: set[tuple[str, int]] = set()
-    told_ns = heard_ns = 0
+    log_ns = sample_ns = 0
     for arrival in samples:
         if arrival.topic != TURNS.name:
-            heard_ns = arrival.wall_ns
+            sample_ns = arrival.wall_ns
             continue
-        told_ns = arrival.wall_ns
+        log_ns = arrival.wall_ns
         try:
             batch = decode_turns(arrival.sample.payload)
         except MalformedMessage as error:
@@ -88,7 +88,7 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
             if beginning is None:
                 return None
         elif batch.beginning is not None:
-            gap = "another daemon began"
+            gap = "another daemon started"
             break
         if batch.first != turns + 1:
             gap = f"turns {turns + 1} to {batch.first - 1} are not in the recording"
@@ -98,8 +98,8 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
         taken.update((s.topic, s.checksum) for turn in batch.turns for s in turn.samples)
     if beginning is None:
         return None
-    if heard_ns - told_ns > SILENT_NS:
-        gap = gap or f"the log ends {1e-9 * (heard_ns - told_ns):.1f} s before the recording"
+    if sample_ns - log_ns > SILENT_NS:
+        gap = gap or f"the log ends {1e-9 * (sample_ns - log_ns):.1f} s before the recording"
     return CycleRecord(beginning, kernels, turns, gap, frozenset(taken))
 
 
@@ -149,7 +149,7 @@ def inflated_sample(told: EarlySample) -> Sample:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A difference to the recording.
+    """A difference from the recording.
 
     Attributes:
         turn: number of the cycle.
@@ -173,9 +173,9 @@ class CycleReplay:
         record: the content of its turn log.
 
     Attributes:
-        mission: the mission, to be looked at between steps.
+        mission: the mission, for inspection between steps.
         turns: how many cycles were played and ended as recorded.
-        plans: how many plans were made, those in spare time among them.
+        plans: how many plans were made, including those in spare time.
         difference: the first decision or sample that differs; None without one.
         kernels: name of the compiled kernels in use.
     """

@@ -63,7 +63,7 @@ class MissionDrive:
         rooms: the rooms that it begins with; None for none.
 
     Attributes:
-        mission: the mission, to be looked at between cycles.
+        mission: the mission, for inspection between cycles.
         planner: the planner that the daemon would use.
         mailbox: where samples wait, without rate limits.
         began: time of the first cycle [s].

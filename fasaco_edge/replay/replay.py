@@ -132,7 +132,7 @@ class Replay:
         work: proposals of each plan.
 
     Attributes:
-        mission: the mission, to be looked at between steps.
+        mission: the mission, for inspection between steps.
     """
 
     def __init__(

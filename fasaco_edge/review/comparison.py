@@ -30,7 +30,7 @@ SETTINGS = {
 }
 # If these differ, floor, cells and times belong to different problems.
 ANOTHER_PROBLEM = ("tool width", "robot radius", "overlap", "line", "building", "orders")
-# Maps of one building from two missions differ by less: its sides [m].
+# Sides of one building differ by less than this between the maps of two missions [m].
 SIDE_M = 1.0
 
 Difference = tuple[str, str, str]
@@ -49,23 +49,23 @@ NUMBERS = (
     ("replan, p99", "replan_ms_p99", "ms"),
     ("replan, slowest", "replan_ms_max", "ms"),
     ("plans made", "plans", ""),
-    ("plans that became no path", "plans_unused", ""),
+    ("plans not used", "plans_unused", ""),
     ("attempts at a better path", "attempts", ""),
-    ("attempts that found one", "attempts_used", ""),
-    ("memory of the daemon, most", "memory_mb_max", "MB"),
-    ("memory of the recorder, most", "recorder_memory_mb_max", "MB"),
+    ("attempts that succeeded", "attempts_used", ""),
+    ("peak memory of the daemon", "memory_mb_max", "MB"),
+    ("peak memory of the recorder", "recorder_memory_mb_max", "MB"),
     ("processor time of the daemon", "processor_s", "s"),
     ("processor time of the recorder", "recorder_processor_s", "s"),
-    ("processor time, most", "processor_percent_max", "% of a core"),
+    ("peak processor load", "processor_percent_max", "% of a core"),
     ("messages refused", "faults", ""),
     ("lost by the recorder", "recorder_lost", "samples"),
     ("samples missing", "samples_missing", ""),
 )
-"""Names of figures, the members of the document they are, and their units."""
+"""Name of each figure, its member of ``ReviewDocument``, and its unit."""
 
 
 def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
-    """Return the differences of two runs' set-ups; what is not recorded of one does not count."""
+    """Return the differences of two runs' set-ups; a setting that one lacks does not count."""
     found = []
     for name, mine, theirs in (
         ("robot", one.robot, other.robot),
@@ -84,14 +84,14 @@ def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Differ
 
 
 def other_problem(setup: list[Difference]) -> str:
-    """Return what makes two runs ones of different problems; "" for nothing."""
+    """Return the differences by which two runs solve different problems; "" for none."""
     return ", ".join(name for name, _, _ in setup if name in ANOTHER_PROBLEM)
 
 
 def setup_words(setup: list[Difference]) -> str:
-    """Return a sentence on whether two runs compare."""
+    """Return a sentence on whether the figures of two runs can be compared."""
     if other := other_problem(setup):
-        return f"These are not two runs of one problem: {other} differ, and figures with them."
+        return f"The figures cannot be compared: {other} differ."
     return "They had different setups:" if setup else "Both had the same setup."
 
 

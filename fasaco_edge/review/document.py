@@ -123,10 +123,10 @@ class ReviewDocument(msgspec.Struct):
             itself, from where the robot was then: planned_steps, lower_bound_steps, cost_s (driving
             it, by the configuration), lower_bound_cost_s and gap (cost_s over that bound, as a
             share of it); changed, the changed rectangle of the map that caused it [m].
-        plans, plans_unused: by the daemon's count: all plans; plans that became no path, as they
+        plans, plans_unused: by the daemon's count: all plans; plans that were not used, as they
             equalled the current one or were outdated.
         attempts, attempts_used: plans made to improve the path; those that did.
-        memory_mb_max, recorder_memory_mb_max: most memory of daemon and recorder [MB].
+        memory_mb_max, recorder_memory_mb_max: peak memory of daemon and recorder [MB].
         processor_s, recorder_processor_s: total processor time of daemon and recorder, by the
             computer's clock [s].
         processor_percent_max, threads_max: of the daemon: processor time over half a minute [% of a

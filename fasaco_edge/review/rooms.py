@@ -1,4 +1,4 @@
-"""The rooms of a recording, one section each: the time in it, what was swept and what was left."""
+"""The rooms of a recording, one chapter each: the time in it, what was swept and what was left."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def state(
     ordered: Status | None = None,
     order: dict[str, Any] | None = None,
 ) -> Digest:
-    """Return the content of the newest status, and why there is none.
+    """Return the content of the newest status; ``absent`` says why there is no newer one.
 
     Args:
         view: of the robot.
@@ -129,9 +129,9 @@ def _absent(view: RobotState, now: float) -> str:
         gone = phrases.age(round(now - view.gone_since))
         return f"The robot has been gone for {gone}: is it switched on?"
     if not view.is_here:
-        return f"There is no robot of the name {view.robot} yet: is it switched on?"
+        return f"No robot named {view.robot} has been found yet: is it switched on?"
     if view.status is None:
-        return "The robot has said nothing yet"
+        return "The robot has sent nothing yet"
     silent = view.silent_s(now)
     return f"The robot has been silent for {phrases.age(round(silent))}" if silent else ""
 
@@ -157,8 +157,8 @@ def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
     path = status.path
     left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)
     if path is not None and not path.steps:
-        # A paused robot goes on with the way that it has left. Without that way, as after a restart
-        # of this server, only the daemon knows how long it takes; else it stands by command.
+        # A paused robot continues on its last path. Without that path, as after a restart of this
+        # server, only the daemon knows how long it takes. In any other state it drives nowhere.
         is_paused = status.state == "paused"
         left_s = (left_s or path.line_s or None) if is_paused else None
     return None if left_s is None or left_s > MOST_TO_GO_S else round(left_s)
@@ -188,13 +188,13 @@ def _mission(mission: MissionReport) -> Digest:
 
 
 def _again(mission: MissionReport, order: dict[str, Any] | None) -> Digest | None:
-    """Return an order that is over, to be given again; None while none is known to be over.
+    """Return the last order, if it is over, so that the user can repeat it; else None.
 
-    It is empty if it is what Start does.
+    It is empty if Start gives the same order.
     """
     if order is None or (mission.ordered is not None and mission.stage != "over"):
         return None
-    # A room may have another outline by now: its number is enough.
+    # The outline of a room may have changed since: its number is enough.
     given = order.get("zones")
     zones = [
         {name: value for name, value in zone.items() if name != "polygon" or "room" not in zone}
@@ -255,7 +255,7 @@ def areas(settings: KnownSettings, report: MissionReport) -> Digest:
 
 
 def _areas(found: Iterable[tuple[str, Corners, str]]) -> Iterator[Digest]:
-    """Yield areas, by name, polygon and kind, that can be drawn, up to a limit."""
+    """Yield the areas (name, polygon, kind) that can be drawn, up to a limit."""
     drawn = (area for area in found if _is_polygon(area[1]))
     for name, polygon, kind in islice(drawn, 2 * MOST_AREAS):
         yield {"name": name, "polygon": polygon, "is": kind}
@@ -270,7 +270,7 @@ def _is_polygon(corners: Corners) -> bool:
 def lately(events: EventLog) -> list[Digest]:
     """Return the newest entries, the newest first."""
     entries = list(events.entries)[-MOST_ENTRIES:]
-    # The wall clock's time; entries keep a monotonic time.
+    # The page shows wall-clock times; entries have monotonic ones.
     offset = time.time() - phrases.steady_now()
     return [
         {"at_s": round(entry.at_s + offset, 1), "text": entry.text, "tone": entry.tone}

@@ -56,7 +56,7 @@ class Guard:
         return True
 
     def to_look_only(self) -> Guard:
-        """Return a guard under which all clients may only look."""
+        """Return a guard under which all clients may only view."""
         tokens: tuple[tuple[Role, str], ...] = tuple(("viewer", token) for _, token in self.tokens)
         return Guard(self.names, tokens)
 

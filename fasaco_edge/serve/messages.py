@@ -93,8 +93,8 @@ def message_text(kind: str, **members: object) -> str:
 
 def framed(kind: str, head: dict[str, object], body: bytes) -> bytes:
     """Return a message with a body: the length of its head (uint32), its head as JSON, the body."""
-    said = message_text(kind, **head).encode()
-    return _LENGTH.pack(len(said)) + said + body
+    encoded = message_text(kind, **head).encode()
+    return _LENGTH.pack(len(encoded)) + encoded + body
 
 
 def _cleaned(value: Any) -> Any:  # noqa: ANN401 - any JSON

@@ -21,7 +21,7 @@ WORDS = {
     "blocked": "waiting",
     "degraded": "needs help",
 }
-"""One word for each state that does not say it itself."""
+"""One word for each state whose own name is not plain."""
 DOES = {
     "idle": "Ready to sweep",
     "waiting for map": "Waits for its map of the rooms",
@@ -31,7 +31,7 @@ DOES = {
     "done": "Done",
     "blocked": "Cannot go on just now",
 }
-STUCK = "Something closes its way: open doors and clear the floor. It tries again by itself."
+STUCK = "Something blocks its way: open doors and clear the floor. It tries again by itself."
 UNKNOWN_ROOM = (
     "It knows no room of that name yet. Tap the room on the map and name it, or end the work."
 )
@@ -40,7 +40,7 @@ NEEDS = {
     "call service.",
     "no_pose": "It has lost its place. Put it where it started; if that does not help, "
     "call service.",
-    "pose_jumped": "It finds its place again: wait a moment. If it goes on like this, "
+    "pose_jumped": "It is finding its place again: wait a moment. If that does not help, "
     "call service.",
     "no_map": "It gets no new picture of the rooms. Switch it off and on; if that does not help, "
     "call service.",
@@ -49,13 +49,13 @@ NEEDS = {
     "no_current": "It stands in its dock and does not charge. Check the plug, and how it stands.",
     "shut_in": "It is shut in. Open the door, or move what is in its way.",
     "blocked": "Something is in its way: clear it if you can. It sweeps elsewhere meanwhile.",
-    "stands": "It does not get on. Look what holds it: a cable, a carpet, furniture.",
+    "stands": "It does not move. Check whether a cable, a carpet or furniture holds it.",
     "beside_line": "It drives beside its path and may leave strips. Call service.",
-    "two_publishers": "Two programs tell it different things. Call service.",
+    "two_publishers": "Two programs send it different maps or places. Call service.",
     "no_effect": "A keep-out, its home or its dock lies where it has seen no floor. Check the map.",
 }
 """What the owner can do, by the code of a trouble."""
-UNSAVED = "It cannot save what it has swept: after a power cut it would begin anew. Call service."
+UNSAVED = "It cannot save what it has swept: after a power cut it would start over. Call service."
 
 # Floor that is still to come, in the words of ``floor.left``.
 TO_COME = ("on the path", "to come", "not planned yet")
@@ -77,9 +77,9 @@ LEFT = {
 TRIED, OTHERWISE = "left over after", "for another reason"
 NOT_REACHED = "it could not get there"
 ENDED = "the work was ended before it got there"
-# Much floor is left, or passed without a trace, if the robot's place is not known often enough.
+# If poses come too seldom, much floor is left, or not known to be swept.
 FAR_APART = "poses are too far apart"
-SELDOM = "it may have missed that: its place was known too seldom"
+SELDOM = "it may have missed that: its place was not known often enough"
 # Share of the floor in reach above which that is so.
 MUCH = 0.1
 PASSED, BESIDE = 8, 16
@@ -123,7 +123,7 @@ def does(status: Status) -> str:
 
 
 def last_seen(status: Status) -> str:
-    """Return what a robot did that nothing is known of now."""
+    """Return what the robot did when it was last seen."""
     did = does(status)
     return f"When last seen: {did[:1].lower()}{did[1:]}"
 
@@ -188,7 +188,7 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
     for part in floor.out_of_reach or ():
         _of(found, LEFT.get(part.reason, OTHERWISE), MARKS.get(part.reason, 0)).m2 += part.m2
     for area in mission.unreached.areas:
-        # No spot has two reasons: where the floor is known, cells of it are not counted again.
+        # Where reasons of floor are known, cells are not counted, so that no spot counts twice.
         if floor.left is None or area.reason in NO_FLOOR:
             is_tried = area.reason.startswith(TRIED)
             kind = _of(found, NOT_REACHED if is_tried else LEFT.get(area.reason, OTHERWISE))

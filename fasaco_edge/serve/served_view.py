@@ -105,7 +105,7 @@ class ServedView(RobotState):
         self._made_at = dict.fromkeys(self._makers, float("-inf"))
         # The source of the newest message of each kind.
         self._made_of: dict[str, object] = {}
-        self._said: dict[str, str] = {}
+        self._sent: dict[str, str] = {}
 
     def news(self, now: float) -> dict[str, str | bytes]:
         """Return the messages, by kind, that are due and changed."""
@@ -115,9 +115,9 @@ class ServedView(RobotState):
                 continue
             self._made_at[kind] = now
             message = make(now)
-            if message is not None and message != self._said.get(kind):
+            if message is not None and message != self._sent.get(kind):
                 if isinstance(message, str):
-                    self._said[kind] = message
+                    self._sent[kind] = message
                 found[kind] = message
         return found
 

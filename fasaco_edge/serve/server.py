@@ -21,7 +21,7 @@ from fasaco_edge.host.processes import release_unused
 from fasaco_edge.serve.guard import Guard, is_same_origin
 from fasaco_edge.serve.messages import Role
 from fasaco_edge.serve.page import load_page
-from fasaco_edge.serve.viewer import Source, Viewer, ending_oddities
+from fasaco_edge.serve.viewer import Source, Viewer, closing_on_error
 
 LOG = logging.getLogger(__name__)
 
@@ -133,7 +133,7 @@ class Server:
     async def _attend(self, socket: ServerConnection) -> None:
         viewer = Viewer(socket, self._source_of(), self._guard)
         try:
-            async with ending_oddities(socket):
+            async with closing_on_error(socket):
                 role = await self._greet(viewer, socket)
                 if role is None:
                     return

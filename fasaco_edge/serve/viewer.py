@@ -70,13 +70,13 @@ class Viewer:
     async def greet(self) -> Role | None:
         """Return its role; None if it is rejected."""
         async with asyncio.timeout(HELLO_S):
-            said = from_page(await self._socket.recv())
-        role = self._guard.role_of(said.token) if isinstance(said, Hello) else None
+            first = from_page(await self._socket.recv())
+        role = self._guard.role_of(first.token) if isinstance(first, Hello) else None
         if role is None:
             # Rate limit for guessing tokens: one a second on each connection.
             await asyncio.sleep(REFUSED_S)
             await self._send(
-                message_text("denied", asks=isinstance(said, Hello) and not said.token)
+                message_text("denied", asks=isinstance(first, Hello) and not first.token)
             )
             await self._socket.close(DENIED)
             return None
@@ -120,12 +120,12 @@ class Viewer:
             async with asyncio.timeout(SEND_S):
                 await self._socket.send(message)
         except TimeoutError:
-            LOG.info("a viewer that does not read is dropped")
+            LOG.info("dropped a viewer that does not read")
             self._socket.transport.abort()
 
     async def _carry_out(self, order: Order, role: Role) -> str:
         if role != "operator":
-            why = "this page may only look; its server decides who may command"
+            why = "this page may only view; its server decides who may command"
             return message_text("answer", id=order.id, ok=False, text=why, hint="")
         asked: dict[str, object] = {"command": order.command}
         if order.command == "start":
@@ -142,8 +142,8 @@ class Viewer:
                 return message_text("answer", id=order.id, ok=False, text=why, hint="")
             if found[0].is_error:
                 wrong = decode_tolerant(found[0].payload, Error)
-                said = {"text": wrong.message, "hint": wrong.hint, "code": wrong.code}
-                return message_text("answer", id=order.id, ok=False, **said)
+                failure = {"text": wrong.message, "hint": wrong.hint, "code": wrong.code}
+                return message_text("answer", id=order.id, ok=False, **failure)
             answer = decode_tolerant(found[0].payload, Answer)
         except FasacoError as error:
             return message_text("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
@@ -152,8 +152,8 @@ class Viewer:
 
 
 @contextlib.asynccontextmanager
-async def ending_oddities(socket: ServerConnection) -> AsyncIterator[None]:
-    """Close the connection of a viewer that sends what no page sends, or asks for lost data."""
+async def closing_on_error(socket: ServerConnection) -> AsyncIterator[None]:
+    """Close the connection if the viewer sends an invalid message, or asks for unreadable data."""
     try:
         yield
     except (msgspec.DecodeError, TimeoutError, RecursionError):

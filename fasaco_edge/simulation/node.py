@@ -32,9 +32,9 @@ Driver = Literal["ideal", "follow"]
 CYCLE_S = 0.02
 # Waits are no shorter than this, or a fast simulation would do nothing but wake up [s].
 WAIT_S = 0.004
-# A simulation is behind by so much at most [s].
+# A simulation is never further behind than this [s].
 DEBT_S = 0.1
-# A robot that is silent for this long is no obstacle any more, in real time [s].
+# A robot without a new pose for this long is no longer an obstacle [s, real time].
 CARRIED_AWAY_S = 10.0
 REPORT_EVERY_S = 0.5
 # A robot that is simulated faster than real time waits for a new velocity after this long
@@ -103,7 +103,7 @@ def run_simulation(
             runs slower.
         driver: ideal: it follows paths itself; follow: velocities drive it.
         meets_others: whether other robots on the bus are obstacles.
-        waits: whether it waits until a program listens where it is to connect.
+        waits: whether it waits until a program listens at its endpoint.
         should_stop: called some fifty times a second.
         report: called about twice a second, and at the end.
 
@@ -169,7 +169,7 @@ class RobotOnBus:
                 self.publish(world.tick())
                 pace.ticked(now_s)
             if now_s - self._reported[0] >= REPORT_EVERY_S:
-                self._part(now_s)
+                self._drop_silent(now_s)
                 report(self.progress(now_s))
 
     def publish(self, emission: Emission) -> None:
@@ -196,15 +196,15 @@ class RobotOnBus:
         self._met_at[name] = time.monotonic()
         self._world.others = {**self._world.others, name: (pose.x, pose.y)}
 
-    def _part(self, now_s: float) -> None:
-        """Drop other robots that are silent: they are obstacles no more."""
+    def _drop_silent(self, now_s: float) -> None:
+        """Drop other robots without new poses: they are no longer obstacles."""
         places, met_at = self._world.others, self._met_at
         here = {name: at for name, at in places.items() if now_s - met_at[name] < CARRIED_AWAY_S}
         if len(here) < len(places):
             self._world.others = here
 
     def _waits(self, now_s: float, patience_s: float) -> bool:
-        """Return whether time stands still until a velocity comes."""
+        """Return whether simulated time is stopped until a velocity arrives."""
         is_late = self._world.unanswered_s >= ANSWER_S - 1e-9
         return is_late and now_s - self._took_at < patience_s
 
@@ -230,8 +230,8 @@ class RobotOnBus:
         self._world.follow(path.xy)
 
     def _move(self, sample: Sample) -> None:
-        told = decode_velocity(sample.payload, sample.schema)
-        self._world.move(told.speed_m_s, told.turn_rad_s)
+        velocity = decode_velocity(sample.payload, sample.schema)
+        self._world.move(velocity.speed_m_s, velocity.turn_rad_s)
 
     def progress(self, now_s: float) -> Progress:
         """Return the progress, with the speed achieved since the last call."""

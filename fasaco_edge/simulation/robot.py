@@ -1,4 +1,4 @@
-"""The simulated robot: a differential drive that follows a polyline, and takes up new ones.
+"""The simulated robot: a differential drive that follows a polyline, and changes to new ones.
 
 It drives straight and turns on the spot. The drive is ideal (no slip, no delay), so that a run
 shows effects of the path alone. It comes to rest at every corner: that is the cost of turns.
@@ -26,21 +26,21 @@ MAY_BE_ZERO = ("padding_m", "free_at_most", "turn_radius_m", "battery_min")
 
 # Closer than this the robot is at a corner [m].
 ARRIVED_M = 1e-3
-# A run begins within this heading error, so that it ends within ARRIVED_M of its corner
-# after 10 m; under way a larger one is steered out, and one above MISALIGNED turned out at rest
-# [rad].
+# A run begins at a heading error below this [rad], so that it ends within ARRIVED_M of its corner
+# after 10 m. While driving, larger errors are corrected by steering; those above MISALIGNED_RAD by
+# a turn at rest.
 ALIGNED_RAD = 1e-4
 MISALIGNED_RAD = 0.05
 # A bend below this need not be a corner: the robot steers through it and does not stop [rad].
 STRAIGHT_RAD = 0.02
-# Such a bend is a corner if the straight line past it is farther from it than this [m].
+# Such a bend is a corner all the same if the robot would miss it by more than this [m].
 CUT_M = 0.002
 # A waypoint is driven through if a point of the track is this near [m]: at least half of the
 # track's spacing.
 PASSED_WITHIN_M = 0.02
-# As a last resort the path is joined anywhere in this much of its beginning [m].
+# As a last resort the path is joined anywhere within this distance of its start [m].
 JOIN_WITHIN_M = 2.0
-# Ways back along the track turn off at each of this many last points, and before them at each n-th.
+# A way back may leave the track at each of this many last points, and at every n-th before them.
 BACK_POINTS, BACK_STRIDE = 100, 10
 
 
@@ -53,8 +53,8 @@ class SimulationConfig:
     Attributes:
         speed_m_s: driving speed [m/s].
         turn_rad_s: turning speed in place [rad/s].
-        acceleration_m_s2: of driving, up and down [m/s^2].
-        turn_acceleration_rad_s2: of turning, up and down [rad/s^2].
+        acceleration_m_s2: acceleration and deceleration of driving [m/s^2].
+        turn_acceleration_rad_s2: acceleration and deceleration of turning [rad/s^2].
         robot_radius_m: radius that the planner uses [m].
         padding_m: by how much that radius exceeds the hull's [m]. Only the hull collides: a robot
             as wide as its corridor would touch at the first rounding error.
@@ -63,8 +63,8 @@ class SimulationConfig:
         map_chunk_m: the published map grows by blocks of about this size [m].
         tick_s: the simulation's time step [s].
         scan_hz, map_hz, pose_hz: rates [Hz]; their periods are rounded to whole ticks.
-        turn_radius_m: of the tightest arc that the base drives when told velocities, forward or
-            backward [m]; 0 for a base that turns on the spot, and drives forward alone.
+        turn_radius_m: of the tightest arc that the base drives by velocities, forward or backward
+            [m]; 0 for a base that turns on the spot, and drives only forward.
         battery_min: how long its battery lasts [min]; 0 for unlimited. It charges where the robot
             began.
     """
@@ -133,7 +133,7 @@ class DriveState:
 
 
 def driven(state: DriveState, goal: Point | None, config: SimulationConfig) -> DriveState:
-    """Return the state a tick later, on the way to ``goal`` [m] and to rest there.
+    """Return the state a tick later, for a robot that drives to ``goal`` [m] and stops there.
 
     Without a goal the robot brakes. It drives only while it points at the goal, and
     turns only at rest, except for corrections below MISALIGNED_RAD.
@@ -210,7 +210,7 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     across = runs[:-1, 0] * runs[1:, 1] - runs[:-1, 1] * runs[1:, 0]
     along = (runs[:-1] * runs[1:]).sum(axis=1)
     bend = np.ones(len(points), bool)
-    # How far the robot would pass a corner that it cut.
+    # A robot that steers through a bend misses it by the sine of the bend times the shorter run.
     shorter = np.minimum(lengths[:-1], lengths[1:])
     bend[1:-1] = (
         (np.abs(across) > STRAIGHT_RAD) | (along < 0.0) | (across**2 > (CUT_M / shorter) ** 2)
@@ -260,7 +260,7 @@ def joined(
 
 
 def passed_waypoints(path: NDArray[np.float64], track: NDArray[np.float64]) -> int:
-    """Return how many of the first waypoints the robot drove through, in order; as ``joined``.
+    """Return how many of the first waypoints the robot drove through, in order; see ``joined``.
 
     Counted from its latest visit to the first one: visits before that belong to paths before this
     one.

@@ -29,7 +29,7 @@ LEGEND = (
 )
 FIELD_LEGEND = (
     (picture.FIELD[0], "no path"),
-    (picture.FIELD[len(picture.FIELD) // 2], "past path, or driven"),
+    (picture.FIELD[len(picture.FIELD) // 2], "old path, or driven"),
     (picture.FIELD[-1], "every path"),
     (picture.WALL, "wall"),
     (picture.HEADING, "robot"),
@@ -106,7 +106,7 @@ class Page:
             left = self._blocks.glyphs.lines(drawn)
         if not layout.figures:
             return left
-        # The status is a value: a new one is another object.
+        # A status never changes: a new one is another object.
         key = (view.status, view.rooms, to_go, layout)
         right = self._blocks.keep("figures", key, lambda: self._figures(view, to_go, layout))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
@@ -166,7 +166,7 @@ def headline(view: RobotView, now: float, width: int) -> Text:
             to_go = time_to_go(view, now)
             line.append(f"  path {status.path.revision}")
             line.append(f", {to_go} to go" if to_go else "")
-        # What the robot does looks faster, and the time to go is by the clock.
+        # The robot moves this much faster on the screen; the time to go is in real seconds.
         scale = view.settings.robot.time_scale
         line.append(f"  {scale:g} x real time" if scale != 1.0 else "", "dim")
     return with_keys(line, width, "q quits", "f trail", clock(now))

@@ -54,7 +54,7 @@ POSE = Topic(
     speaker="mapper",
     listeners=("robot", "recorder", "driver"),
     schemas=schemas.POSE_SCHEMAS,
-    qos=Qos("interactive_low", express=True, why="the next pose is better than one sent again"),
+    qos=Qos("interactive_low", express=True, why="the next pose is better than a late one"),
     queues=Queues(daemon=1024, recorder=NEWEST, watch=NEWEST),
     is_input=True,
     limits=("max_coordinate_m", "quaternion_tolerance", "queue_pose"),
@@ -63,7 +63,7 @@ POSE = Topic(
 BATTERY = Topic(
     name="battery",
     direction="in",
-    when="the battery's charge is measured, some times a minute at least",
+    when="the battery's charge is measured, a few times a minute at least",
     speaker="mapper",
     listeners=("robot", "recorder"),
     schemas=(schemas.BATTERY_STATE,),
@@ -88,7 +88,7 @@ KEEP_OUT_MASK = Topic(
 PRIORITY = Topic(
     name="priority",
     direction="in",
-    when="it has become known which floor matters how much, as by a map of dirt",
+    when="the priorities of floor have changed, for example by a map of dirt",
     speaker="mapper",
     listeners=("robot", "recorder"),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -104,7 +104,7 @@ PRIORITY = Topic(
 SCAN = Topic(
     name="scan",
     direction="in",
-    when="the robot's lidar has turned once, five times a second at least; only where the "
+    when="each turn of the robot's lidar, five times a second at least; only where the "
     "configuration has a block `scan`",
     speaker="mapper",
     listeners=("driver",),
@@ -122,7 +122,7 @@ PATH = Topic(
     schemas=(schemas.PATH,),
     attachment="path_attachment.json",
     qos=Qos(
-        "interactive_high", express=True, cache=1, why="a frozen receiver never holds the planner"
+        "interactive_high", express=True, cache=1, why="a frozen receiver never blocks the planner"
     ),
     queues=Queues(recorder=EVERY, watch=64),
     limits=("max_path_poses", "max_coordinate_m"),
@@ -141,8 +141,8 @@ COVERAGE = Topic(
 FLOOR = Topic(
     name="floor",
     direction="out",
-    when="floor was swept, every two seconds at most; again after ten seconds; only while someone "
-    "listens",
+    when="floor was swept, every two seconds at most; again after ten seconds; only while there is "
+    "a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -153,8 +153,8 @@ FLOOR = Topic(
 UNSWEPT = Topic(
     name="unswept",
     direction="out",
-    when="floor was swept, or another reason holds for it, every two seconds at most; again after "
-    "ten seconds; only while someone listens",
+    when="floor was swept, or is left for another reason, every two seconds at most; again after "
+    "ten seconds; only while there is a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -166,7 +166,7 @@ PHEROMONE = Topic(
     name="pheromone",
     direction="out",
     when="the trail has changed, twice a second at most; again after ten seconds; only while "
-    "someone listens",
+    "there is a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.PHEROMONE_GRID,),
@@ -178,7 +178,7 @@ PHEROMONE = Topic(
 DIRECTIONS = Topic(
     name="directions",
     direction="out",
-    when="with each field of the living trail, only while someone listens",
+    when="with each field of the living trail, only while there is a subscriber",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -224,9 +224,8 @@ COMMAND = Topic(
 TURNS = Topic(
     name="turns",
     direction="out",
-    when=(
-        "turns were made, twice a second at most, and only while someone listens from the beginning"
-    ),
+    when="the loop has run, twice a second at most; only while a subscriber gets it from the first "
+    "cycle on",
     speaker="robot",
     listeners=("recorder",),
     json="turns.json",
@@ -243,7 +242,7 @@ FLEET = Topic(
     # Robots share an area by these messages; it is also received from the keys of other robots.
     listeners=("fleet", "viewer"),
     json="fleet.json",
-    qos=Qos("data_low", why="the next one says it all again, within a second"),
+    qos=Qos("data_low", why="the next one repeats all of it, within a second"),
     rate_hz=1.0,
     queues=Queues(daemon=64),
     limits=(
@@ -300,15 +299,13 @@ CMD_VEL = Topic(
     speaker="driver",
     listeners=("viewer",),
     schemas=schemas.TWIST_SCHEMAS,
-    qos=Qos(
-        "interactive_high", express=True, why="the next velocity is better than one sent again"
-    ),
+    qos=Qos("interactive_high", express=True, why="the next velocity is better than a late one"),
 )
 BLOCKED = Topic(
     name="blocked",
     direction="out, by the follower",
-    when="once a second while the follower has stood for some seconds for what keeps it from "
-    "driving its path",
+    when="once a second while the follower cannot drive along its path, some seconds after it has "
+    "stopped",
     speaker="driver",
     listeners=("robot", "viewer"),
     json="blocked.json",

@@ -56,7 +56,7 @@ def tls(files, **more):
 
 def test_without_a_file_everything_is_as_it_should_be():
     ended = fasaco_edge("doctor")
-    assert "tcp/127.0.0.1:7447: from this computer, by anybody there" in ended.out
+    assert "tcp/127.0.0.1:7447: from this computer, without authentication" in ended.out
     told = [line.split(maxsplit=1) for line in ended.out.splitlines() if line[0] > " "]
     # Somebody else of this computer may have the port by default.
     own = [name for name in OF_CONFIG if name not in ON_THE_BUS]
@@ -92,8 +92,10 @@ def test_what_is_open_to_everyone_is_told(doctor, anywhere):
     told, code = doctor(listen=[anywhere], open_to_everyone=True)
     assert code == 0
     assert told["endpoints"]["level"] == "warn"
-    assert "anybody who can connect may send maps" in told["endpoints"]["found"]
-    assert told["endpoints"]["details"] == [f"{anywhere}: from other computers, by anybody there"]
+    assert "every program that can connect may send maps" in told["endpoints"]["found"]
+    assert told["endpoints"]["details"] == [
+        f"{anywhere}: from other computers, without authentication"
+    ]
 
 
 @needs_openssl

@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from fasaco_edge.cli.console.logs import OneOfAKind
+from fasaco_edge.cli.console.logs import RateLimiter
 
 
 class Storm:
@@ -19,7 +19,7 @@ class Storm:
         target = logging.Handler()
         target.emit = self._hear
         self.log = logging.Logger("storm")
-        self.handler = OneOfAKind(target, lambda: self.now)
+        self.handler = RateLimiter(target, lambda: self.now)
         self.log.addHandler(self.handler)
 
     def fault(self, text: str, code: str = "malformed") -> None:

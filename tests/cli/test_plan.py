@@ -420,14 +420,14 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         *((f"--clearance={m}", "--clearance: expected float") for m in ("1.1", "-0.1", "nan")),
         *((f"--overlap={m}", "--overlap: expected float") for m in ("0.9", "-0.1", "nan")),
         *((f"--turn-radius={m}", "--turn-radius: expected float") for m in ("21", "-1", "nan")),
-        ("--line cells --turn-radius 0.3", "has turns on the spot alone"),
-        ("--robots 0,0 5,5 --turn-radius 0.3", "has turns on the spot alone"),
+        ("--line cells --turn-radius 0.3", "only has turns on the spot"),
+        ("--robots 0,0 5,5 --turn-radius 0.3", "only has turns on the spot"),
         ("--swept 1.5", "swept must be a share in (0, 1], got 1.5"),
         *((f"--line cells --align {to}", "line over the floor") for to in ("walls", "30")),
         ("--line cells --swept 0.9", "has no share to choose"),
         *((f"--rooms {to}", "for one pass of one") for to in ("--passes 2", "--robots 0,0 3,3")),
         ("--planner zigzag --line cells --pheromone-png t.png", "leaves no pheromone"),
-        ("--robots 0,0 5,5 --pheromone-png t.png", "of one robot's colony"),
+        ("--robots 0,0 5,5 --pheromone-png t.png", "the colony of one robot"),
     ],
 )
 def test_what_cannot_be_is_refused(capsys, words, said):

@@ -103,7 +103,7 @@ def test_a_check_tells_what_is_damaged_and_what_is_not_trusted(tmp_path, monkeyp
     ended = fasaco_edge("warmup", "--check")
     assert ended.code == 1
     not_used, not_ready = ended.err.splitlines()
-    assert not_used == f"{folder} may be written by everybody: not used"
+    assert not_used == f"{folder} may be written by all users: not used"
     assert not_ready.startswith("kernels not ready: they were never compiled")
     assert f" in {temporary}/" in not_ready
     assert list(temporary.iterdir()) == []

@@ -59,7 +59,7 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
         way = [tuple(point) for point in points[:12].tolist()]
         drive(outsider, way)
         status = outsider.wait_status(lambda status: status["floor"]["swept_m2"] > 0.3)
-        # Only while someone listens: each pixel has the reason for which it is left.
+        # Only while there is a subscriber: each pixel has the reason for which it is left.
         heard = outsider.listen("unswept", late=False).wait(lambda heard: True)
         grid = decode_occupancy_grid(heard.payload)
         pixels = np.bincount(grid.cells.ravel(), minlength=7) * grid.geometry.resolution**2

@@ -59,7 +59,7 @@ def at(
 def test_who_may_read_the_figures_is_told(metrics, where):
     details = security.endpoints(CheckContext(DaemonConfig(metrics=metrics))).details
     assert details[-1] == (
-        f"http://{metrics.listen}/metrics: figures, from {where}, by anybody there"
+        f"http://{metrics.listen}/metrics: figures, from {where}, without password"
     )
 
 

@@ -29,10 +29,10 @@ def test_a_folder_of_ours_that_nobody_else_may_write_is_trusted(folder):
 def test_what_is_not_there_is_judged_by_what_is_above_it(folder):
     assert why_not_trusted(folder / "later" / "still") == ""
     folder.chmod(0o777)
-    assert why_not_trusted(folder / "later") == f"{folder} may be written by everybody"
+    assert why_not_trusted(folder / "later") == f"{folder} may be written by all users"
 
 
-@pytest.mark.parametrize(("mode", "who"), [(0o770, "its group"), (0o702, "everybody")])
+@pytest.mark.parametrize(("mode", "who"), [(0o770, "its group"), (0o702, "all users")])
 def test_a_folder_that_others_may_write_is_not(folder, mode, who):
     folder.chmod(mode)
     assert why_not_trusted(folder) == f"{folder} may be written by {who}"
@@ -45,7 +45,7 @@ def test_a_folder_that_others_may_write_is_not(folder, mode, who):
 def test_a_sticky_folder_protects_its_subfolders_but_not_itself(folder):
     folder.parent.chmod(0o1777)
     assert why_not_trusted(folder) == ""
-    assert why_not_trusted(folder.parent) == f"{folder.parent} may be written by everybody"
+    assert why_not_trusted(folder.parent) == f"{folder.parent} may be written by all users"
 
 
 def test_what_is_roots_is_trusted_by_everybody():
@@ -75,7 +75,7 @@ def test_a_link_is_as_good_as_who_made_it_and_what_it_leads_to(folder):
     link.unlink()
     link.symlink_to(real)
     real.chmod(0o777)
-    assert why_not_trusted(link) == f"{real} may be written by everybody"
+    assert why_not_trusted(link) == f"{real} may be written by all users"
 
 
 def test_links_in_a_circle_and_files_in_the_way_are_told(folder):
@@ -102,7 +102,7 @@ def test_a_file_that_others_may_read_alone_is_read(folder, mode):
 def test_a_file_that_others_may_write_is_not_read(folder):
     file = folder / "file"
     file.write_bytes(b"content")
-    for mode, who in ((0o620, "its group"), (0o602, "everybody")):
+    for mode, who in ((0o620, "its group"), (0o602, "all users")):
         file.chmod(mode)
         with pytest.raises(UntrustedFileError, match=f"may be written by {who}"):
             read_trusted(file)

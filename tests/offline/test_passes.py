@@ -101,7 +101,7 @@ def test_a_slow_pass_takes_longer():
         ("--passes auto --pheromone-png p.png", "leave no single trail"),
         ("--passes auto --robots 0,0 1,1", "--passes is for one robot"),
         ("--passes 30deg --line cells", "the centres of cells lie along the axes"),
-        ("--passes auto --turn-radius 0.3", "a robot that turns on the spot alone"),
+        ("--passes auto --turn-radius 0.3", "a robot that turns on the spot"),
     ],
 )
 def test_what_passes_cannot_be_is_said(capsys, words, said):

@@ -177,7 +177,7 @@ def test_a_recording_takes_no_commands(file, tmp_path):
         token = tokens.read_text().split("operator: ")[1].strip()
         with looking(page, token) as looker:
             assert looker.wait("welcome")["role"] == "viewer"
-            assert "may only look" in looker.command("cancel")["text"]
+            assert "may only view" in looker.command("cancel")["text"]
 
 
 @pytest.mark.parametrize(

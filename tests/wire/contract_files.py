@@ -97,7 +97,7 @@ def qos_entry(topic: Topic) -> dict[str, Any]:
         "priority": qos.priority,
         "express": qos.express,
         "cache": qos.cache,
-        "blocks": blocked if qos.congestion == "block" else "nobody",
+        "blocks": blocked if qos.congestion == "block" else "none",
     }
 
 

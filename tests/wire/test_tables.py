@@ -110,7 +110,7 @@ def test_priorities_make_sense():
     # An update must not overtake the map it belongs to.
     assert rank("map") == rank("map_update")
     sent = {topic.name for topic in TOPICS if topic.direction.startswith("out")}
-    assert {QOS[name].congestion for name in sent} == {"drop"}, "nobody holds up a daemon"
+    assert {QOS[name].congestion for name in sent} == {"drop"}, "no receiver blocks a daemon"
 
 
 def test_every_publisher_has_the_quality_of_service_of_a_row():

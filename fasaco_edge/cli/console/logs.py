@@ -29,12 +29,12 @@ class _Kind:
     last: logging.LogRecord | None = None
 
 
-class OneOfAKind(logging.Handler):
-    """Rate limiter: passes on one line of each kind in ten seconds to another handler.
+class RateLimiter(logging.Handler):
+    """Passes on one line of each kind in ten seconds to another handler.
 
     The kind is the event and its code, if a line has them (``extra``), else the whole text.
-    The next line of a kind has the number of suppressed ones; if none follows, a separate line
-    has it, once another line is due.
+    The next line of a kind states how many were suppressed; if none follows within the ten seconds,
+    the last suppressed line is passed on, with that number.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class OneOfAKind(logging.Handler):
                 continue
             del self._kinds[kind]
             if known.last is not None:
-                # The separate line is of the same kind, so the ten seconds begin again.
+                # This line counts for its kind, too, so the ten seconds begin again.
                 self._kinds[kind] = _Kind(now + PERIOD_S)
                 _add_count(known.last, known.left_out - 1)
                 self._target.handle(known.last)
@@ -128,7 +128,7 @@ class JournalLine(OneLine):
 
 
 def begin_logging(level: str) -> None:
-    """Log from ``level`` on."""
+    """Log entries of ``level`` and above."""
     target = logging.StreamHandler()
     if is_journal():
         target.setFormatter(JournalLine("%(message)s"))
@@ -137,10 +137,10 @@ def begin_logging(level: str) -> None:
         faulthandler.enable()
     else:
         target.setFormatter(OneLine("%(levelname)s %(name)s: %(message)s"))
-    logging.basicConfig(level=level.upper(), handlers=[OneOfAKind(target)])
+    logging.basicConfig(level=level.upper(), handlers=[RateLimiter(target)])
 
 
-def say_why(error: FasacoError) -> None:
+def report_error(error: FasacoError) -> None:
     """Print or log the reason of a command's failure, with its hint."""
     if is_journal():
         text = f"{error} ({error.hint})" if error.hint else str(error)

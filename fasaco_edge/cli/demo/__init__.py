@@ -58,8 +58,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="MIN",
-        help="how long the robot's battery lasts [simulated min], charged where it started; 0 for "
-        "ever (default: %(default)g)",
+        help="battery life of the robot [simulated min]; it charges where it started; 0: unlimited "
+        "(default: %(default)g)",
     )
     parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
     parser.add_argument(

@@ -70,7 +70,7 @@ class DemoRobot:
         self.config.write_text(yaml.safe_dump(config), encoding="utf-8")
 
     def programs(self, args: argparse.Namespace, endpoint: str) -> list[tuple[str, list[str]]]:
-        """Return the programs to start: for each its name, and the words after `fasaco-edge`."""
+        """Return the programs to start: for each its name, and the arguments of `fasaco-edge`."""
         daemon = ["run", "--config", str(self.config), "--record", str(self.folder)]
         # The daemon gets a fresh state folder of its own: no progress of another daemon or an
         # earlier demo.
@@ -90,7 +90,7 @@ class DemoRobot:
 
 
 def fleet_recorder(out: Path, endpoint: str) -> list[str]:
-    """Return the words after `fasaco-edge` of the program that records all robots in one file."""
+    """Return the arguments of `fasaco-edge` that record all robots in one file."""
     return ["record", "--fleet", FLEET, "--out", str(out), "--connect", endpoint]
 
 

@@ -99,7 +99,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     """Return the request of the options; other values are those of ``--config``, if given.
 
     Raises:
-        BadConfiguration: a value is impossible; the error names it.
+        BadConfiguration: a value is invalid; the error names it.
         PlannerFailed: the file of the user's planner raised.
     """
     config = None if args.config is None else load_config(args.config)
@@ -130,7 +130,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         changes["reverses"] = False
     if line == CELLS and changes.get("turn_radius_m", robot.turn_radius_m):
         raise BadConfiguration(
-            "--turn-radius: a line through the centres of cells has turns on the spot alone",
+            "--turn-radius: a line through the centres of cells only has turns on the spot",
             hint="ask for a line over the floor, quick or thorough; for one robot",
         )
     named = args.config, Path(own.file) if own and own.file else None

@@ -115,7 +115,7 @@ def _print_remarks(console: Console, document: ReviewDocument) -> None:
 
 
 def _say(console: Console, text: str, style: str = "") -> None:
-    """Print a sentence; a file keeps it in one line."""
+    """Print a sentence; it is wrapped only in a terminal."""
     console.print(text, style=style, soft_wrap=not console.is_terminal)
 
 

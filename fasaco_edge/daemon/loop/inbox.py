@@ -313,9 +313,9 @@ def blocked_of(payload: bytes) -> FollowerBlocked:
     Raises:
         MalformedMessage: it is not valid.
     """
-    said = decode_blocked(payload)
+    one = decode_blocked(payload)
     return FollowerBlocked(
-        said.revision, said.detail, said.held_s, said.frame, said.x, said.y, said.points
+        one.revision, one.detail, one.held_s, one.frame, one.x, one.y, one.points
     )
 
 

@@ -353,4 +353,4 @@ class Loop:
             if self._ports.metrics is not None:
                 self._ports.metrics.show(due)
             self._ports.outbox.status(due)
-            self._ports.watchdog.tell(due)
+            self._ports.watchdog.show(due)

@@ -1,7 +1,7 @@
 """The mission runner: owner of the mission and its planning thread, from startup to replacement.
 
 The first map starts the loading of kernels; until then the daemon is small. Events that arrive
-meanwhile are held, the first events of the mission.
+before the mission are held for it.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ class MissionRunner:
 
     Attributes:
         config: the configuration in force.
-        rooms: the rooms, which each mission goes on with.
-        paths: the exit for the paths of its missions.
+        rooms: the rooms, kept from each mission to the next.
+        paths: through it the paths of its missions reach the bus.
         mission: the mission; None during startup.
         worker: its planning thread; None during startup.
     """
@@ -118,7 +118,7 @@ class MissionRunner:
                 self.mission.succeed(self._before)
             self._before = None
             if self.config.fleet:
-                # No ledger that was set aside has this order.
+                # This order is new: it belongs to no ledger that was set aside.
                 self.mission.shared.begin(time.time_ns() // 1_000_000)
             self._held = HeldEvents()
         return self.mission, held, faults
@@ -162,11 +162,11 @@ class MissionRunner:
         return None
 
     def held(self) -> list[Event]:
-        """Return newest map and pose as events, for a new mission."""
+        """Return the newest map and pose as events for a new mission."""
         return self._held.events if self.mission is None else self.mission.held()
 
     def step(self, mission: Mission, events: Sequence[Event], now: float) -> Decision:
-        """Step the mission; its path is due afterwards."""
+        """Step the mission, and take over its path for publication."""
         decision = mission.step(events, now)
         self.paths.follow(mission, decision.path)
         return decision

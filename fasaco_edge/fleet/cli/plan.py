@@ -75,7 +75,7 @@ def plan_fleet(args: argparse.Namespace, request: PlanRequest) -> int:
 
 
 def _check(args: argparse.Namespace, request: PlanRequest) -> None:
-    """Refuse what is not for several robots."""
+    """Refuse options that do not apply to several robots."""
     search, count = request.search, len(args.robots or args.robots_xy)
     line = "a line over the floor is for one robot"
     refused = (
@@ -86,7 +86,7 @@ def _check(args: argparse.Namespace, request: PlanRequest) -> None:
             "several robots are planned for by colony-search",
         ),
         (request.line != CELLS, "--line", line),
-        (args.pheromone_png is not None, "--pheromone-png", "it is of one robot's colony"),
+        (args.pheromone_png is not None, "--pheromone-png", "it shows the colony of one robot"),
         (args.align is not None, "--align", line),
         (args.overlap is not None, "--overlap", line),
         (args.clearance is not None, "--clearance", line),
@@ -182,7 +182,7 @@ def _write(
     if args.png is not None:
         from fasaco_edge.fleet.review.drawing import draw_fleet
 
-        gap = f", at most {figures['gap']:.1%} above the least" if figures["gap"] else ""
+        gap = f", at most {figures['gap']:.1%} above the lower bound" if figures["gap"] else ""
         lines_below = [
             f"{Path(args.map).name}: {figures['cells']} cells of {lattice.cell_m:g} m, "
             f"{len(division.walks)} robots; longest walk {figures['makespan_steps']} steps{gap}; "
@@ -211,7 +211,9 @@ def _summary(figures: dict[str, Any], robots: int) -> list[tuple[str, str]]:
     from fasaco_edge.text import duration
 
     gap = (
-        "" if figures["gap"] is None else f", at most {100 * figures['gap']:.1f} % above the least"
+        ""
+        if figures["gap"] is None
+        else f", at most {100 * figures['gap']:.1f} % above the lower bound"
     )
     rows = [
         ("map", f"{figures['map']}, {figures['cells']} cells of {figures['cell_m']:g} m"),

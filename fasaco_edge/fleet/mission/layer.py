@@ -235,7 +235,7 @@ class FleetLayer(Company):
             robots = robots[: MOST_ROBOTS + 1]
             divided = divide(joint.lattice, left, robots, before, self._turn_steps)
             if divided != before:
-                self.numbers.count_on()
+                self.numbers.number_own()
                 self._division = divided if len(robots) > 1 else None
         self._divided_at, self._owners = now, (None, self._owners[1])
         self._taken = self._count_taken()

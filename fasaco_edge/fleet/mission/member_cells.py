@@ -29,7 +29,7 @@ class MemberCells:
 
     Attributes:
         epoch: of the tiles.
-        lattice: pose of its lattice in this robot's [m], as they were placed.
+        lattice: pose of its lattice in this robot's when the tiles were placed [m].
         is_doubtful: whether all cells of this epoch are disregarded: some were disregarded before
             the sender's lattice moved, and their new places are not known.
     """

@@ -42,8 +42,8 @@ class Remainder:
     def __init__(self) -> None:
         self.others_go_on = self.had_part = False
         self.divided = 0
-        # Largest number of swept cells since this robot has no part, and its time; None while it
-        # has a part. The number of cells left may grow as others sweep, by cells that they find.
+        # Largest number of swept cells since this robot had a part, and its time; None while it
+        # has one. The number of cells left may grow as others sweep, by cells that they find.
         self._most: tuple[int, float] | None = None
         # Since when all others wait; None while one is at work.
         self._waiting_since: float | None = None
@@ -114,7 +114,7 @@ class DivisionNumbers:
         """Take over the number of a received division."""
         self.number, self.by = newer.division, newer.by
 
-    def count_on(self) -> None:
+    def number_own(self) -> None:
         """Number a division that this robot makes: above all valid numbers received."""
         most = self._most_valid()
         numbers = [one for one in self._others.division_numbers().values() if one <= most]
@@ -154,7 +154,7 @@ class AtWork:
         divided_at: float,
         now: float,
     ) -> list[Robot]:
-        """Return robots of the last division that take part, but not among those in reach.
+        """Return the robots of the last division that take part, but are not in reach.
 
         This robot's map shows no way to them, or their messages no longer arrive, but the robot
         that made the division still reaches them. If left out, they would make a division of their

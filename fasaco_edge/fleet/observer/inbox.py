@@ -25,7 +25,7 @@ from fasaco_edge.wire.topics import FLEET, MAP, POSE
 # Largest number of waiting samples of a topic; 1 for topics not named. A fleet's message is sent
 # again within a second; several poses show which cells a robot drove through.
 DEPTHS = {FLEET.name: 4, POSE.name: 256}
-# Least number of robots that the space is divided by.
+# The capacity is divided among at least this many robots.
 LEAST_SHARING = 4
 
 
@@ -39,7 +39,7 @@ class Received:
 
 @dataclass(slots=True)
 class Traffic:
-    """Messages of a robot to its fleet, their bytes, and samples of all topics left out."""
+    """Messages of a robot to its fleet, their bytes, and samples that were too large."""
 
     messages: int = 0
     bytes: int = 0
@@ -108,7 +108,7 @@ class FleetInbox:
             return found
 
     def forget(self, robot: str) -> None:
-        """Drop a robot's queues: those of another fleet need none."""
+        """Drop the queues of a robot that is not in the fleet."""
         with self._changed:
             self._robots.pop(robot, None)
 
@@ -127,7 +127,7 @@ class FleetInbox:
         queues.bytes += size
 
 
-# Time for a robot's map before the next robot's turn.
+# Time for a robot's map before the next robot's turn [ns].
 MAP_TURN_NS = 2_000_000_000
 
 Post = Callable[[str, str, Sample], None]

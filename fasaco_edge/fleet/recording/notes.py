@@ -70,7 +70,7 @@ class Note(msgspec.Struct, array_like=True):
         swept, ground: whole tiles that have changed since; all tiles if ``in_force``.
         in_force: whether this note repeats the content of earlier parts.
         stamp_ms: stamp of its newest pose; 0 without one, and in recordings of before.
-        time_scale: intended seconds of a simulated robot per second; 1 for a real one.
+        time_scale: simulated seconds per second, as configured; 1 for a real robot.
     """
 
     robot: Count

@@ -4,8 +4,8 @@ A cell that two robots passed is swept again, or only driven through. While a ro
 others have swept, its steps from entry to exit are counted. The shortest way between the two counts
 as driving through; all further steps count as sweeping again.
 
-Durations are by the robots' own clocks, which are faster than the recorder's where they are
-simulated; which robot was first on some floor is decided by the recorder's.
+Durations are by the robots' own clocks, which run faster than the recorder's in a simulation. The
+recorder's clock decides which robot was first on a cell.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ PEAK_S = 5.0
 # Notes come once a second: a longer interval means that no message arrived [s].
 LONGEST_NOTE_S = 3.0
 NEVER_MS = math.inf
-# Longer than robots of a fleet work one after another [s].
+# How far a simulated robot's clock is extended beyond its stamps [s]: longer than any recording.
 AROUND_S = 1e6
 
 
@@ -87,9 +87,9 @@ class FleetFigures(msgspec.Struct, frozen=True):
 
     Attributes:
         fleet: its name.
-        time_scale: intended seconds of the first robot per second: 1, unless it is simulated.
+        time_scale: simulated seconds per second, as configured for the first robot; 1 if real.
         duration_s: of the recording [s].
-        makespan_s: from when the first robot works until the last has ended [s].
+        makespan_s: from the first robot's start of work to the last robot's end [s].
         busy_balance: the least busy robot's time at work over the busiest one's.
         swept_balance: the same of the swept area.
         swept_m2: cells that any robot swept [m2].
@@ -204,7 +204,8 @@ def _tracks(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack],
 def _clock(notes: Sequence[Note]) -> RobotClock:
     """Return the clock of a robot, by the stamps of its poses if it is simulated.
 
-    Before and after those it is as fast as intended: others may be at work then.
+    Before the first and after the last stamp it has the configured time scale: other robots may be
+    at work then.
     """
     stamped = [note for note in notes if note.stamp_ms]
     scale = stamped[-1].time_scale if stamped else 1.0
@@ -294,7 +295,7 @@ def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigur
 def _until_last(tracks: Sequence[RobotTrack], states: Sequence[str] = ()) -> float:
     """Return the time from the beginning, or the first note in ``states``, to the last note [s].
 
-    By the clock of the robot that was last.
+    The clock is that of the robot with the last note.
     """
     at = [(note.at_ms, track) for track in tracks for note in track.notes
           if not states or note.state in states]  # fmt: skip

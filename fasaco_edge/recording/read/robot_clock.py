@@ -37,7 +37,7 @@ class RobotClock:
 
     Attributes:
         began_ns: beginning of the recording, by the recorder's clock [ns].
-        scale: intended seconds of the robot per second; 1 for a real robot.
+        scale: simulated seconds per second, as configured; 1 for a real robot.
         recorder_s, robot_s: both times of each pose [s], float64 (n,), not decreasing; just (0,)
             for a real robot, whose seconds are the recorder's.
     """

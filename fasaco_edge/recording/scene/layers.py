@@ -56,7 +56,7 @@ class Anchor:
         return self.x, self.y
 
     def pose(self, pose: Pose2D) -> Pose2D:
-        """Return the drawn pose of a pose."""
+        """Return a pose as it is drawn."""
         return replace(pose, x=pose.x - self.x, y=pose.y - self.y)
 
     def grid(self, grid: Grid) -> Grid:
@@ -101,7 +101,7 @@ RATES = {
 }
 # A grid's size in the file is estimated from every n-th row.
 EVERY_ROW = 8
-# Rerun's compression (LZ4) against the fastest deflate, at worst.
+# Largest ratio of sizes after Rerun's compression (LZ4) and after the fastest deflate.
 LOOSER = 1.5
 
 

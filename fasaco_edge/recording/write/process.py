@@ -56,7 +56,7 @@ class Output:
     budget: DiskBudget
 
     def begin(self, name: str, blueprint: rrb.Blueprint) -> Recording:
-        """Return the recording that begins now, called after a robot or fleet."""
+        """Begin a recording, named after a robot or fleet, and return it."""
         clock = RunClock()
         began_ns = clock.now_ns()
         began = datetime.fromtimestamp(began_ns / 1e9, UTC)
@@ -87,10 +87,10 @@ def record(
 ) -> int:
     """Record until SIGTERM or SIGINT; return the process's exit code.
 
-    After a disk failed, the process ends here (``os._exit``), because rerun would never let it.
+    If the disk fails, the process exits here (``os._exit``): rerun would block a normal exit.
 
     Args:
-        folder: of the recordings; those that broke off are repaired first.
+        folder: of the recordings; interrupted recordings are repaired first.
         bus_settings: how to join the bus.
         recorder_on: makes the recorder.
 
@@ -110,7 +110,7 @@ def record(
             recorder.step(TAKE_TIMEOUT_S)
         code = 0 if recorder.end() else EXIT_STALLED
     if recorder.hangs:
-        # All recoverable data are saved; rerun's own exit would never end.
+        # All recoverable data are saved; rerun would block a normal exit for ever.
         os._exit(code)
     return code
 

@@ -140,7 +140,7 @@ def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
     """Return the budget of a configuration, for the recordings of its robot or those of ``name``.
 
     Raises:
-        BadConfiguration: a size is impossible, or the robot's name is no key.
+        BadConfiguration: a size is invalid, or the robot's name is no key.
     """
     limits, robot = config.recording, name or config.keys().robot
     if 0 < limits.quota_mb < 2 * limits.part_mb:

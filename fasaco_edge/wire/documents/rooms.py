@@ -26,8 +26,8 @@ class RoomReport(Document, frozen=True):
         encloses: numbers of the rooms that lie within its outline, and are no part of it.
         swept: swept share of its reachable floor, in the present pass; null if none is reachable.
         to_go_s: driving time of the path ahead within the room [s]; null without a path.
-        passes: passes of an order by its name that gives none itself, as in `mission.json`; null
-            for as many as other zones.
+        passes: passes if an order names the room without passes, as in `mission.json`; null: as
+            many as other zones get.
         skip: whether orders for everything leave it out.
         priority: where time or battery do not allow all, rooms of higher priority come first.
     """

@@ -36,8 +36,8 @@ class ClaimReport(Document, frozen=True):
 
     Attributes:
         id: its Zenoh id.
-        stand: its role. looks: not known yet whether another plans; waits: another plans;
-            yields: another plans, and this one planned before; plans: this one plans.
+        stand: its role. plans: this daemon plans; waits: another one plans; yields: another one
+            plans, and this one did before; looks: not known yet whether another one plans.
     """
 
     id: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
@@ -80,7 +80,7 @@ class PlanCounts(Document, frozen=True):
     Attributes:
         plans: plans made.
         unchanged: plans equal to the path in force.
-        outdated: plans that no longer held when they were made.
+        outdated: plans that were no longer valid when they were finished.
         attempts: attempts to improve the path in spare time.
         planning: whether a plan is being made.
     """
@@ -152,8 +152,8 @@ class BatteryReport(Document, frozen=True):
         power: power supply status of its message; "" before the first.
         age_s: time since the last plausible charge.
         drain_per_h: discharge an hour while driving, measured.
-        turns_back_at: threshold at which the robot goes to charge.
-        goes_on_at: threshold at which it continues; null if it does not charge.
+        turns_back_at: level at which the robot drives to its dock.
+        goes_on_at: level at which it leaves the dock again; null if it does not charge.
     """
 
     level: Amount | None = None
@@ -272,7 +272,7 @@ class MemberReport(Document, frozen=True):
         state: of its mission, in its last message.
         heard_s: time since that message.
         away: why it gets no part of the remaining cells; null if it gets one.
-        swept_cells: cells that count for this robot, too.
+        swept_cells: cells swept by it that this robot need not sweep.
     """
 
     name: Name = ""

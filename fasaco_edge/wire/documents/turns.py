@@ -59,8 +59,8 @@ class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         number: of the request.
         seconds: how long it took.
-        stops: numbers, from 1, of the planner's stop checks that were answered with yes; a replay
-            stops at the same ones. A repair and the search after it may each have been stopped.
+        stops: numbers, from 1, of the stop checks at which the planner was stopped; a replay stops
+            at the same ones. A repair and the search after it may each have been stopped.
         work: its ants, kicks and proposals.
         checksum: CRC-32 of its cells, int32 (row, col), little endian.
     """
@@ -73,7 +73,7 @@ class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Decided(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Decisions of a cycle with any decision or change of state.
+    """Decisions of a cycle that decided something or changed the state.
 
     Attributes:
         state, reason: of the mission.

@@ -21,7 +21,7 @@ LEAST_POSE_BYTES = 72
 
 
 class PathPoints:
-    """The points of a path, in order; iterated over, its poses, read as they are asked for.
+    """The points of a path, in order; iteration yields its poses, and reads them on demand.
 
     Attributes:
         frame: name of the frame of all poses.
