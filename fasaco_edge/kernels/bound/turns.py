@@ -35,9 +35,7 @@ UNIT = 256
 
 
 @lean_kernel
-def ascend(
-    lines: Lines, prices: StepPrices, step: int, turn: int, pace: int, falls: int, times: int
-) -> int:
+def ascend(lines: Lines, prices: StepPrices, step: int, turn: int, falls: int, times: int) -> int:
     """Improve the prices; return the best bound found [half us], with its prices in ``best``.
 
     A subgradient method with exactly feasible iterates: each price follows the imbalance of its
@@ -47,11 +45,11 @@ def ascend(
         lines: the cells, two or more.
         prices: initial ones, feasible or not; changed in place.
         step, turn: a step and a quarter-turn [half us], the step an even number.
-        pace: initial step size of the prices [half us].
-        falls: over all iterations the pace falls by a factor of about e ** falls.
+        falls: over all iterations the step size of the prices, a quarter-turn at first, falls by a
+            factor of about e ** falls.
         times: number of iterations.
     """
-    best = 0
+    best, pace = 0, turn
     for _ in range(times):
         make_feasible(lines, prices, step, turn)
         bound = _relaxed(lines, prices, step, turn)
