@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.bound.covering import covering_bound
-from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, first_prices, lines_of
+from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, StepPrices, lines_of
 from fasaco_edge.kernels.bound.turns import ascend
 from fasaco_edge.kernels.lattice.reach import reachable_from
-from fasaco_edge.planners.bands import BandBound
 from fasaco_edge.planners.cost import MICROSECONDS
 from fasaco_edge.planners.problem import CoverageProblem
 
@@ -29,9 +28,8 @@ FEWEST, MOST = 8, 300
 # On larger lattices turns are left out of the bound: prices take about 100 bytes per cell.
 MOST_CELLS = 250_000
 
-# Initial step size of a price, as a share of a quarter-turn's cost: in the first call, in later
-# ones; and the exponent of its decay.
-FIRST_PACE, LATER_PACE, FALLS = 1.0, 0.5, 4
+# Exponent of the decay of a price's step size, which begins at a quarter-turn's cost.
+FALLS = 4
 
 
 def lower_bound_steps(problem: CoverageProblem) -> int:
@@ -63,10 +61,8 @@ class LowerBound:
         start, end = problem.flat_start, problem.flat_end
         self._lines = lines_of(lattice.steps, required, reached, start, end)
         self._flat = np.flatnonzero(reached).astype(np.int32)
-        self._prices = first_prices(self._lines, 2 * self._cost.quarter_turn_us)
-        self._is_first = True
-        self._cols = lattice.states.shape[1]
-        self._bands: BandBound | None = None
+        size = 2, self._lines.sides.size
+        self._prices = StepPrices(*(np.zeros(size, np.int64) for _ in StepPrices._fields))
 
     @property
     def cost_s(self) -> float:
@@ -79,24 +75,7 @@ class LowerBound:
             return
         step, turn = 2 * self._cost.step_us, 2 * self._cost.quarter_turn_us
         times = min(max(work // self._lines.sides.size, FEWEST), MOST)
-        pace = round(turn * (FIRST_PACE if self._is_first else LATER_PACE))
-        self._is_first = False
-        self._raise(ascend(self._lines, self._prices, step, turn, pace, FALLS, times))
-
-    def tighten_in_bands(self, cells: int) -> None:
-        """Raise ``cost_us`` by bands, if solving ``cells`` more cells can, at some 10 us each.
-
-        Each iteration over all cells gives a bound; the first starts from the best prices so far.
-        """
-        if not self._turns or (self._bands is not None and self._bands.is_done):
-            return
-        if self._bands is None:
-            row, col = np.divmod(self._flat, self._cols)
-            step, turn = 2 * self._cost.step_us, 2 * self._cost.quarter_turn_us
-            self._bands = BandBound(self._lines, self._prices, row, col, step, turn)
-        self._raise(self._bands.improve(cells))
-
-    def _raise(self, doubled: int) -> None:
+        doubled = ascend(self._lines, self._prices, step, turn, FALLS, times)
         # A cost is a whole number of microseconds, and a multiple of the common divisor of both
         # prices.
         unit = math.gcd(self._cost.step_us, self._cost.quarter_turn_us)

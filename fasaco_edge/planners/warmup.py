@@ -202,7 +202,7 @@ _STAGES: dict[str, Callable[[TinyRoom], object]] = {
     AREAS: _take_areas,
     ROOMS: lambda room: find_rooms(room.grid),
     WALKS: lambda room: walk_figures(room.lattice, np.array([[0, 0], [0, 1]], np.int32)),
-    BOUND: lambda room: lower_bound_of(room.costly).tighten_in_bands(16),
+    BOUND: lambda room: lower_bound_of(room.costly),
     LOCAL_SEARCH: _take_local_search,
     WINDOWS: _take_windows,
     SHARES: _take_shares,

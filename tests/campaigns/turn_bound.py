@@ -32,8 +32,6 @@ PLENTY: Final = 10**15
 HEADINGS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 # Cells that a best walk is looked for over: each one more doubles the work.
 MOST_REQUIRED = 8
-# Iterations over bands: along rows, along columns, and on with the better one.
-IN_BANDS = 6
 PRICES = ((1.0, 0.001), (1.0, 0.3), (1.2, 1.5), (1.0, 5.0), (1.0, 50.0), (0.123457, 0.765433))
 
 
@@ -47,15 +45,12 @@ class Finding:
 
 
 def examine(random: np.random.Generator) -> Finding:
-    """Draw a ground; return the bounds after an iteration or two, and after many; and by bands."""
+    """Draw a ground; return the bounds after an iteration or two, and after many."""
     problem = drawn_problem(random)
     bound = LowerBound(problem)
     bounds = [bound.cost_us]
     for iterations in (1, 20, MOST):
         bound.tighten(iterations * problem.lattice.states.size)
-        bounds.append(bound.cost_us)
-    for _ in range(IN_BANDS):
-        bound.tighten_in_bands(problem.lattice.states.size)
         bounds.append(bound.cost_us)
     return Finding(problem, least_cost_us(problem), bounds)
 

@@ -43,13 +43,13 @@ EVERY_CELL = 1 << 30
 
 
 def rules_for(
-    prices, radius, proposals=10, loops_of_256=256, limit=EVERY_CELL, patience=0.4, steady=False,
-    strict=False, ants_of_256=0,
+    prices, radius, proposals=10, loops_of_256=256, limit=EVERY_CELL, patience=0.4, strict=False,
+    ants_of_256=0,
 ):  # fmt: skip
     unit = (prices.step_us + prices.quarter_turn_us) * 2 // 5
     patience_us = int(unit * patience)
     return PerturbationRules(
-        limit, proposals, radius, unit, patience_us, loops_of_256, ants_of_256, steady, strict
+        limit, proposals, radius, unit, patience_us, loops_of_256, ants_of_256, strict
     )
 
 
@@ -80,12 +80,11 @@ def assert_best_is_sound(task, ground, memory, prices):
     ants_of_256=st.sampled_from((0, 192)),
     limit=st.sampled_from((1, 6, EVERY_CELL)),
     room=st.sampled_from((0, 3, 300)),
-    steady=st.booleans(),
     strict=st.booleans(),
     seed=st.integers(0, 2**32),
 )
 def test_perturbations_leave_a_sound_walk_and_remember_the_best(
-    task, prices, radius, loops_of_256, ants_of_256, limit, room, steady, strict, seed
+    task, prices, radius, loops_of_256, ants_of_256, limit, room, strict, seed
 ):
     search = set_up(task, prices, len(task.walk) + room)
     ground, walk, _, tally, memory, colony = search
@@ -95,7 +94,6 @@ def test_perturbations_leave_a_sound_walk_and_remember_the_best(
         5,
         loops_of_256,
         limit,
-        steady=steady,
         strict=strict,
         ants_of_256=ants_of_256,
     )

@@ -99,7 +99,7 @@ def test_the_better_of_two_walks_goes_on_with_its_line(monkeypatch, better):
     monkeypatch.setattr(Ground, "line_search", line_search)
     rank = property(lambda line: float(line is not searches[better][1]))
     monkeypatch.setattr(LineSearch, "rank", rank)
-    _, path, xy = planned(room(1), 1, Pauses(400), seen.append)
+    _, path, xy = planned(room(2), 1, Pauses(400), seen.append)
     assert len(searches) == 2
     assert path.cells.tolist() == searches[better][0].tolist()
     assert xy is searches[better][1].best.xy

@@ -240,7 +240,7 @@ def test_attempts_never_worsen_a_walk_and_each_looks_elsewhere():
 
 def test_a_search_of_the_rest_keeps_its_start_and_beats_repair():
     """A walk over a whole floor is cut to half of it, as for a robot's part in a fleet."""
-    lattice = CoverageLattice.from_free(ground(3, rows=24, cols=40, blocked=0.05))
+    lattice = CoverageLattice.from_free(ground(4, rows=24, cols=40, blocked=0.05))
     start = tuple(np.argwhere(lattice.coverable)[0].tolist())
     enough = WorkLimit(SearchWork(proposals=1_000_000))
     walk = NearOptimal().plan(CoverageProblem.of(lattice, start, cost=TURNS), enough).cells

@@ -195,8 +195,8 @@ def test_it_is_asked_often_whether_to_stop(cost):
 def test_who_observes_sees_the_trail_and_changes_nothing():
     problem, seen = CoverageProblem.of(*ROOMS["rooms"]), []
     config = ColonyConfig(ants=32, seed=2)
-    path = NearOptimal(config).plan(problem, after(perturbations=10), seen.append)
-    assert path.cells.tobytes() == plan(problem, after(perturbations=10), config).cells.tobytes()
+    path = NearOptimal(config).plan(problem, after(perturbations=40), seen.append)
+    assert path.cells.tobytes() == plan(problem, after(perturbations=40), config).cells.tobytes()
     (snapshot,) = seen
     assert snapshot.best_steps == path.steps
     assert snapshot.ants == path.work.ants

@@ -94,32 +94,3 @@ def lines_of(
     if end >= 0:
         wanted[last] = 0
     return Lines(sides, rank, links, wanted, int(first), int(last))
-
-
-@kernel
-def first_prices(lines: Lines, turn: int) -> StepPrices:
-    """Return prices that rise evenly along each line, by half a turn's cost on either side of 0.
-
-    So each cell of a long strip pays a part of the turn at its end.
-
-    Args:
-        lines: the cells.
-        turn: a quarter-turn [half us].
-    """
-    size = lines.sides.size
-    price = np.zeros((2, size), np.int64)
-    for axis in range(2):
-        first = 0
-        for index in range(size):
-            if not lines.links[axis, index]:
-                length = index + 1 - first
-                for inner in range(first, index):
-                    price[axis, inner] = turn * (2 * (inner + 1 - first) - length) // (2 * length)
-                first = index + 1
-    return StepPrices(
-        price,
-        price.copy(),
-        np.zeros((2, size), np.int64),
-        np.zeros((2, size), np.int64),
-        np.zeros((2, size), np.int64),
-    )

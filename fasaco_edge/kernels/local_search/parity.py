@@ -308,15 +308,13 @@ def euler_walk(
     walk: Walk,
     tally: Tally,
     end: int,
-    steady: bool,
     random: NDArray[np.uint64],
 ) -> int:
     """Write into ``walk.cells`` a walk that takes each step as often as ``times`` says.
 
     Hierholzer's algorithm from the walk's ``end``, so that its result begins with the
     start. Uses up ``times``. If there is a choice it continues like the old walk
-    (``order_of_old``) or straight if ``steady``, else at random. Returns the
-    walk's length.
+    (``order_of_old``), or straight. Returns the walk's length.
     """
     bound, stack = ground.bound, tally.stack
     _list_jumps(tally)
@@ -325,7 +323,7 @@ def euler_walk(
     while depth:
         here = stack[depth - 1]
         if here < bound:
-            heading = _heading(ground, tally, depth) if steady else -1
+            heading = _heading(ground, tally, depth)
             if heading < 0:
                 heading = draw(random) & 3
             direction = _next_step(ground, tally, here, heading)

@@ -60,7 +60,6 @@ class PerturbationRules(NamedTuple):
         acceptance_us: temperature at which a worse walk is kept [us].
         loops_of_256: number of 256 perturbations that change the end or add a loop.
         ants_of_256: number of 256 perturbations in which ants rebuild a disc.
-        steady: whether unchanged parts of the walk keep their order.
         strict: whether a walk of equal cost is reverted.
     """
 
@@ -71,7 +70,6 @@ class PerturbationRules(NamedTuple):
     acceptance_us: int
     loops_of_256: int
     ants_of_256: int = 0
-    steady: bool = False
     strict: bool = False
 
 
@@ -183,8 +181,7 @@ def _change_parity(search: Search, rules: PerturbationRules, random: NDArray[np.
     ground, walk, tally = search.ground, search.walk, search.tally
     length = walk.counts[LENGTH]
     count_steps(ground, walk, tally)
-    if rules.steady:
-        note_order(ground, walk, tally)
+    note_order(ground, walk, tally)
     end = walk.cells[length - 1]
     if search.prices.free_end and draw(random) & 1:
         touched = _move_end(search, rules.limit, random)
@@ -193,7 +190,7 @@ def _change_parity(search: Search, rules: PerturbationRules, random: NDArray[np.
         touched = _add_loop(search, rules.limit, random)
     if touched == 0 or length + touched + 1 > walk.cells.size:
         return 0
-    length = euler_walk(ground, walk, tally, end, rules.steady, random)
+    length = euler_walk(ground, walk, tally, end, random)
     recount(ground, walk, length, search.prices)
     return touched
 

@@ -11,7 +11,6 @@ corner flip   a spare visit moves to the opposite corner of its  0
               square
 shrink        a spike, or two spare visits between neighbours,   -2 (-1 at a
               or the free end, is left out                       free end)
-detour        one step becomes three, or a spike                 +2
 ============  =================================================  ==============
 
 A visit is spare if its cell is visited more often than needed. If only steps count,
@@ -35,7 +34,6 @@ from fasaco_edge.kernels.local_search.walk_array import (
     Walk,
     added,
     drop,
-    insert_two,
     is_at,
     leads,
     put,
@@ -48,15 +46,10 @@ from fasaco_edge.kernels.random import draw, index_of
 # equal on all machines.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536).astype(np.int64)
 
-# Number of 64 proposals at a spare visit that try to remove it, and number of 64 proposals
-# at a temperature above 0 that are detours.
+# Number of 64 proposals at a spare visit that try to remove it.
 REMOVALS_OF_64 = 40
-DETOURS_OF_64 = 8
-
-# Half of the proposals go where a gain is possible: to cells with spare visits, or to a
-# cell one or two steps beside one.
+# Half of the proposals go where a gain is possible: to cells with spare visits.
 AT_SPARE_OF_256 = 128
-BESIDE_OF_256 = 128
 
 
 @inlined
@@ -286,55 +279,6 @@ def _flip_square(state: _State, index: int, direction: int, choice: int) -> None
         reverse(walk, first + 1, last)
 
 
-@inlined
-def _add_detour(state: _State, index: int, direction: int, choice: int) -> None:
-    """Go from visit ``index`` to the next around a square, or to a side and back first."""
-    ground, walk, prices = state.ground, state.walk, state.prices
-    length = walk.counts[LENGTH]
-    if index + 1 >= length or length + 2 > walk.cells.size or index + 1 < prices.held:
-        return
-    cells = walk.cells
-    here, after = cells[index], cells[index + 1]
-    aside = here + ground.offsets[direction]
-    if aside == after or not ground.steps[here] >> direction & 1:
-        return
-    turn = prices.quarter_turn_us
-    delta = 2 * prices.step_us + 2 * turn - _turn_at(walk, index, turn)
-    if index > 0:
-        delta += turning(cells[index - 1], here, aside, turn)
-    if choice & 1 or after - here == here - aside:
-        back = here
-        delta += turning(aside, here, after, turn)
-    else:
-        back = aside + after - here
-        if not (leads(ground, aside, back) and leads(ground, after, back)):
-            return
-        delta -= _turn_at(walk, index + 1, turn)
-        if index + 2 < length:
-            delta += turning(back, after, cells[index + 2], turn)
-    delta += added(ground, prices, here, aside) + added(ground, prices, aside, back)
-    delta += added(ground, prices, back, after) - added(ground, prices, here, after)
-    if accepts(delta, state.temperature_us, state.random):
-        insert_two(ground, walk, index + 1, aside, back)
-        walk.counts[COST] += delta
-
-
-@inlined
-def _pick_spare(ground: Ground, walk: Walk, bits: int) -> int:
-    """Return a cell with a spare visit, or one a step or two beside such a cell; or -1."""
-    cell = walk.spare[index_of(bits, walk.counts[SPARE_CELLS])]
-    aside = bits >> 16 & 255
-    if aside < BESIDE_OF_256:
-        if not ground.steps[cell] >> (aside & 3) & 1:
-            return -1
-        cell += ground.offsets[aside & 3]
-        if aside & 4:
-            if not ground.steps[cell] >> (aside >> 3 & 3) & 1:
-                return -1
-            cell += ground.offsets[aside >> 3 & 3]
-    return int(cell)
-
-
 @lean_kernel
 def improve(
     ground: Ground,
@@ -362,9 +306,7 @@ def improve(
         if area.size:
             cell = area[index_of(bits, area.size)]
         elif walk.counts[SPARE_CELLS] and bits >> 8 & 255 < AT_SPARE_OF_256:
-            cell = _pick_spare(ground, walk, bits)
-            if cell < 0:
-                continue
+            cell = walk.spare[index_of(bits, walk.counts[SPARE_CELLS])]
         else:
             index = index_of(bits, walk.counts[LENGTH])
             cell = walk.cells[index]
@@ -375,7 +317,5 @@ def improve(
         direction, choice = bits & 3, bits >> 2 & 63
         if choice < REMOVALS_OF_64 and walk.visits[cell] > ground.needed[cell]:
             _remove(state, index, choice)
-        elif temperature_us == 0 or choice < 64 - DETOURS_OF_64:
-            _flip_square(state, index, direction, choice)
         else:
-            _add_detour(state, index, direction, choice)
+            _flip_square(state, index, direction, choice)

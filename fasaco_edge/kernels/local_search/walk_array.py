@@ -255,19 +255,3 @@ def drop(ground: Ground, walk: Walk, index: int, visits: int) -> None:
     for cell in (first, last):
         if walk.visits[cell]:
             find_visit(ground, walk, cell)
-
-
-@lean_kernel
-def insert_two(ground: Ground, walk: Walk, index: int, one: int, other: int) -> None:
-    """Put two visits before visit ``index``; the array must be long enough."""
-    cells, place = walk.cells, walk.place
-    for after in range(walk.counts[LENGTH] - 1, index - 1, -1):
-        cell = cells[after]
-        cells[after + 2] = cell
-        place[cell] = after + 2
-    cells[index], cells[index + 1] = one, other
-    place[one] = index
-    place[other] = index + 1
-    walk.counts[LENGTH] += 2
-    add_visit(ground, walk, one)
-    add_visit(ground, walk, other)

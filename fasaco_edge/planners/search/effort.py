@@ -63,7 +63,6 @@ def effort_for(cost: CoverageCost, *, has_ants: bool = True) -> Effort:
         acceptance_us=unit * 3 // 10,
         loops_of_256=(256 - by_ants) // 4,
         ants_of_256=by_ants,
-        steady=True,
     )
     temperatures_us = tuple(int(np.rint(unit * level)) for level in LEVELS)
     return Effort(temperatures_us, 250, rules, 15_000)
@@ -102,7 +101,6 @@ def repair_for(cost: CoverageCost) -> RepairEffort:
         acceptance_us=0,
         loops_of_256=256 - BY_ANTS,
         ants_of_256=BY_ANTS,
-        steady=True,
         strict=True,
     )
     if not (cost.quarter_turn_us or cost.is_priced):

@@ -56,10 +56,6 @@ WINDOWS_A_PERTURBATION = 10
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM = 8_000, 8, 100
 CORNERS = (0, LINES, PLACES, LINES | PLACES)
 
-# Cells that the bound solves in bands per pause, and per call: this takes some 3 % of the time with
-# expensive turns, else 10 to 20 %.
-BAND_CELLS, BAND_CELLS_AT_ONCE = 40, 256
-
 # Distinguishes the random stream from those of the ants.
 LOCAL_SEARCH = 1 << 32
 
@@ -90,25 +86,13 @@ class Search:
         # Cost of the first walk [us].
         self._first_us = 0
         self._bound: LowerBound | None = None
-        # Whether improvement has begun; number of cells that the bound may solve in bands.
-        self._has_begun, self._owed = False, 0
         self._perturbed_in_pass = 0
 
     def run(self) -> Iterator[None]:
         """Search to the end; pause after each piece of work."""
-        for _ in self._search():
-            if self._has_begun and self._bound is not None:
-                self._owed += BAND_CELLS
-                if self._owed >= BAND_CELLS_AT_ONCE:
-                    self._bound.tighten_in_bands(self._owed)
-                    self._owed = 0
-            yield
-
-    def _search(self) -> Iterator[None]:
         yield from self._begin()
         if not self._is_proven():
             yield from self._begin_better()
-        self._has_begun = True
         walk = self._walk
         while not self._is_proven():
             before = self._work
