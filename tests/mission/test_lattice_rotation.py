@@ -223,7 +223,7 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(3.0, 2.4)))
     robot.drive(60)
-    robot.mission._ledger.break_track()
+    robot.mission.covered.break_track()
     before = robot.mission.snapshot()
     after = rotated_ledger(before, DEG)
     assert after.lattice_deg == DEG

@@ -7,6 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from fasaco_edge.daemon.loop.mission_reports import room_progress, zone_progress
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PriorityReceived, State
@@ -135,7 +136,7 @@ def test_the_battery_is_a_limit_too():
         drive.command("start")
         for _ in range(130):
             tick(drive)
-        shares.append(drive.mission.room_progress()[number].share)
+        shares.append(room_progress(drive.mission)[number].share)
     assert shares[0] < 0.6
     assert shares[1] == 1.0
 
@@ -143,7 +144,7 @@ def test_the_battery_is_a_limit_too():
 def test_what_comes_first_and_cannot_be_reached_does_not_keep_the_rest():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
-    orders = drive.mission._orders
+    orders = drive.mission.orders
     for _ in range(MAX_IN_VAIN):
         assert not orders.note_path_end("")
         assert drive.mission.first_from == 80
@@ -268,7 +269,7 @@ def test_zones_of_higher_priority_come_first_where_time_is_short(priorities, unt
     order = {"zones": zones(**priorities), "until_min": until_min}
     drive.command("start", order)
     assert drive.mission.order_state.order.zones[0].name == first
-    assert drive.mission.zone_progress()[0].name == first
+    assert zone_progress(drive.mission)[0].name == first
     # The same order goes on, and so does one that is kept over a restart.
     assert are_same(drive.mission.order_state.order, read_order(order))
     kept = OrderState.from_json(drive.mission.order_state.to_json())

@@ -178,7 +178,9 @@ class Publication:
                 route.keep_back()
                 plan = waiting.plan if waiting and update.plan is None else update.plan
                 waiting = self._waiting = replace(update, plan=plan)
-            is_due = self._line.is_due(now, self._is_settled(ahead), ahead.leads_on)
+            is_due = self._line.is_due(
+                now, self._is_settled(ahead), lambda xy: route.is_cut and ahead.leads_on(xy)
+            )
             is_due = is_due or (stands and waiting is not None)
             if not (waiting or reason if is_way else is_due):
                 self._why = reason or self._why
@@ -190,6 +192,9 @@ class Publication:
         if update.xy is not None:
             self.forget()
             return update  # a way out, along no cells
+        if not len(update.cells):
+            self.forget()
+            return replace(update, xy=NONE)
         polished = ahead.line.first_below(POLISHED)
         self._line.take(ahead.next_xy(len(ahead.line) + 1), polished)
         return replace(update, xy=ahead.xy())

@@ -9,6 +9,7 @@ import pytest
 
 from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.members import HANGING_S
+from fasaco_edge.fleet.mission.message import waits_for
 from fasaco_edge.fleet.mission.shared_work import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -58,7 +59,7 @@ def test_a_robot_without_a_part_stands_while_another_sweeps():
     assert not ours.walk
     assert ours.mission.route.plans == plans
     # By that others know that it does not hang.
-    assert ours.mission.waits_for == "r2"
+    assert waits_for(ours.mission) == "r2"
     shared.run(len(CELLS) - shared.swept)
     assert ours.mission.state == "done"
 
@@ -131,9 +132,9 @@ def test_a_robot_does_not_wait_again_for_others_that_stood(swept):
 def test_a_paused_robot_sends_that_it_waits_for_none():
     shared = Shared()
     shared.run(40)
-    assert shared.ours.mission.waits_for == "r2"
+    assert waits_for(shared.ours.mission) == "r2"
     shared.ours.tell(CommandReceived(1, "pause"), after=1.0)
-    assert (shared.ours.mission.state, shared.ours.mission.waits_for) == ("paused", "")
+    assert (shared.ours.mission.state, waits_for(shared.ours.mission)) == ("paused", "")
 
 
 def test_a_standing_robot_in_trouble_sends_which_it_waits_for():
@@ -142,7 +143,7 @@ def test_a_standing_robot_in_trouble_sends_which_it_waits_for():
     shared.run(40)
     mission = shared.ours.mission
     assert [trouble.code for trouble in mission.troubles] == ["no_map"]
-    assert (mission.state, mission.waits_for) == ("degraded", "r2")
+    assert (mission.state, waits_for(mission)) == ("degraded", "r2")
 
 
 def test_a_robot_whose_part_only_others_see_sweeps_what_it_sees():

@@ -29,7 +29,7 @@ def around(cell):
 def begun():
     """A robot, r1, that has passed cells of a room beside another one; and one of those."""
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.shared.begin(1)
+    robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
     robot.drive(40, is_checked=False)
@@ -47,7 +47,7 @@ def test_floor_of_a_passed_cell_stays_with_the_robot_that_passed():
             robot.tell(replace(divided_by("r2", number), x=0.3 + 0.2 * (number % 2)))
             robot.drive(is_checked=False)
         assert robot.mission.company.part_cells() == 0
-        to_sweep = robot.mission.floor_to_sweep()
+        to_sweep = robot.mission.line.left.areas
         unswept_m2.append(to_sweep.ahead_m2 + to_sweep.left_m2)
     assert unswept_m2[1] - unswept_m2[0] > 0.5 * CELL_M**2
 
