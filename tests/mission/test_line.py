@@ -113,7 +113,7 @@ def check_tally(mission):
     if ahead is None:
         return
     fresh = SweepTally(ahead._floor)
-    swept = mission.floor.swept_on(ahead._floor.geometry)
+    swept = mission.covered.floor.swept_on(ahead._floor.geometry)
     whole = Window(0, 0, *swept.shape)
     state, points = ahead.tally._state, ahead.line.points
     # Without a reachable area no floor is asked for, and all is looked at once there is one.
@@ -172,7 +172,7 @@ def test_a_room_is_swept_to_its_rim():
     centres = 1.0 - (2 * 0.15 * (3.0 + 2.4)) / (3.0 * 2.4)
     assert judged.figures.swept_share > max(0.97, centres)
     assert judged.figures.illegal_share == 0.0
-    assert robot.mission.floor.swept_m2 <= judged.swept.sum() * 0.025**2 * 1.005
+    assert robot.mission.covered.floor.swept_m2 <= judged.swept.sum() * 0.025**2 * 1.005
     told = floor_report(robot.mission)
     assert told.reachable_m2 == pytest.approx(judged.figures.reachable_m2, rel=0.01)
     assert told.reached_m2 == pytest.approx(judged.figures.swept_m2, rel=0.01)
@@ -288,13 +288,13 @@ def test_the_line_avoids_a_new_keep_out_at_once():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(4.8, 2.4)))
     robot.drive(20)
-    covered, swept_m2 = robot.mission.coverage().covered, robot.mission.floor.swept_m2
+    covered, swept_m2 = robot.mission.coverage().covered, robot.mission.covered.floor.swept_m2
     assert covered > 3
     corners = ((4.2, 2.0), (4.7, 2.0), (4.7, 2.5), (4.2, 2.5))
     robot.tell(CommandReceived(1, "keep_out_add", keep_out=KeepOut("column", corners)))
     began = len(robot.trail)
     assert robot.mission.coverage().covered >= covered
-    assert robot.mission.floor.swept_m2 >= swept_m2
+    assert robot.mission.covered.floor.swept_m2 >= swept_m2
     robot.finish()
     for x, y in robot.trail[began:]:
         assert not (4.2 < x < 4.7 and 2.0 < y < 2.5)
@@ -732,9 +732,9 @@ def test_what_is_forgotten_is_to_be_swept_again(poses_a_step):
         xs = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M - x
         return (np.abs(ys) < 0.1)[:, None] & (np.abs(xs) < 0.1)
 
-    before = mission.floor.pixels
-    mission.floor.forget(around)
-    assert mission.floor.pixels <= before - 50
+    before = mission.covered.floor.pixels
+    mission.covered.floor.forget(around)
+    assert mission.covered.floor.pixels <= before - 50
     ways = np.array([robot.at, *robot.line])[:40:3]
     poses = np.concatenate([np.linspace(a, b, 8) for a, b in pairwise(ways)])[:32]
     events = [PoseReceived(StampedPose(Pose2D(*pose), "map")) for pose in poses.tolist()]
@@ -743,6 +743,6 @@ def test_what_is_forgotten_is_to_be_swept_again(poses_a_step):
         mission.step(events[first : first + poses_a_step], robot.now)
     tally, floor = mission.line._ahead.tally, mission.map.floor
     whole = Window(0, 0, *tally.shape)
-    is_left = (tally._state & WANTED > 0) & ~mission.floor.swept_on(floor.geometry, whole)
+    is_left = (tally._state & WANTED > 0) & ~mission.covered.floor.swept_on(floor.geometry, whole)
     # The two rasters differ along the rims of what was driven, by a few pixels.
     assert np.count_nonzero(is_left & (tally._state & OPEN == 0)) < 25

@@ -380,7 +380,7 @@ def test_after_lost_updates_only_a_full_map_counts():
     assert "updates before it were lost" in str(fault_of(drive, patch("#", at=(2, 2))))
     drive.tell(MapReceived(building(*ROOM)))
     assert drive.tell(patch("#", at=(2, 2))).faults == ()
-    assert np.count_nonzero(drive.mission.area.reachable) == 23
+    assert np.count_nonzero(drive.mission.map.area.reachable) == 23
 
 
 def test_a_pose_or_map_in_another_frame_is_a_fault():

@@ -121,14 +121,14 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     """Return the swept floor and the floor left; None without a mission."""
     if mission is None:
         return None
-    swept_m2, to_sweep = round(mission.floor.swept_m2, 3), mission.line.left.areas
+    swept_m2, to_sweep = round(mission.covered.floor.swept_m2, 3), mission.line.left.areas
     if to_sweep is None:
         return FloorReport(swept_m2)
     # Before the first path no floor has been judged; on the way home the line is set aside.
     order, is_planned = mission.order_state, mission.route.revision > 0
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
-    comes_later = (is_aside and order.is_open) or mission.first_from
+    comes_later = (is_aside and order.is_open) or mission.orders.scope.worth.least
     beside = to_come if comes_later else BESIDE
     beside = beside if is_planned else unplanned
     left = _largest_first(
@@ -196,7 +196,7 @@ def mission_report(
         waits_for_room=order_state.waits_for or None,
         left_out=() if order is None else left_out(order.zones),
         time_left_s=rounded(mission.time_limit.left_s) if mission else None,
-        first_from=mission.first_from or None if mission else None,
+        first_from=mission.orders.scope.worth.least or None if mission else None,
     )
 
 
@@ -256,12 +256,12 @@ def _centre(mission: Mission, cell: tuple[int, int], cell_m: float) -> tuple[flo
 
 def zone_progress(mission: Mission) -> list[ZoneProgress]:
     """Return the progress of each zone of the order."""
-    return progress.zone_progress(mission.order_state, mission.area, mission.covered)
+    return progress.zone_progress(mission.order_state, mission.map.area, mission.covered)
 
 
 def room_progress(mission: Mission) -> dict[int, RoomProgress]:
     """Return the progress in each room, by its number."""
-    area, ahead, line = mission.area, mission.route.path.ahead, mission.line.ahead()
+    area, ahead, line = mission.map.area, mission.route.path.ahead, mission.line.ahead()
     rooms = None if area is None else mission.room_cells.on(area.lattice)
     to_go_s: dict[int, float] = {}
     if area is not None and rooms is not None:

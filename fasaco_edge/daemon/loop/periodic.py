@@ -110,7 +110,7 @@ class FloorPublisher:
         if not self._outbox.has_listeners(FLOOR):
             self._due.forget()  # the next listener has not received it
             return
-        floor, grid = mission.floor, mission.grid
+        floor, grid = mission.covered.floor, mission.grid
         key = (floor, floor.changes)
         if grid is None or not self._due.is_due(key, now, repeats=True):
             return

@@ -55,7 +55,7 @@ class Messages:
             epoch=others.shared.epoch,
             division=others.numbers.number,
             tiles=swept,
-            ground=self._ground.next(mission.area, most),
+            ground=self._ground.next(mission.map.area, most),
             by=others.numbers.by,
             parts=others.parts,
             radius_m=self._radius_m,

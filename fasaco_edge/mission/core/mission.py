@@ -44,13 +44,11 @@ from fasaco_edge.mission.coverage.progress import (
     Coverage,
 )
 from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
-from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_cells import RoomCells
 from fasaco_edge.mission.map.room_watch import RoomWatch
@@ -308,11 +306,6 @@ class Mission:
             None if lattice is None else self.map.coverage(self.covered, self.orders.known(lattice))
         )
 
-    @property
-    def first_from(self) -> int:
-        """The priority from which on floor is planned now; 0 while all is."""
-        return self.orders.scope.worth.least
-
     def snapshot(self) -> LedgerSnapshot:
         """Return the state kept over a restart: coverage, and the order's progress."""
         trail = self._trail.snapshot()
@@ -365,11 +358,6 @@ class Mission:
         return self.map.lattice
 
     @property
-    def area(self) -> ReachableArea | None:
-        """The reachable area, in the lattice's frame."""
-        return self.map.area
-
-    @property
     def ledger(self) -> CoverageLedger:
         """The covered cells."""
         return self.covered.current
@@ -378,8 +366,3 @@ class Mission:
     def trail(self) -> LivingTrail:
         """The living trail."""
         return self._trail.trail
-
-    @property
-    def floor(self) -> SweptFloor:
-        """The swept floor, in the lattice's frame."""
-        return self.covered.floor

@@ -117,7 +117,7 @@ class LineAhead:
         self._place.here = self._place.here + np.array(by)
 
     def stop(self) -> None:
-        """Leave the line for a path that is kept while the robot stands, in a pause or for others."""
+        """Leave the line for a path that is kept while the robot stands, as in a pause."""
         self.line = self.line.renumbered(-self.cell)
         self._walk, self.cell = self._walk[self.cell :], 0
 
@@ -280,20 +280,13 @@ class LineAhead:
         return raster_to_map(self._floor.geometry, points)
 
     def leads_on(self, xy: Points) -> bool:
-        """Return whether the robot can drive along points.
+        """Return whether the robot can drive straight to the first of some points, and along them.
 
-        Args:
-            xy: float64 (n, 2): x, y [m]; the robot is between the first two.
+        ``xy``: float64 (n, 2): x, y [m]; False without any.
         """
-        if len(xy) < 2:
-            return False
-        points = np.array([map_to_raster(self._floor.geometry, x, y) for x, y in xy.tolist()])
-        edge, here = points[1] - points[0], self._place.here
-        share = float(np.dot(here - points[0], edge)) / max(float(np.dot(edge, edge)), 1e-9)
-        points[0] += min(max(share, 0.0), 1.0) * edge
-        if np.hypot(*(points[0] - here)) > self._tool:
-            return False
-        return all(self._is_clear(a, b) for a, b in pairwise(points))
+        points = [np.array(map_to_raster(self._geometry, x, y)) for x, y in xy.tolist()]
+        ways = pairwise([self._place.here, *points])
+        return bool(points) and all(self._is_clear(a, b) for a, b in ways)
 
     def next_xy(self, count: int) -> Points:
         """Return the first points of ``xy``, from the robot's place on, at most ``count``."""

@@ -92,7 +92,7 @@ class PublishedLine:
             now: [s].
             is_settled: whether nothing is under way that changes the next metres.
             leads_on: whether the robot can drive along the next points of the published line,
-                float64 (n, 2): x, y [m], of which the first is behind it, while a plan is made.
+                float64 (n, 2): x, y [m], while a plan is made.
         """
         if self.differs_m > self._due_m:
             self._due_since = math.inf
@@ -103,10 +103,10 @@ class PublishedLine:
         return self.differs_m <= self._near_m and not leads_on(self._near())
 
     def _near(self) -> Points:
-        """Return the points around the next metre of the published line."""
-        rest = self._xy[max(self._next - 1, 0) :][:SEEN_POINTS]
-        ways = np.hypot(*np.diff(rest[1:], axis=0).T) if len(rest) > 1 else np.empty(0)
-        return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 3]
+        """Return the points of the next metre of the published line."""
+        rest = self._xy[self._next :][:SEEN_POINTS]
+        ways = np.hypot(*np.diff(rest, axis=0).T) if len(rest) > 1 else np.empty(0)
+        return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 2]
 
     def take(self, xy: Points, polished: int) -> None:
         """Note that a line is published, and the number of its polished points."""

@@ -80,7 +80,7 @@ def test_cells_tried_in_vain_stay_the_others_despite_new_maps():
     ours.cannot = other.cannot = {(12, 5)}
 
     def untried():
-        area = ours.mission.area
+        area = ours.mission.map.area
         return ours.mission.company.untried(area.reachable, area)[area.lattice.local((12, 5))]
 
     while untried():
@@ -150,7 +150,7 @@ def test_a_robot_whose_part_only_others_see_sweeps_what_it_sees():
     # The east half is still unknown to it, and its part lies there.
     ours = FleetRobot("r1", (0, 0), [row[:12] for row in HALL])
     other = FleetRobot("r2", (6, 12), HALL)
-    report = replace(other.report(), ground=GroundQueue().next(other.mission.area, 100))
+    report = replace(other.report(), ground=GroundQueue().next(other.mission.map.area, 100))
     parts = (Part("r1", (6, 22), 0.0, 1.0), Part("r2", (6, 4), 0.0, 1.0))
     for second in range(20):
         place = 3.0 + 0.2 * (second % 2)
@@ -176,7 +176,7 @@ def heard_from_the_east(other, number, to_r1):
     seed = (6, 22) if to_r1 else (0, 0)
     return replace(
         other.report(),
-        ground=GroundQueue().next(other.mission.area, 100),
+        ground=GroundQueue().next(other.mission.map.area, 100),
         tiles=tiles_of([cell for cell in CELLS if cell[1] < 12]),
         parts=(Part("r1", seed, 0.0 if to_r1 else 1e6, 1.0), Part("r2", (6, 14), 0.0, 1.0)),
         division=number,
@@ -263,10 +263,10 @@ def test_a_robot_plans_anew_once_others_have_swept_what_came_first():
     ours.command("start", {"until_min": 2.0})
     for _ in range(5):
         ours.tick()
-    assert ours.mission.first_from == 90
+    assert ours.mission.orders.scope.worth.least == 90
     swept = tiles_of([(row, col) for row in range(12) for col in east])
     ours.tell(replace(report, tiles=swept))
     for _ in range(3):
         ours.tick()
     assert "others have swept what lay ahead" in [each.reason for each in ours.updates]
-    assert ours.mission.first_from == 0
+    assert ours.mission.orders.scope.worth.least == 0

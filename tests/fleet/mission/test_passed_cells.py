@@ -42,7 +42,7 @@ def test_floor_of_a_passed_cell_stays_with_the_robot_that_passed():
     for is_left in (False, True):
         robot, cell = begun()
         if is_left:
-            robot.mission.floor.forget(around(cell))
+            robot.mission.covered.floor.forget(around(cell))
         for number in range(1, 9):
             robot.tell(replace(divided_by("r2", number), x=0.3 + 0.2 * (number % 2)))
             robot.drive(is_checked=False)
@@ -58,5 +58,5 @@ def test_unswept_floor_in_a_passed_cell_does_not_delay_others():
         if robot.mission.state is State.DONE:
             break
         robot.drive(is_checked=False)
-        robot.mission.floor.forget(around(cell))
+        robot.mission.covered.floor.forget(around(cell))
     assert robot.mission.state is State.DONE
