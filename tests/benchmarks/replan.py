@@ -114,7 +114,7 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
 
     return (
         ("ingest", MapState, "take_map"),
-        ("floor", Ground, "_follow_floor"),
+        ("floor", Ground, "_floor_of"),
         ("reach", MapState, "update_area"),
         ("reach", ReachableArea, "change_since"),
         ("orders", Sequencer, "note_area"),
