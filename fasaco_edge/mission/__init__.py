@@ -7,7 +7,7 @@ Read in this order:
     core/event_handler   applies each event
     core/order_changes   begins orders, and carries out commands
     core/executive       then decides what the robot does next: a list of rules, in their order
-    core/resting, errands, order_work, shut_in   the rules' contents
+    core/errands, order_work, path_checks, way_out   the rules' contents
     core/route           owns the path and the pending plan; better paths in spare time
 
     map/map_state        owns the map, the robot's cell and the reachable area

@@ -20,8 +20,7 @@ from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 if TYPE_CHECKING:
     # For types only: an idle daemon loads no kernels.
     from fasaco_edge.grid.lattice import Cell
-    from fasaco_edge.mission.core.doing import Doing
-    from fasaco_edge.mission.core.events import MemberReceived, State
+    from fasaco_edge.mission.core.events import Doing, MemberReceived, State
     from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 OpenCells = Callable[[Window], NDArray[np.bool_]]
@@ -153,28 +152,18 @@ class Company:
         """Yield viewpoints for cells that only maps of others show."""
         return iter(())
 
-    def busiest(self, open_cells: OpenCells) -> str:
-        """Return the name of the other robot with the most cells left in its part; "" for none."""
-        return ""
-
 
 class Waiting:
     """When the robot waits for others, and makes way for them: never.
 
     Attributes:
         waits_for: name of the robot that it waits for; "" for none.
-        is_near: whether another robot is near.
     """
 
     waits_for = ""
-    is_near = False
 
     def succeed(self, before: Waiting) -> None:
         """Take over the state of a predecessor."""
-
-    def line(self) -> NDArray[np.float64]:
-        """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
-        return np.zeros((0, 2))
 
     def decide(self, state: State, now: float, *, may_drive: bool) -> Doing | None:
         """Return what the robot does while it waits or makes way; None if it need not.

@@ -26,7 +26,7 @@ from fasaco_edge.mission.core.events import (
     PlanReady,
     PlanRequest,
 )
-from fasaco_edge.mission.core.spare_time import most_s
+from fasaco_edge.mission.core.plan_requests import most_s
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import AnyOf, WorkLimit, ignore

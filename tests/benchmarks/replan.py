@@ -102,6 +102,7 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
     from fasaco_edge.mission.core.route import Route
     from fasaco_edge.mission.core.trail_layer import TrailLayer
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+    from fasaco_edge.mission.line.floor_left import FloorLeft
     from fasaco_edge.mission.line.layer import LineLayer
     from fasaco_edge.mission.line.line_ahead import LineAhead
     from fasaco_edge.mission.line.polisher import Polisher
@@ -124,11 +125,10 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
         ("route", Route, "truncate"),
         ("trail", TrailLayer, "finish"),
         ("trail", TrailLayer, "posed"),
-        ("open floor", LineLayer, "_take_floor"),
+        ("open floor", FloorLeft, "update"),
         ("follow", LineLayer, "note_map"),
         ("laying", LineAhead, "lay"),
         ("laying", LineAhead, "check"),
-        ("counting", SweepTally, "count"),
         ("counting", SweepTally, "exchange"),
         ("polish", Polisher, "polish"),
         ("publishing", LineAhead, "xy"),

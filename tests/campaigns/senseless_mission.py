@@ -24,7 +24,7 @@ from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
 from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms, encode_rooms
 from fasaco_edge.daemon.loop.loader import mission_config
-from fasaco_edge.daemon.loop.mission_reports import mission_report
+from fasaco_edge.daemon.loop.mission_reports import mission_report, unswept
 from fasaco_edge.daemon.loop.outbox import headings
 from fasaco_edge.daemon.loop.periodic import MOST_SQUARES, ShownTrail
 from fasaco_edge.errors import FasacoError
@@ -282,7 +282,7 @@ class MissionTrial:
 
     def _unswept(self) -> bytes:
         """Return why floor is not swept, as it is published, b"" where that is not known."""
-        shown = self._mission.unswept()
+        shown = unswept(self._mission)
         return b"" if shown is None else encode_occupancy_grid(coarser(shown, MOST_SQUARES))
 
     def _trail(self) -> bytes:
@@ -339,7 +339,7 @@ class MissionTrial:
         mission, order = self._mission, self._mission.order_state.order
         keeps_out = (order and order.keep_out) or self._config.policy.keep_out
         keeps_out = keeps_out or mission.order_state.keep_out
-        grid = mission._map.grid
+        grid = mission.map.grid
         if grid is None or mission.lattice is None or keeps_out:
             return
         fresh = Ground(mission.rotation.config(self._config))
@@ -350,7 +350,7 @@ class MissionTrial:
             _hold(np.array_equal(now, anew), f"{name} over {geometry}")
         if fresh.floor is not None:
             for name in ("blocked", "places"):
-                now, anew = getattr(mission._map.floor, name), getattr(fresh.floor, name)
+                now, anew = getattr(mission.map.floor, name), getattr(fresh.floor, name)
                 _hold(np.array_equal(now, anew), f"{name} over {geometry}")
             check_tally(mission)
         self.counts["lattices made afresh"] += 1
@@ -368,7 +368,7 @@ class MissionTrial:
 
     def _check_line(self, xy: np.ndarray[Any, Any], reason: str) -> None:
         """Check that a line leads over places where the robot may be."""
-        floor, grid = self._mission._map.floor, self._mission._map.grid
+        floor, grid = self._mission.map.floor, self._mission.map.grid
         assert floor is not None
         assert grid is not None
         _hold(bool(np.isfinite(xy).all()), "a line that leads nowhere")

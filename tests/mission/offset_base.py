@@ -167,7 +167,7 @@ def driven(
         if mission.state is State.DONE:
             break
     judged = judge_floor(ground, np.array(track), SweepingRobot(TOOL_M, RADIUS_M), stands_at=START)
-    known = mission.floor.swept_on(judged.geometry) & judged.reachable
+    known = mission.covered.floor.swept_on(judged.geometry) & judged.reachable
     told, whole = floor_report(mission), np.count_nonzero(judged.reachable)
     return Outcome(
         mission,

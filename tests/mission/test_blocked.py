@@ -196,5 +196,5 @@ def test_updates_come_on_the_map_without_obstacles():
     robot.wait(CLOSED_S, lambda robot: False)
     assert np.count_nonzero(robot.mission.grid.cells != room()) == 4
     assert robot.mission.lattice.coverable.sum() > closed - 4
-    rows, cols = np.nonzero(robot.mission._map.grid.cells != room())
+    rows, cols = np.nonzero(robot.mission.map.grid.cells != room())
     assert (set(rows), set(cols)) == ({50, 51}, {70, 71})

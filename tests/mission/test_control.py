@@ -2,6 +2,7 @@
 
 import pytest
 
+from fasaco_edge.daemon.loop.mission_reports import zone_progress
 from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
@@ -127,7 +128,7 @@ def test_the_robot_never_drives_into_a_keep_out_zone():
     follow(drive)
     assert not set(drive.driven) & cells(1, 3, 4, 5)
     assert drive.visited == cells(0, 0, 6, 8) - cells(1, 3, 4, 5)
-    (area,) = drive.mission.unreached().areas
+    (area,) = drive.mission.orders.unreached().areas
     assert (area.cells, area.reason) == (6, "in a keep-out zone")
     assert area.cell in cells(1, 3, 4, 5)
 
@@ -136,7 +137,7 @@ def test_cells_behind_a_keep_out_are_not_blamed_on_obstacles():
     drive = idle("........", "...#....")
     drive.command("start", {"keep_out": [rectangle(0, 4, 2, 5)]})
     follow(drive)
-    found = {(area.reason, area.cells) for area in drive.mission.unreached().areas}
+    found = {(area.reason, area.cells) for area in drive.mission.orders.unreached().areas}
     assert found == {("in a keep-out zone", 2), ("closed off by a keep-out zone", 6)}
 
 
@@ -328,7 +329,7 @@ def test_cancel_stops_drops_the_order_and_keeps_the_coverage():
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "cancelled")
     assert len(drive.visited) == 6
     assert drive.tell(patch("#", at=(0, 0)), after=100.0).plan is None
-    assert drive.mission.unreached().areas == ()
+    assert drive.mission.orders.unreached().areas == ()
 
 
 def test_reset_forgets_what_is_covered_too():
@@ -390,7 +391,7 @@ def test_unknown_parts_of_a_zone_are_named():
     drive = idle("..??", "..??")
     drive.command("start", {"zones": [{"name": "all", "polygon": rectangle(0, 0, 2, 4)}]})
     follow(drive)
-    (area,) = drive.mission.unreached().areas
+    (area,) = drive.mission.orders.unreached().areas
     assert (area.cells, area.reason) == (4, "unknown to the map")
 
 
@@ -480,7 +481,7 @@ def test_how_far_each_zone_is():
     drive.command("start", {**TWO_ZONES, "passes": 2})
     seen = []
     for _ in range(300):
-        zones = [(zone.begun, zone.cells, zone.covered) for zone in drive.mission.zone_progress()]
+        zones = [(zone.begun, zone.cells, zone.covered) for zone in zone_progress(drive.mission)]
         seen.append(zones)
         if drive.mission.state is State.DONE:
             break
@@ -491,9 +492,9 @@ def test_how_far_each_zone_is():
     for east, west in seen:
         assert west[0] == 0 or east == (2, 12, 12)
     assert {east[0] for east, _ in seen} == {1, 2}
-    assert [zone.name for zone in drive.mission.zone_progress()] == ["east", "west"]
+    assert [zone.name for zone in zone_progress(drive.mission)] == ["east", "west"]
     drive.command("start")
-    assert drive.mission.zone_progress() == []
+    assert zone_progress(drive.mission) == []
 
 
 class Mapper:
@@ -537,7 +538,7 @@ def test_a_zone_nobody_has_seen_yet_is_looked_for():
     assert drive.request.problem.cells == 1
     explore(drive, mapper)
     assert cells(0, 7, 3, 9) <= drive.visited
-    assert drive.mission.unreached().areas == ()
+    assert drive.mission.orders.unreached().areas == ()
     assert not drive.visited & {(3, 0), (4, 0), (4, 1)}, "the rest of the house was not asked for"
 
 
@@ -547,4 +548,7 @@ def test_a_zone_without_a_way_to_it_is_given_up_once_all_is_seen():
     drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 7, 2, 9)}]})
     mapper.rows = tuple(line[:6] + "######" for line in HOUSE)
     explore(drive, mapper)
-    assert [area.reason for area in drive.mission.unreached().areas] in ([], ["unknown to the map"])
+    assert [area.reason for area in drive.mission.orders.unreached().areas] in (
+        [],
+        ["unknown to the map"],
+    )

@@ -117,7 +117,7 @@ def laid(line_xy):
     run = CurvedMission(ROOM, START)
     run._step([MapReceived(ROOM)])
     run._step([])
-    ahead, floor = run.mission._line._ahead, run.mission._map.floor
+    ahead, floor = run.mission.line._ahead, run.mission.map.floor
     points = np.array([map_to_raster(floor.geometry, x, y) for x, y in line_xy])
     numbers, state = np.zeros(len(points), np.int64), np.full(len(points), POLISHED, np.uint8)
     ahead.tally.exchange(edges_between(ahead.line.points), edges_between(points))
@@ -195,14 +195,6 @@ def test_a_robot_whose_disc_does_not_fit_may_leave_its_place():
     assert math.cos(curver.yaw(xy, Pose2D(4.33, 0.6))[0]) > 0.99
     assert xy[1, 0] < 4.33
     assert not bends_of(xy).spots.any()
-
-
-def test_a_line_beyond_its_walk_becomes_a_curve_too():
-    ahead, floor = laid(LANES)
-    ahead.line = ahead.line.renumbered(1000)
-    curver = Curver(configured().sweeping.curves)
-    assert curver.curve(ahead, floor, Pose2D(0.6, 0.6))
-    assert (ahead.line.cells == 1000).all()
 
 
 def test_headings_are_published_in_the_map_frame_as_the_points_are(driven):

@@ -42,7 +42,7 @@ def test_a_pose_in_ten_that_is_off_sweeps_no_floor(off_m):
     truth = SweptFloor(TOOL_M)
     for x, y in robot.track:
         truth.record(Pose2D(x, y))
-    swept, true = (floor.swept_in(AROUND) for floor in (robot.mission.floor, truth))
+    swept, true = (floor.swept_in(AROUND) for floor in (robot.mission.covered.floor, truth))
     assert np.count_nonzero(swept & ~true) == 0
     assert np.count_nonzero(swept) > 0.97 * np.count_nonzero(true)
 

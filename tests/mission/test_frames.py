@@ -197,7 +197,7 @@ def test_frames_without_end_are_not_all_held():
     for number in range(50):
         name = f"f{number}"
         drive.tell(MapReceived(building(*HALL, frame=name)), pose_at(1, 1, frame=name))
-    frames = drive.mission._map.frames
+    frames = drive.mission.map.frames
     assert len(frames._maps) == len(frames._poses) == 2
     drive.finish()
 

@@ -177,12 +177,12 @@ def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     robot.drive(20)
     mission = robot.mission
     assert mission.rotation.deg == 0.0
-    swept_m2, revision = mission.floor.swept_m2, mission.route.revision
+    swept_m2, revision = mission.covered.floor.swept_m2, mission.route.revision
     robot.tell(MapReceived(grid))
     robot.drive(15)
     assert mission.rotation.deg == pytest.approx(DEG, abs=1.0)
     assert swept_m2 > 0.5
-    assert mission.floor.swept_m2 > swept_m2
+    assert mission.covered.floor.swept_m2 > swept_m2
     assert mission.route.revision > revision
     laid = [reason for reason in robot.reasons if "cells lie along the walls" in reason]
     assert laid
@@ -194,7 +194,7 @@ def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     again.mission.restore_order(mission.order_state)
     again.tell(MapReceived(grid))
     assert again.mission.rotation.deg == mission.rotation.deg
-    assert again.mission.floor.pixels == mission.floor.pixels
+    assert again.mission.covered.floor.pixels == mission.covered.floor.pixels
     assert again.mission.order_state.home == mission.order_state.home
     robot.finish()
     assert len([r for r in robot.reasons if "cells lie along the walls" in r]) <= len(laid) + 1
@@ -223,7 +223,7 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(3.0, 2.4)))
     robot.drive(60)
-    robot.mission._ledger.break_track()
+    robot.mission.covered.break_track()
     before = robot.mission.snapshot()
     after = rotated_ledger(before, DEG)
     assert after.lattice_deg == DEG
@@ -249,7 +249,7 @@ def test_floor_that_is_carried_over_lies_where_it_was():
 def snapshot_of(ledger):
     mission = Mission(CONFIG)
     mission.restore_ledger(replace(ledger, lattice_deg=0.0))
-    return mission.floor
+    return mission.covered.floor
 
 
 def looks(grid, metres=12):

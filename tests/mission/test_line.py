@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import PASSED as PASSED_BY
-from fasaco_edge.daemon.loop.mission_reports import floor_report
+from fasaco_edge.daemon.loop.mission_reports import floor_report, unswept
 from fasaco_edge.grid import floor_map
 from fasaco_edge.grid.fine_raster import raster_to_map
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
@@ -29,11 +29,10 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
-from fasaco_edge.mission.line.figures import Unswept
-from fasaco_edge.mission.line.missed_floor import Cause
 from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.tally import SweepTally
+from fasaco_edge.mission.line.unswept import OUT_OF_REACH, Unswept
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
@@ -110,15 +109,15 @@ class Robot:
 
 def check_tally(mission):
     """What is counted is what a fresh count of the line ahead gives."""
-    ahead = mission._line._ahead
+    ahead = mission.line._ahead
     if ahead is None:
         return
     fresh = SweepTally(ahead._floor)
-    swept = mission.floor.swept_on(ahead._floor.geometry)
+    swept = mission.covered.floor.swept_on(ahead._floor.geometry)
     whole = Window(0, 0, *swept.shape)
     state, points = ahead.tally._state, ahead.line.points
     # Without a reachable area no floor is asked for, and all is looked at once there is one.
-    assert mission._line._asked is None or (((state & SWEPT) > 0) == swept).all()
+    assert mission.line.left._asked is None or (((state & SWEPT) > 0) == swept).all()
     fresh._state |= state & PASSED
     fresh.set_open(whole, (state & WANTED) > 0, swept)
     edges = np.concatenate([points[:-1], points[1:]], axis=1)
@@ -135,7 +134,7 @@ def check_tally(mission):
     tally = ahead.tally
     assert tally._wanted_pixels == np.count_nonzero(state & WANTED)
     assert tally._open_pixels == np.count_nonzero(state & OPEN)
-    for cause in Cause:
+    for cause in OUT_OF_REACH:
         pixels = np.count_nonzero((state & np.uint8(CAUSE)) >> CAUSE_SHIFT == cause)
         assert tally._beyond_pixels[cause] == pixels
     blocks = padded.reshape(high, 8, wide, 8).sum(axis=(1, 3))
@@ -157,10 +156,10 @@ def test_a_pose_that_jumps_within_reach_searches_nothing():
     """Each of a burst searched the whole lattice, and compared it with itself."""
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(3.0, 2.4)))
-    area, robot.at = robot.mission._map.area, (START[0] + 1.5, START[1])
+    area, robot.at = robot.mission.map.area, (START[0] + 1.5, START[1])
     robot.tell()
     assert area is not None
-    assert robot.mission._map.area is area
+    assert robot.mission.map.area is area
     assert not area.change_since(area)
 
 
@@ -173,7 +172,7 @@ def test_a_room_is_swept_to_its_rim():
     centres = 1.0 - (2 * 0.15 * (3.0 + 2.4)) / (3.0 * 2.4)
     assert judged.figures.swept_share > max(0.97, centres)
     assert judged.figures.illegal_share == 0.0
-    assert robot.mission.floor.swept_m2 <= judged.swept.sum() * 0.025**2 * 1.005
+    assert robot.mission.covered.floor.swept_m2 <= judged.swept.sum() * 0.025**2 * 1.005
     told = floor_report(robot.mission)
     assert told.reachable_m2 == pytest.approx(judged.figures.reachable_m2, rel=0.01)
     assert told.reached_m2 == pytest.approx(judged.figures.swept_m2, rel=0.01)
@@ -192,16 +191,16 @@ def test_a_room_is_swept_to_its_rim():
 
 def test_the_line_ahead_is_timed_and_bounded_from_below():
     grid, robot = room(3.0, 2.4), Robot(Mission(CONFIG))
-    assert robot.mission.line_ahead() is None
+    assert robot.mission.line.ahead() is None
     robot.tell(MapReceived(grid))
     robot.drive(3)
-    line = robot.mission.line_ahead()
+    line = robot.mission.line.ahead()
     judged = judge_floor(grid, np.array([robot.at, *robot.line]), ROBOT).figures
     assert line.seconds == pytest.approx(judged.seconds, rel=0.02)
     assert 0.8 * judged.least_s < line.least_s < judged.least_s
     assert line.gap == pytest.approx(line.seconds / line.least_s - 1.0)
     robot.finish()
-    assert robot.mission.line_ahead().gap is None
+    assert robot.mission.line.ahead().gap is None
 
 
 def test_the_status_says_what_of_the_floor_is_left_and_why():
@@ -240,7 +239,7 @@ def test_the_rest_of_an_order_is_pending_while_the_robot_is_home():
 
 def why_unswept(mission, x, y):
     """Return why the floor at x, y [m] is not swept; all areas are those of the status."""
-    grid, told = mission.unswept(), floor_report(mission)
+    grid, told = unswept(mission), floor_report(mission)
     pixels = np.bincount(grid.cells.ravel(), minlength=len(Unswept) + 1) * 0.025**2
     assert sum(left.m2 for left in told.left) == pytest.approx(pixels[4:].sum(), abs=0.002)
     beyond = sum(left.m2 for left in told.out_of_reach)
@@ -289,13 +288,13 @@ def test_the_line_avoids_a_new_keep_out_at_once():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(4.8, 2.4)))
     robot.drive(20)
-    covered, swept_m2 = robot.mission.coverage().covered, robot.mission.floor.swept_m2
+    covered, swept_m2 = robot.mission.coverage().covered, robot.mission.covered.floor.swept_m2
     assert covered > 3
     corners = ((4.2, 2.0), (4.7, 2.0), (4.7, 2.5), (4.2, 2.5))
     robot.tell(CommandReceived(1, "keep_out_add", keep_out=KeepOut("column", corners)))
     began = len(robot.trail)
     assert robot.mission.coverage().covered >= covered
-    assert robot.mission.floor.swept_m2 >= swept_m2
+    assert robot.mission.covered.floor.swept_m2 >= swept_m2
     robot.finish()
     for x, y in robot.trail[began:]:
         assert not (4.2 < x < 4.7 and 2.0 < y < 2.5)
@@ -325,45 +324,6 @@ def test_unreachable_floor_follows_map_growth_and_zone_orders():
         robot.tell(MapReceived(OccupancyGrid(whole.geometry, seen)))
         robot.drive(3)
     assert floor_report(robot.mission).out_of_reach == floor_report(last.mission).out_of_reach
-
-
-def test_an_obstacle_ahead_keeps_the_line_beyond_it():
-    grid = room(12.0, 3.0)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
-    for _ in range(60):
-        robot.tell()
-    robot.drive(20)
-    kept = []
-    for number in range(24):
-        robot.drive(2)
-        # So far along its line from the robot, where the line still leads now and then.
-        at = point_along(robot.line, robot.at, 0.7 + 0.1 * (number % 12))
-        col, row = (int(place) for place in grid.geometry.to_pixels(*at))
-        before = far_points(robot, at)
-        robot.tell(MapReceived(with_obstacle(grid, row - 2, col - 2, 4)))
-        check_tally(robot.mission)
-        kept.append(len(before & far_points(robot, at)) / len(before))
-        robot.tell(MapReceived(grid))
-    # Now and then the walk further on gains by another way round.
-    assert sum(kept) / len(kept) > 0.85
-    robot.finish()
-
-
-def point_along(line, start, length_m):
-    """Return the point so far along a line from its start."""
-    for end in line:
-        if (edge_m := math.dist(start, end)) >= length_m:
-            share = length_m / edge_m
-            return tuple(a + share * (b - a) for a, b in zip(start, end, strict=True))
-        start, length_m = end, length_m - edge_m
-    return start
-
-
-def far_points(robot, at):
-    """Return the points of the line, published or not, that are far from a place."""
-    line = robot.mission._line._ahead.xy().round(6)
-    return {(x, y) for x, y in line.tolist() if math.dist((x, y), at) > 3.0}
 
 
 def test_the_same_events_give_the_same_line():
@@ -483,7 +443,7 @@ def test_a_plan_continues_from_the_cell_nearest_to_the_robot():
     for _ in range(60):
         robot.drive()
         path = robot.mission.route.path
-        stand = robot.mission._map.place_of(tuple(path.cells[path.index].tolist()))
+        stand = robot.mission.map.place_of(tuple(path.cells[path.index].tolist()))
         assert math.dist(stand, robot.at) < 0.65 * CELL_M
 
 
@@ -497,7 +457,7 @@ def test_the_current_cell_stays_near_a_robot_on_a_polished_line():
     for _ in range(600):
         robot.drive(is_checked=False)
         path = robot.mission.route.path
-        stand = robot.mission._map.place_of(tuple(path.cells[path.index].tolist()))
+        stand = robot.mission.map.place_of(tuple(path.cells[path.index].tolist()))
         apart.append(math.dist(stand, robot.at))
     assert np.median(apart) < 0.5 * CELL_M
     assert max(apart) < 4.0 * CELL_M
@@ -510,14 +470,12 @@ def test_a_path_that_ends_where_it_was_cut_off_is_whole_again():
     robot.at = 2.3, 1.2
     robot.tell(MapReceived(grid))
     robot.drive(12)
-    ahead = robot.mission._line._ahead
     cells = len(robot.mission.route.path.cells)
     wall = grid.cells.copy()
     wall[:, -30:] = 100
     robot.tell(MapReceived(OccupancyGrid(grid.geometry, wall)))
     assert len(robot.mission.route.path.cells) < cells
     assert not robot.mission.route.wanted
-    assert not ahead.is_cut
     robot.finish()
 
 
@@ -583,7 +541,7 @@ def test_a_pause_leaves_the_line_as_it_was():
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(20)
     # As it is polished by now: of what lies further on the robot was not told yet.
-    before = mission._line._ahead.xy()[1:]
+    before = mission.line._ahead.xy()[1:]
     robot.tell(CommandReceived(1, "pause"))
     assert robot.line == []
     # A robot that brakes comes a little further.
@@ -672,7 +630,7 @@ def test_a_map_shifted_by_part_of_a_pixel_keeps_most_of_the_line():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))
     robot.drive(10)
-    ahead = robot.mission._line._ahead
+    ahead = robot.mission.line._ahead
     before = raster_to_map(ahead._geometry, ahead.line.points)
     robot.tell(MapReceived(shifted(grid, 0.012)))
     check_tally(robot.mission)
@@ -711,8 +669,8 @@ def test_a_line_on_a_growing_map_never_becomes_worse():
     grid = with_obstacle(with_obstacle(room(6.0, 3.0), 22, 30), 0, 82, 62, UNKNOWN)
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))
-    assert robot.mission._orders.cells.is_exploring
-    ahead, line = robot.mission._line._ahead, CONFIG.sweeping.line
+    assert robot.mission.orders.cells.is_exploring
+    ahead, line = robot.mission.line._ahead, CONFIG.sweeping.line
     while (first := ahead.line.first_below(POLISHED)) < len(ahead.line) and (
         ahead.lengths()[first] <= AHEAD_M
     ):
@@ -731,7 +689,7 @@ def test_the_robot_is_told_of_another_line_when_it_comes_near_it():
     robot.tell(MapReceived(room(6.0, 3.0)))
     for _ in range(100):
         robot.tell()
-    told, ahead = len(robot.reasons), robot.mission._line._ahead
+    told, ahead = len(robot.reasons), robot.mission.line._ahead
     for _ in range(100):
         robot.tell()
     # It stands: random moves go on further ahead, and are not its concern yet.
@@ -774,17 +732,17 @@ def test_what_is_forgotten_is_to_be_swept_again(poses_a_step):
         xs = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M - x
         return (np.abs(ys) < 0.1)[:, None] & (np.abs(xs) < 0.1)
 
-    before = mission.floor.pixels
-    mission.floor.forget(around)
-    assert mission.floor.pixels <= before - 50
+    before = mission.covered.floor.pixels
+    mission.covered.floor.forget(around)
+    assert mission.covered.floor.pixels <= before - 50
     ways = np.array([robot.at, *robot.line])[:40:3]
     poses = np.concatenate([np.linspace(a, b, 8) for a, b in pairwise(ways)])[:32]
     events = [PoseReceived(StampedPose(Pose2D(*pose), "map")) for pose in poses.tolist()]
     for first in range(0, 32, poses_a_step):
         robot.now += 0.1
         mission.step(events[first : first + poses_a_step], robot.now)
-    tally, floor = mission._line._ahead.tally, mission._map.floor
+    tally, floor = mission.line._ahead.tally, mission.map.floor
     whole = Window(0, 0, *tally.shape)
-    is_left = (tally._state & WANTED > 0) & ~mission.floor.swept_on(floor.geometry, whole)
+    is_left = (tally._state & WANTED > 0) & ~mission.covered.floor.swept_on(floor.geometry, whole)
     # The two rasters differ along the rims of what was driven, by a few pixels.
     assert np.count_nonzero(is_left & (tally._state & OPEN == 0)) < 25

@@ -112,7 +112,7 @@ def test_a_map_that_turns_by_a_degree_with_each_message():
     robot.tell(MapReceived(grid))
     robot.finish()
     assert_clear(robot, grid)
-    assert robot.mission.floor_to_sweep().left_m2 < 0.5
+    assert robot.mission.line.left.areas.left_m2 < 0.5
 
 
 @pytest.mark.parametrize("far_m", [8_000.0, 900_000.0])
@@ -175,14 +175,14 @@ def test_without_its_last_keep_out_the_whole_floor_is_swept():
     robot = Robot(Mission(CONFIG))
     for _ in range(2):
         robot.tell(MapReceived(grid))
-    asked_m2 = robot.mission.floor_to_sweep().asked_m2
+    asked_m2 = robot.mission.line.left.areas.asked_m2
     polygon = ((3.6, 2.2), (3.9, 2.2), (3.9, 2.5), (3.6, 2.5))
     for number, name in enumerate(("keep_out_add", "keep_out_remove")):
         keep_out = KeepOut("vase", polygon if name == "keep_out_add" else ())
         robot.tell(CommandReceived(number, name, keep_out=keep_out))
-        is_less = robot.mission.floor_to_sweep().asked_m2 < asked_m2
+        is_less = robot.mission.line.left.areas.asked_m2 < asked_m2
         assert is_less == (name == "keep_out_add")
-    assert robot.mission.floor_to_sweep().asked_m2 == asked_m2
+    assert robot.mission.line.left.areas.asked_m2 == asked_m2
     robot.finish()
     figures = judge_floor(grid, np.array([*robot.trail, robot.at]), ROBOT).figures
     assert figures.swept_share > 0.95

@@ -180,10 +180,10 @@ def along(track, angle_deg):
 def test_a_line_keeps_the_direction_of_its_pass():
     robot, _ = robot_in_room()
     order(robot, "edge", "auto", "cross")
-    asked = robot.mission.floor_to_sweep().asked_m2
+    asked = robot.mission.line.left.areas.asked_m2
     lap, lanes, across, *_ = tracks(robot).values()
     # The floor within is not asked for.
-    assert asked < 0.45 * robot.mission.floor_to_sweep().asked_m2
+    assert asked < 0.45 * robot.mission.line.left.areas.asked_m2
     assert along(lanes, 0.0) > 2 * along(lanes, 90.0)
     assert along(across, 90.0) > 2 * along(across, 0.0)
     middle = np.hypot(*(lap - (lap.min(axis=0) + lap.max(axis=0)) / 2).T)

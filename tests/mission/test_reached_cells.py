@@ -128,7 +128,7 @@ def test_what_was_reachable_moves_with_the_map(motion):
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
     assert robot.mission.reason.startswith("every reachable cell is covered")
     covered = robot.mission.coverage()
-    assert covered.coverable == np.count_nonzero(robot.mission.area.reachable)
+    assert covered.coverable == np.count_nonzero(robot.mission.map.area.reachable)
 
 
 @pytest.mark.parametrize("motion", [MOTIONS[0], (*SHIFTS[1], 0.0)])

@@ -33,7 +33,7 @@ def drives(*rows, cell=(0, 0), config=RETRIES):
 
 
 def reasons(drive):
-    return [(area.cells, area.reason) for area in drive.mission.unreached().areas]
+    return [(area.cells, area.reason) for area in drive.mission.orders.unreached().areas]
 
 
 def test_a_room_with_a_shut_door_is_tried_again_later():
@@ -97,7 +97,7 @@ def test_what_never_could_be_reached_is_named_and_not_waited_for():
     drive.run(State.DONE)
     assert drive.now < 5.0
     assert reasons(drive) == [(4, "closed off by obstacles")]
-    (area,) = drive.mission.unreached().areas
+    (area,) = drive.mission.orders.unreached().areas
     assert area.cell in {(row, col) for row in (0, 1) for col in (4, 5)}
 
 

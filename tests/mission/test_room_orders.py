@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import pytest
 
+from fasaco_edge.daemon.loop.mission_reports import room_progress, zone_progress
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.polygons import is_near
@@ -99,9 +100,9 @@ def test_a_room_is_ordered_by_its_name_and_by_its_number():
     east = {(row, col) for row in range(10) for col in EAST_COLUMNS}
     assert east <= drive.visited
     assert len(visited(drive, WEST_COLUMNS)) < 30
-    (zone,) = drive.mission.zone_progress()
+    (zone,) = zone_progress(drive.mission)
     assert (zone.name, zone.covered) == ("kitchen", zone.cells)
-    progress = drive.mission.room_progress()
+    progress = room_progress(drive.mission)
     east_room = progress[room_at(drive, *IN_EAST).id]
     assert (east_room.cells, east_room.covered, east_room.share) == (zone.cells, zone.covered, 1.0)
     assert progress[room_at(drive, *IN_WEST).id].covered < 30
@@ -283,7 +284,7 @@ def test_a_ring_of_corridors_does_not_contain_the_room_within(deg):
     assert len(book.rooms) == 2
     start(drive, ring.title)
     drive.plan()
-    (zone,) = drive.mission.zone_progress()
+    (zone,) = zone_progress(drive.mission)
     within = {(row, col) for row in range(7, 19) for col in range(7, 19)}
     assert 400 < zone.cells <= 26 * 26 - 14 * 14 + 2
     lattice = drive.mission.lattice

@@ -221,10 +221,10 @@ def test_a_robot_that_stops_short_is_not_resent_for_ever():
     assert drive.mission.state is State.DONE
     ending = "66 % of 0.2 m2 covered; 0.1 m2 not reached: left over after 4 tries (0.1 m2)"
     assert drive.mission.reason == ending
-    (area,) = drive.mission.unreached().areas
+    (area,) = drive.mission.orders.unreached().areas
     assert (area.cells, area.cell, area.reason) == (1, (0, 2), "left over after 4 tries")
     drive.tell(pose_at(0, 2))
-    assert drive.mission.unreached().areas == ()
+    assert drive.mission.orders.unreached().areas == ()
 
 
 def test_a_map_that_jumps_far_away_costs_no_memory_in_between():
@@ -380,7 +380,7 @@ def test_after_lost_updates_only_a_full_map_counts():
     assert "updates before it were lost" in str(fault_of(drive, patch("#", at=(2, 2))))
     drive.tell(MapReceived(building(*ROOM)))
     assert drive.tell(patch("#", at=(2, 2))).faults == ()
-    assert np.count_nonzero(drive.mission.area.reachable) == 23
+    assert np.count_nonzero(drive.mission.map.area.reachable) == 23
 
 
 def test_a_pose_or_map_in_another_frame_is_a_fault():

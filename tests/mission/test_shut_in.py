@@ -70,7 +70,7 @@ def test_a_shut_in_robot_that_gives_up_its_cells_is_not_done():
     """What it could not come to in the niche was given up, and with it all of the room."""
     robot = shut_in(by=5)
     for _ in range(5):
-        robot.mission._orders.advance(robot.now)
+        robot.mission.orders.advance(robot.now)
     assert robot.mission.order_state.is_open
     robot.wait(10.0, lambda robot: False)
     assert robot.mission.state != "done"

@@ -322,24 +322,24 @@ def test_a_mission_sweeps_the_floor_it_drives_over():
     drive = Drive((0, 0), MapReceived(building("....", "....")), pose_at(0, 0))
     drive.plan()
     drive.finish()
-    floor, snapshot = drive.mission.floor, drive.mission.snapshot()
+    floor, snapshot = drive.mission.covered.floor, drive.mission.snapshot()
     # All but the corners, at a wall, that a round tool leaves.
     assert floor.swept_m2 == pytest.approx(8 * CELL**2, rel=0.1)
     assert snapshot.floor.pixels == floor.pixels
     drive.command("reset")
-    assert floor.swept_m2 > drive.mission.floor.swept_m2 > 0, "where it stands"
+    assert floor.swept_m2 > drive.mission.covered.floor.swept_m2 > 0, "where it stands"
 
 
 def test_a_second_pass_forgets_the_floor_of_its_zone():
     drive = Drive((0, 0), MapReceived(building("........")), pose_at(0, 0))
     drive.plan()
     drive.finish()
-    whole = drive.mission.floor.pixels
+    whole = drive.mission.covered.floor.pixels
     zone = {"name": "east", "polygon": rectangle(0, 0, 1, 4), "passes": 1}
     drive.command("start", {"zones": [zone]})
-    assert drive.mission.floor.pixels == pytest.approx(0.5 * whole, rel=0.15)
+    assert drive.mission.covered.floor.pixels == pytest.approx(0.5 * whole, rel=0.15)
     mid = round(4 * CELL / PIXEL_M)
-    swept = drive.mission.floor.swept_in(Window(0, mid - 10, 10, mid + 10))
+    swept = drive.mission.covered.floor.swept_in(Window(0, mid - 10, 10, mid + 10))
     assert not swept[:, :10].any()
     assert swept[:, 10:].any()
 
@@ -355,7 +355,7 @@ def test_floor_before_a_restart_counts_until_a_map_contradicts():
         drive = Drive((1, 1))
         drive.mission.restore_ledger(kept)
         drive.tell(MapReceived(building(*rows)), pose_at(1, 1))
-        return drive.mission.floor
+        return drive.mission.covered.floor
 
     assert resumed(*rooms).pixels >= kept.floor.pixels
     other = ["#" * 30, *("#." + "#." * 14 for _ in range(8)), "#" * 30]

@@ -109,7 +109,7 @@ def beside(xy, most_m):
 def test_what_is_said_to_be_swept_is_swept(ground, config, noise_m, beside_m, right, known):
     mission, track = driven(ground, config, noise_m, beside_m)
     judged = judge_floor(ground, track, SweepingRobot(TOOL_M, RADIUS_M))
-    said = mission.floor.swept_on(judged.geometry) & judged.reachable
+    said = mission.covered.floor.swept_on(judged.geometry) & judged.reachable
     print(f"{np.count_nonzero(said & judged.swept) / np.count_nonzero(said):.4f} of what it says,")
     print(f"{np.count_nonzero(said & judged.swept) / np.count_nonzero(judged.swept):.4f} of all")
     assert np.count_nonzero(said & judged.swept) >= right * np.count_nonzero(said)

@@ -91,7 +91,7 @@ def test_after_a_lost_pose_the_robot_may_be_in_another_room():
     drive.tell(after=5.0)
     drive.cell = (0, 6)
     drive.tell(pose_at(0, 6))
-    assert np.count_nonzero(drive.mission.area.reachable) == 6
+    assert np.count_nonzero(drive.mission.map.area.reachable) == 6
     drive.finish()
     assert {(row, col) for row in (0, 1) for col in (4, 5, 6)} <= drive.visited
 

@@ -59,7 +59,7 @@ def mission_in(grid, order=None):
 
 def report(mission):
     """Return a report as of something having changed."""
-    mission._ledger.current.total += 1
+    mission.covered.current.total += 1
     return mission_report(mission, mission.order_state)
 
 

@@ -7,6 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from fasaco_edge.daemon.loop.mission_reports import room_progress, zone_progress
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PriorityReceived, State
@@ -68,11 +69,11 @@ def test_the_room_of_higher_priority_comes_first_where_time_is_short():
     assert finish(ranked(None, until_min=TIGHT_MIN))[1] < 60
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
-    assert drive.mission.first_from == 80
+    assert drive.mission.orders.scope.worth.least == 80
     west, east = finish(drive)
     assert east == 90
     assert west < 60
-    assert drive.mission.first_from == 0
+    assert drive.mission.orders.scope.worth.least == 0
     # A room of lower priority comes last.
     assert finish(ranked(20, until_min=TIGHT_MIN))[1] < 60
 
@@ -92,11 +93,11 @@ def test_a_robot_that_turns_out_too_slow_turns_to_what_matters():
     drive = ranked(80, until_min=5.0)
     for _ in range(20):
         tick(drive)
-        assert drive.mission.first_from == 0
+        assert drive.mission.orders.scope.worth.least == 0
     for _ in range(30):
         tick(drive)
         drive.tell(after=3.0)
-    assert drive.mission.first_from == 80
+    assert drive.mission.orders.scope.worth.least == 80
     tick(drive)
     reasons = [each.reason for each in drive.updates]
     assert "not all can be done in time: the most worthwhile floor first" in reasons
@@ -107,16 +108,16 @@ def test_a_robot_that_turns_out_too_slow_turns_to_what_matters():
 def test_nothing_is_planned_first_once_time_is_up():
     drive = ranked(80, until_min=0.5)
     drive.plan()
-    assert drive.mission.first_from == 80
+    assert drive.mission.orders.scope.worth.least == 80
     drive.command("pause")
     drive.tell(after=40.0)
-    assert drive.mission.first_from == 0
+    assert drive.mission.orders.scope.worth.least == 0
 
 
 def test_the_rest_follows_where_time_is_left_after_all():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
-    assert drive.mission.first_from == 80
+    assert drive.mission.orders.scope.worth.least == 80
     drive.command("room_set", room=RoomRequest("bath", priority=50))
     drive.command("start", {"until_min": 60.0})
     assert min(finish(drive)) == 90
@@ -135,7 +136,7 @@ def test_the_battery_is_a_limit_too():
         drive.command("start")
         for _ in range(130):
             tick(drive)
-        shares.append(drive.mission.room_progress()[number].share)
+        shares.append(room_progress(drive.mission)[number].share)
     assert shares[0] < 0.6
     assert shares[1] == 1.0
 
@@ -143,12 +144,12 @@ def test_the_battery_is_a_limit_too():
 def test_what_comes_first_and_cannot_be_reached_does_not_keep_the_rest():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
-    orders = drive.mission._orders
+    orders = drive.mission.orders
     for _ in range(MAX_IN_VAIN):
         assert not orders.note_path_end("")
-        assert drive.mission.first_from == 80
+        assert drive.mission.orders.scope.worth.least == 80
     assert not orders.note_path_end("")
-    assert drive.mission.first_from == 0
+    assert drive.mission.orders.scope.worth.least == 0
     problem = drive.command("replan").plan.problem
     assert np.count_nonzero(problem.to_cover) > 150, "the other room, too"
 
@@ -165,7 +166,7 @@ def test_a_map_of_dirt_says_what_comes_first():
     drive.tell(dirt(90))
     drive.command("start", {"until_min": TIGHT_MIN})
     drive.plan()
-    assert drive.mission.first_from == 90
+    assert drive.mission.orders.scope.worth.least == 90
     west, east = finish(drive)
     assert east == 90
     assert west < 60
@@ -175,18 +176,21 @@ def test_a_map_of_dirt_says_what_comes_first():
     after.step(drive.mission.held(), 0.0)
     order = {"zones": [{"name": "all", "polygon": rectangle(0, 0, 10, 21)}], "until_min": 2.5}
     decision = after.step([CommandReceived(1, "start", read_order(order), discard=True)], 1.0)
-    assert after.first_from == 90
+    assert after.orders.scope.worth.least == 90
     assert np.count_nonzero(decision.plan.problem.to_cover) == 90
 
 
 def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
-    assert drive.mission.first_from == 80
+    assert drive.mission.orders.scope.worth.least == 80
     for _ in range(5):
         tick(drive)
     drive.tell(dirt(95, columns=WEST_COLUMNS))
-    assert (drive.request.reason, drive.mission.first_from) == ("priorities have changed", 95)
+    assert (drive.request.reason, drive.mission.orders.scope.worth.least) == (
+        "priorities have changed",
+        95,
+    )
     drive.plan()
     drive.tell(dirt(95, columns=WEST_COLUMNS))
     assert drive.request is None, "the same again"
@@ -194,7 +198,7 @@ def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
     drive = ranked(None, until_min=60.0)
     drive.plan()
     drive.tell(dirt(95))
-    assert (drive.request, drive.mission.first_from) == (None, 0)
+    assert (drive.request, drive.mission.orders.scope.worth.least) == (None, 0)
 
 
 def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
@@ -208,7 +212,7 @@ def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
     assert not early.tell(*first_map).faults
     drive.command("start", {"until_min": TIGHT_MIN})
     drive.plan()
-    assert drive.mission.first_from == 0
+    assert drive.mission.orders.scope.worth.least == 0
 
 
 def test_one_slow_path_does_not_count_in_later_passes():
@@ -268,7 +272,7 @@ def test_zones_of_higher_priority_come_first_where_time_is_short(priorities, unt
     order = {"zones": zones(**priorities), "until_min": until_min}
     drive.command("start", order)
     assert drive.mission.order_state.order.zones[0].name == first
-    assert drive.mission.zone_progress()[0].name == first
+    assert zone_progress(drive.mission)[0].name == first
     # The same order goes on, and so does one that is kept over a restart.
     assert are_same(drive.mission.order_state.order, read_order(order))
     kept = OrderState.from_json(drive.mission.order_state.to_json())

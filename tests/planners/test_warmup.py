@@ -98,7 +98,7 @@ def test_a_mission_with_decoded_maps_compiles_nothing_new(turn_s, sweeping):
     again = replace(asked.problem, before=path.cells[::-1].copy())
     assert NearOptimal().plan(again, WorkLimit(SearchWork(perturbations=5))).steps
     assert Fasaco().plan(asked.problem).steps
-    if (ahead := mission._line._ahead) is not None:
+    if (ahead := mission.line._ahead) is not None:
         walk = mission.route.path.ahead
         better = np.concatenate((walk, walk[-2:-1]))
         better.flags.writeable = False  # as a plan's cells

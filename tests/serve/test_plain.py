@@ -8,7 +8,7 @@ import pytest
 
 from fasaco_edge.daemon.loop import mission_reports
 from fasaco_edge.mission.coverage import unreached
-from fasaco_edge.mission.line import missed_floor
+from fasaco_edge.mission.line import unswept
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import STATES
@@ -55,7 +55,7 @@ def test_a_room_that_is_waited_for_is_named():
 
 def test_all_reasons_for_floor_left_have_an_owners_words():
     reasons = {
-        *missed_floor.REASONS.values(),
+        *unswept.OUT_OF_REACH.values(),
         *unreached.REASONS.values(),
         mission_reports.PASSED,
         mission_reports.BESIDE,
@@ -64,7 +64,7 @@ def test_all_reasons_for_floor_left_have_an_owners_words():
     assert {mission_reports.ON_PATH, *mission_reports.LATER} == set(plain.TO_COME)
     assert unreached.LEFT_OVER.startswith(plain.TRIED)
     assert not [text for text in (*plain.LEFT.values(), plain.ENDED) if TECHNICAL.search(text)]
-    of_floor = {*missed_floor.REASONS.values(), mission_reports.PASSED, mission_reports.BESIDE}
+    of_floor = {*unswept.OUT_OF_REACH.values(), mission_reports.PASSED, mission_reports.BESIDE}
     assert set(plain.MARKS) == of_floor | set(plain.TO_COME)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, NothingToCover
 from fasaco_edge.host.resources import folder
-from fasaco_edge.mission.line.figures import Unswept
+from fasaco_edge.mission.line.unswept import Unswept
 from fasaco_edge.wire import limits, schemas, topics
 from fasaco_edge.wire.documents.json_text import decode_json, encode_json
 from fasaco_edge.wire.documents.replies import encode_error

@@ -7,7 +7,7 @@ import inspect
 
 from fasaco_edge.client.phrases import swept
 from fasaco_edge.mission.core.events import BETTER
-from fasaco_edge.mission.line import layer, published_line
+from fasaco_edge.mission.line import floor_left, published_line
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.reasons import WORDS, plain
 
@@ -23,7 +23,7 @@ def literals(module: object) -> str:
 def test_each_reason_is_one_that_a_mission_publishes() -> None:
     assert set(WORDS) == {BETTER, "line polished"}
     assert "line polished" in literals(published_line)
-    assert " m2 if walls are a pixel thinner than on the map" in literals(layer)
+    assert " m2 if walls are a pixel thinner than on the map" in literals(floor_left)
 
 
 def test_a_reason_is_shown_in_plain_words() -> None:

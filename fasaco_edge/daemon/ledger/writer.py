@@ -85,7 +85,11 @@ class LedgerKeeper:
     def keep(self, mission: Mission | None, now: float) -> None:
         """Write changes: an order at once, coverage once a period."""
         if mission is not None:
-            changes = mission.floor.changes, mission.trail.changes, mission.shared.version
+            changes = (
+                mission.covered.floor.changes,
+                mission.trail.changes,
+                mission.covered.shared.version,
+            )
             state = mission.order_state
             spent = int(state.spent_s // SPENT_PERIOD_S)
             held = _Kept(mission.ledger.total, *changes, state, spent)

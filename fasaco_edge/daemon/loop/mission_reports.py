@@ -6,7 +6,12 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.coverage import progress
+from fasaco_edge.mission.coverage.progress import RoomProgress, ZoneProgress
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.wire.documents.replies import (
@@ -84,7 +89,7 @@ def drive_report(mission: Mission | None, cost: CoverageCost) -> DriveReport:
     planned_s = round(cost.quarter_turn_s, 3)
     if mission is None:
         return DriveReport(planned_s)
-    times = mission.drive_times()
+    times = mission.drive.times
     return DriveReport(
         planned_s,
         rounded(times.speed_m_s),
@@ -116,14 +121,14 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     """Return the swept floor and the floor left; None without a mission."""
     if mission is None:
         return None
-    swept_m2, to_sweep = round(mission.floor.swept_m2, 3), mission.floor_to_sweep()
+    swept_m2, to_sweep = round(mission.covered.floor.swept_m2, 3), mission.line.left.areas
     if to_sweep is None:
         return FloorReport(swept_m2)
     # Before the first path no floor has been judged; on the way home the line is set aside.
     order, is_planned = mission.order_state, mission.route.revision > 0
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
-    comes_later = (is_aside and order.is_open) or mission.first_from
+    comes_later = (is_aside and order.is_open) or mission.orders.scope.worth.least
     beside = to_come if comes_later else BESIDE
     beside = beside if is_planned else unplanned
     left = _largest_first(
@@ -191,7 +196,7 @@ def mission_report(
         waits_for_room=order_state.waits_for or None,
         left_out=() if order is None else left_out(order.zones),
         time_left_s=rounded(mission.time_limit.left_s) if mission else None,
-        first_from=mission.first_from or None if mission else None,
+        first_from=mission.orders.scope.worth.least or None if mission else None,
     )
 
 
@@ -217,7 +222,7 @@ def _zones(mission: Mission | None, order_state: OrderState) -> Iterator[ZoneRep
         for zone, corners in zones:
             yield ZoneReport(zone.name, zone.passes, polygon=corners)
         return
-    for done, (_, corners) in zip(mission.zone_progress(), zones, strict=True):
+    for done, (_, corners) in zip(zone_progress(mission), zones, strict=True):
         counts = done.begun, done.cells, done.covered
         yield ZoneReport(done.name, done.passes, *counts, polygon=corners)
 
@@ -225,7 +230,7 @@ def _zones(mission: Mission | None, order_state: OrderState) -> Iterator[ZoneRep
 def _unreached(mission: Mission | None) -> UnreachedReport:
     if mission is None or mission.lattice is None:
         return UnreachedReport()
-    found, cell_m = mission.unreached(), mission.lattice.cell_m
+    found, cell_m = mission.orders.unreached(), mission.lattice.cell_m
     areas = tuple(
         UnreachedArea(
             area.cells,
@@ -247,3 +252,29 @@ def _place(mission: Mission, cell: tuple[int, int]) -> Point | None:
 def _centre(mission: Mission, cell: tuple[int, int], cell_m: float) -> tuple[float, float]:
     x, y = mission.rotation.centre(cell, cell_m)
     return round(x, 3), round(y, 3)
+
+
+def zone_progress(mission: Mission) -> list[ZoneProgress]:
+    """Return the progress of each zone of the order."""
+    return progress.zone_progress(mission.order_state, mission.map.area, mission.covered)
+
+
+def room_progress(mission: Mission) -> dict[int, RoomProgress]:
+    """Return the progress in each room, by its number."""
+    area, ahead, line = mission.map.area, mission.route.path.ahead, mission.line.ahead()
+    rooms = None if area is None else mission.room_cells.on(area.lattice)
+    to_go_s: dict[int, float] = {}
+    if area is not None and rooms is not None:
+        ahead_s = mission.orders.scope.walk_s(ahead) if line is None else line.seconds
+        to_go_s = progress.seconds_in(rooms, area.lattice.window, ahead, ahead_s)
+    deg = mission.rotation.deg
+    return progress.room_progress(mission.rooms, deg, area, mission.covered, to_go_s)
+
+
+def unswept(mission: Mission) -> OccupancyGrid | None:
+    """Return why floor is not swept, in the map frame, see ``Unswept``; None if unknown."""
+    found, grid = mission.line.unswept(), mission.grid
+    if found is None or grid is None:
+        return None
+    geometry = mission.rotation.geometry(found[0])
+    return OccupancyGrid(geometry, found[1].view(np.int8), grid.frame, grid.stamp_ns)

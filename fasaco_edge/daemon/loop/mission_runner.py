@@ -119,7 +119,7 @@ class MissionRunner:
             self._before = None
             if self.config.fleet:
                 # This order is new: it belongs to no ledger that was set aside.
-                self.mission.shared.begin(time.time_ns() // 1_000_000)
+                self.mission.covered.shared.begin(time.time_ns() // 1_000_000)
             self._held = HeldEvents()
         return self.mission, held, faults
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fasaco_edge.bus.queries import Reply
+from fasaco_edge.daemon.loop.mission_reports import room_progress, unswept
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
@@ -109,7 +110,7 @@ class FloorPublisher:
         if not self._outbox.has_listeners(FLOOR):
             self._due.forget()  # the next listener has not received it
             return
-        floor, grid = mission.floor, mission.grid
+        floor, grid = mission.covered.floor, mission.grid
         key = (floor, floor.changes)
         if grid is None or not self._due.is_due(key, now, repeats=True):
             return
@@ -133,8 +134,8 @@ class UnsweptPublisher:
             return
         if now < self._due.next_at:
             return
-        key = (mission.map_revision, mission.floor_to_sweep())
-        if self._due.is_due(key, now, repeats=True) and (shown := mission.unswept()) is not None:
+        key = (mission.map_revision, mission.line.left.areas)
+        if self._due.is_due(key, now, repeats=True) and (shown := unswept(mission)) is not None:
             self._due.note(key, now, max(FLOOR_PERIOD_S, shown.cells.size / PIXELS_PER_S))
             self._outbox.put(UNSWEPT, encode_occupancy_grid(coarser(shown, MOST_SQUARES)))
 
@@ -255,7 +256,7 @@ class RoomsPublisher:
         if now - self._published_at < (ROOMS_PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
             return
         self._published_at, self._version, self._progress = now, book.version, progress_id
-        progress = {} if mission is None else mission.room_progress()
+        progress = {} if mission is None else room_progress(mission)
         rooms = tuple(_report(room, progress.get(room.id)) for room in book.rooms)
         self._outbox.send(ROOMS, encode_json(Rooms(book.frame, book.version, rooms)))
 

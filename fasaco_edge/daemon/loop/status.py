@@ -195,7 +195,7 @@ def path_report(path: PublishedPath | None, mission: Mission | None) -> PathRepo
     """Return this part of the status; None before the first path of a mission."""
     if path is None or not path.revision or mission is None:
         return None
-    line = mission.line_ahead()
+    line = mission.line.ahead()
     gap = None if line is None else line.gap
     return replace(
         PathReport.of(path.plan),

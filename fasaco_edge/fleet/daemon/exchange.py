@@ -19,8 +19,8 @@ from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.errors import FasacoError, FleetError
 from fasaco_edge.fleet.daemon.arrivals import FleetArrivals
 from fasaco_edge.fleet.mission.frames import FleetFrames
-from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of
-from fasaco_edge.fleet.mission.message import Messages
+from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of, giving_way_of
+from fasaco_edge.fleet.mission.message import Messages, waits_for
 from fasaco_edge.fleet.mission.shared import MapPlace
 from fasaco_edge.fleet.mission.tiles import Placed
 from fasaco_edge.grid.geometry import Point, Pose2D
@@ -168,8 +168,8 @@ class FleetSender:
         """Publish a message if due; the caller catches failures."""
         if now - self._said_at < LEAST_PERIOD_S:
             return
-        others, giving_way = fleet_of(mission), mission.giving_way
-        key = mission.state, others.numbers.number, others.shared.epoch, mission.waits_for
+        others, giving_way = fleet_of(mission), giving_way_of(mission)
+        key = mission.state, others.numbers.number, others.shared.epoch, waits_for(mission)
         is_news, is_due = key != self._said, now - self._tiles_at >= PERIOD_S
         if not (is_news or is_due or giving_way.is_near):
             return
@@ -192,7 +192,7 @@ class FleetSender:
             step_s=message.step_s,
             epoch=message.epoch,
             division=message.division,
-            open_cells=mission.open_cells(),
+            open_cells=mission.orders.cells.left(),
             swept=_tiles(message.tiles),
             ground=_tiles(message.ground),
             by=message.by,

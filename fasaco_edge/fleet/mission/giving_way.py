@@ -31,8 +31,7 @@ from fasaco_edge.fleet.mission.traffic import (
 )
 from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.mission.company import Waiting
-from fasaco_edge.mission.core.doing import Doing
-from fasaco_edge.mission.core.events import PathUpdate, State
+from fasaco_edge.mission.core.events import Doing, PathUpdate, State
 from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.line.way import sees_on
 from fasaco_edge.mission.map.map_state import MapState

@@ -60,3 +60,9 @@ def fleet_of(mission: Mission) -> FleetLayer:
     """Return the other robots of a mission that has a name in a fleet."""
     assert isinstance(mission.company, FleetLayer)
     return mission.company
+
+
+def giving_way_of(mission: Mission) -> GivingWay:
+    """Return when the robot of a mission waits, of a robot that has a name in a fleet."""
+    assert isinstance(mission.giving_way, GivingWay)
+    return mission.giving_way

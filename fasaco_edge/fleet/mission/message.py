@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from fasaco_edge.fleet.mission.ground import GroundQueue
-from fasaco_edge.fleet.mission.kind import fleet_of
+from fasaco_edge.fleet.mission.kind import fleet_of, giving_way_of
 from fasaco_edge.fleet.mission.tiles import SweptQueue
-from fasaco_edge.mission.core.events import MemberReceived
+from fasaco_edge.grid.rotation import rotated_points
+from fasaco_edge.mission.core.events import MemberReceived, State
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
@@ -51,11 +55,27 @@ class Messages:
             epoch=others.shared.epoch,
             division=others.numbers.number,
             tiles=swept,
-            ground=self._ground.next(mission.area, most),
+            ground=self._ground.next(mission.map.area, most),
             by=others.numbers.by,
             parts=others.parts,
             radius_m=self._radius_m,
-            ahead=tuple((x, y) for x, y in mission.next_metres().tolist()),
-            waits_for=mission.waits_for,
+            ahead=tuple((x, y) for x, y in next_metres(mission).tolist()),
+            waits_for=waits_for(mission),
             kept=self._swept.kept(swept),
         )
+
+
+def next_metres(mission: Mission) -> NDArray[np.float64]:
+    """Return the points of the path's next metres in the map frame [m], float64 (n, 2)."""
+    line = giving_way_of(mission).line()[1:]
+    return rotated_points(line, mission.rotation.deg) if len(line) else line
+
+
+def waits_for(mission: Mission) -> str:
+    """Return the name of the robot that this one waits or makes way for, or that sweeps the rest;
+    "" for none."""
+    name, orders = mission.giving_way.waits_for, mission.orders
+    stands = mission.doing is State.COVERING and len(mission.route.path.ahead) < 2
+    if name or not (stands and orders.waits_for_others):
+        return name
+    return fleet_of(mission).busiest(orders.cells.open_cells)

@@ -16,7 +16,7 @@ import numpy as np
 from fasaco_edge.mission.config import BatteryPolicy, MissionConfig
 from fasaco_edge.mission.core.events import BatteryReceived
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.way_back import LOOK_EVERY_S, SPARE, Lapse, seconds_back
+from fasaco_edge.mission.core.time_limit import LOOK_EVERY_S, SPARE, Lapse, seconds_back
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.orders.sequencer import Sequencer

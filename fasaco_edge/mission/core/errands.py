@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.doing import Doing
-from fasaco_edge.mission.core.events import PathUpdate, State
-from fasaco_edge.mission.core.resting import Resting
+from fasaco_edge.mission.core.events import Doing, PathUpdate, State
 from fasaco_edge.mission.core.route import NO_CELLS, Route
-from fasaco_edge.mission.core.shut_in import ShutIn
 from fasaco_edge.mission.core.standing import Standing
+from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
@@ -38,8 +36,7 @@ class Errands:
     route: Route
     charging: Charging
     standing: Standing
-    resting: Resting
-    shut_in: ShutIn
+    way_out: WayOut
 
     def consider_charging(self, state: State, now: float) -> None:
         """Begin to charge if due, and end charging if it is enough."""
@@ -52,13 +49,12 @@ class Errands:
             charging.begin()
             orders.set_state(replace(orders.order_state, errand="charge"))
 
-    def run(self, cell: Cell, update: PathUpdate | None, state: State, now: float) -> Doing:
-        """Drive on to the destination of the errand, or arrive there.
+    def run(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
+        """Drive on to the destination of the errand; None if the errand ends here, at home.
 
         Args:
             cell: the robot's cell.
             update: the path that this step has made up to now.
-            state: of the mission up to now.
             now: time [s].
         """
         route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
@@ -69,7 +65,8 @@ class Errands:
         if cell == goal and not is_new and self.standing.in_cell_s >= ARRIVAL_S:
             if errand == "charge":
                 return Doing(State.CHARGING, self.charging.why(now), update)
-            return self._arrive(update, state, now)
+            orders.set_state(orders.order_state.arrived())
+            return None
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
         stands = cell != goal and self.standing.is_on_path
         if stands and not is_new:
@@ -81,7 +78,7 @@ class Errands:
             if goal is None:
                 return Doing(State.BLOCKED, NO_WAY.format(to), update)
             if area is None or not area.contains(goal):
-                return self.shut_in.lead_out(NO_WAY.format(to), update, now, goal)
+                return self.way_out.lead_out(NO_WAY.format(to), update, now, goal)
             here = self.map.cell_at_pose() or cell
             why = self.charging.why_due() if errand == "charge" else ""
             update = self.lead(self.way(area, here, goal), f"drives {to}{why}", errand, now)
@@ -98,10 +95,3 @@ class Errands:
         place = self.map.places.place(errand)
         yaw = None if place is None else place.stand.yaw
         return self.route.publish(path, reason, now, end_yaw=yaw)
-
-    def _arrive(self, update: PathUpdate | None, state: State, now: float) -> Doing:
-        """End an errand on arrival."""
-        self.orders.set_state(self.orders.order_state.arrived())
-        resting = self.resting.why(state, now)
-        assert resting is not None
-        return Doing(*resting, update)

@@ -10,7 +10,6 @@ from fasaco_edge.errors import FasacoError, LedgerMismatchError, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.company import Company
-from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.events import (
     Answer,
@@ -32,6 +31,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.order_changes import OTHERS_FIRST, OrderChanges
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.standing import BlockedFollower
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter, Driven
@@ -130,6 +130,10 @@ class EventHandler:
         if reason := self.company.receive(event, self._now):
             self.route.want(reason)
 
+    def _close_floor(self, event: FollowerBlocked) -> None:
+        if self.blocked.take(event, self.map, self.route.revision, self._now):
+            self._map_changed(self.monitor.map_at)
+
     def _take_priorities(self, grid: OccupancyGrid) -> None:
         """Take a map of priorities; of one before the first map ``_note_frame`` checks the frame.
 
@@ -141,26 +145,6 @@ class EventHandler:
             raise _in_other_frame(grid, used)
         if self.orders.scope.worth.take(grid):
             self.route.want(OTHERS_FIRST)
-
-    def _close_floor(self, event: FollowerBlocked) -> None:
-        """Close floor for a while on which a follower has reported an obstacle.
-
-        Raises:
-            WrongFrame: the report is in another frame than the map's.
-        """
-        grid = self.map.grid
-        # A follower that has a newer path by now repeats the report if it still applies.
-        if grid is None or event.revision not in (0, self.route.revision):
-            return
-        if event.frame != grid.frame:
-            raise WrongFrame(
-                f"blocked in frame {event.frame!r}, map in {grid.frame!r}",
-                hint="let the follower report in the frame of the path that it drives",
-            )
-        self.blocked.note(event, self._now)
-        if self.map.obstacles.close(event.points, (event.x, event.y), self._now):
-            self.map.draw_obstacles()
-            self._map_changed(self.monitor.map_at)
 
     def _open_floor(self) -> None:
         """Reopen floor that was closed for long enough, as long as there is work."""
@@ -222,7 +206,6 @@ class EventHandler:
             why = f"it was given in frame {order.frame!r}, the map is in {grid.frame!r}"
             after = order.in_other_frame(why)
             self.changes.begin(replace(after, frame=grid.frame))
-            self.changes.update_area()
 
     def _look_for_another_building(self) -> None:
         """Raise LedgerMismatchError once the map has shown another building for long enough."""
@@ -242,15 +225,15 @@ class EventHandler:
 
     def _go_on(self, misfit: LedgerMismatchError | None) -> None:
         """Update the reachable area; start over if the ledger belongs to another place."""
-        if misfit is not None:
-            self.orders.scope.worth.take(None)
-            self._path = self.route.stop(str(misfit), self._now) or self._path
-            self.trail.begin_anew()
-            self.changes.begin(self.orders.order_state.in_other_building(str(misfit)))
-        self.changes.update_area()
-        if misfit is not None:
-            self.route.want(self.ledger.first_plan_reason)
-            raise misfit
+        if misfit is None:
+            self.changes.update_area()
+            return
+        self.orders.scope.worth.take(None)
+        self._path = self.route.stop(str(misfit), self._now) or self._path
+        self.trail.begin_anew()
+        self.changes.begin(self.orders.order_state.in_other_building(str(misfit)))
+        self.route.want(self.ledger.first_plan_reason)
+        raise misfit
 
     def _enter_frame(self, frame: str) -> None:
         """Activate a frame; raise LedgerMismatchError for progress in another frame."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,13 +68,8 @@ class PoseReceived:
 
 @dataclass(frozen=True, slots=True)
 class BatteryReceived:
-    """A battery message.
-
-    Attributes:
-        level: charge from 0 to 1; None if unknown.
-        power: state of the power supply, one of ``wire.messages.battery.POWERS``.
-        stamp_ns: time of measurement [ns]; 0 if unknown.
-    """
+    """A battery message: charge from 0 to 1, None if unknown; state of the power supply, one of
+    ``wire.messages.battery.POWERS``; time of measurement [ns], 0 if unknown."""
 
     level: float | None
     power: str = "unknown"
@@ -83,14 +78,8 @@ class BatteryReceived:
 
 @dataclass(frozen=True, slots=True)
 class PlanReady:
-    """The plan for request ``number``.
-
-    Attributes:
-        number: of the request.
-        path: the plan.
-        seconds: planning time [s].
-        stops: when the search was stopped, see ``planners.planner.StopRecorder``.
-    """
+    """The plan for request ``number``, its planning time [s], and when the search was stopped, see
+    ``planners.planner.StopRecorder``."""
 
     number: int
     path: CoveragePath
@@ -242,8 +231,8 @@ def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
             yield from run
 
 
-# Reason of a request for a better path, and of the resulting path.
-SPARE, BETTER = "spare time", "better further on"
+# Reason of a path from an attempt in spare time.
+BETTER = "better further on"
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,13 +286,8 @@ class PathUpdate:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer to command ``number``.
-
-    Attributes:
-        number: of the command.
-        error: why it was refused; None if it was carried out.
-        plan: for ``replan`` the number of the coming plan.
-    """
+    """The answer to command ``number``: why it was refused, None if it was carried out; for
+    ``replan`` the number of the coming plan."""
 
     number: int
     error: FasacoError | None = None
@@ -348,3 +332,19 @@ class State(StrEnum):
     def is_at_rest(self) -> bool:
         """Whether the robot stands, and no path is published."""
         return self not in (State.PLANNING, State.COVERING, State.RETURNING, State.DEGRADED)
+
+
+class Doing(NamedTuple):
+    """The mission's activity in a step.
+
+    Attributes:
+        state: of the mission.
+        reason: why; "" for the number of the path.
+        path: a path to publish.
+        plan: a plan to make.
+    """
+
+    state: State
+    reason: str
+    path: PathUpdate | None = None
+    plan: PlanRequest | None = None

@@ -7,18 +7,14 @@ from dataclasses import dataclass, field
 
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.company import Company, Waiting
-from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.doing import Doing
 from fasaco_edge.mission.core.errands import Errands
-from fasaco_edge.mission.core.events import Decision, PathUpdate, State
+from fasaco_edge.mission.core.events import Decision, Doing, PathUpdate, State
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.order_work import OrderWork
 from fasaco_edge.mission.core.path_checks import PathChecks
-from fasaco_edge.mission.core.resting import Resting
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.shut_in import ShutIn
-from fasaco_edge.mission.core.standing import Standing
+from fasaco_edge.mission.core.standing import BlockedFollower, Standing
 from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
 from fasaco_edge.mission.core.way_out import WayOut
@@ -61,8 +57,6 @@ class Executive:
     _reason: str = field(default="no map yet", init=False)
     _standing: Standing = field(init=False)
     _checks: PathChecks = field(init=False)
-    _resting: Resting = field(init=False)
-    _shut_in: ShutIn = field(init=False)
     _errands: Errands = field(init=False)
     _work: OrderWork = field(init=False)
     # State of this step: the time [s], the robot's cell once known, the path made up to now.
@@ -76,10 +70,8 @@ class Executive:
         self._checks = PathChecks(
             self.ledger, self.monitor, self.orders, self.route, self.line, standing
         )
-        self._resting = Resting(self.map, self.orders, self.charging, self.dock, self.mask_frame)
-        self._shut_in = shut_in = ShutIn(self.map, self.orders, self.route, self.way_out)
-        self._errands = Errands(*driven, self.charging, standing, self._resting, shut_in)
-        self._work = OrderWork(*driven, self.line, self.company, self._errands, shut_in)
+        self._errands = Errands(*driven, self.charging, standing, self.way_out)
+        self._work = OrderWork(*driven, self.line, self.company, self._errands, self.way_out)
         self.troubles = Troubles(
             self.map,
             self.monitor,
@@ -142,30 +134,70 @@ class Executive:
 
     def _give_way(self) -> Doing | None:
         """Wait or make way for another robot, but not in the dock."""
-        resting, state, now = self._resting, self._state, self._now
-        is_docked = (
-            self.orders.order_state.errand == "charge"
-            and resting.why_in_dock(state, now) is not None
-        )
-        lacks_map = self.map.building.why or resting.why_no_mask()
-        may_drive = self.monitor.is_sound(now) and not lacks_map and not is_docked
-        return self.giving_way.decide(state, now, may_drive=may_drive)
+        errand, building = self.orders.order_state.errand, self.map.building
+        is_docked = errand == "charge" and self._why_in_dock() is not None
+        lacks_map = building.why or self._why_no_mask()
+        may_drive = self.monitor.is_sound(self._now) and not lacks_map and not is_docked
+        return self.giving_way.decide(self._state, self._now, may_drive=may_drive)
 
     def _rest(self) -> Doing | None:
         """Rest if a command, the battery or a missing input requires it."""
-        resting = self._resting.why(self._state, self._now)
+        resting = self._why_rest()
         if resting is None:
             return None
         if resting[0] in STOPPED:
             self._standing.begin_anew()
-        return Doing(*resting)
+        return Doing(*resting, self._update)
+
+    def _why_rest(self) -> tuple[State, str] | None:
+        """Return state and reason of a robot that has nothing to decide; else None."""
+        order = self.orders.order_state
+        doubt = self.map.building.why if order.order is not None or order.errand else ""
+        if order.paused or doubt:
+            return (State.PAUSED, order.why_paused) if order.paused else (State.BLOCKED, doubt)
+        if order.errand == "charge" and (docked := self._why_in_dock()):
+            return docked
+        if not order.errand and not order.is_open:
+            return (State.DONE, self.orders.ending) if order.order else (State.IDLE, order.why)
+        if self.map.lattice is None:
+            return State.WAITING_FOR_MAP, self.map.why_no_map()
+        if self.map.pose is None:
+            return State.WAITING_FOR_POSE, self.map.why_no_pose()
+        no_mask = self._why_no_mask()
+        return (State.BLOCKED, no_mask) if no_mask else None
+
+    def _why_no_mask(self) -> str:
+        """Return why the keep-out zones of this map are missing; "" if they are not.
+
+        The zones of another map would close other places.
+        """
+        if why := self.map.places.why_no_keep_out:
+            return why
+        grid = self.map.grid
+        if grid is None or self.mask_frame in ("", grid.frame):
+            return ""
+        return (
+            f"the keep-out mask is in frame {self.mask_frame!r}, the map in {grid.frame!r}: "
+            "waits for one in the map's"
+        )
+
+    def _why_in_dock(self) -> tuple[State, str] | None:
+        """Return state and reason of a robot that is, or may be, in its dock; else None.
+
+        After a restart it may be there until the first battery message: no path may lead it out.
+        """
+        if self.dock.holds(is_charging=self._state is State.CHARGING):
+            return State.CHARGING, self.charging.why(self._now)
+        if not self.charging.gauge.power and self.dock.is_near():
+            return State.BLOCKED, "near the dock: waits for the battery to say if it charges"
+        return None
 
     def _find_place(self) -> Doing | None:
         """Find the robot's cell; if it is outside of all cells, lead it back to the nearest one."""
         route, cell = self.route, self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
-            return self._shut_in.lead_out(self.map.why_misplaced(), None, self._now)
+            return self.way_out.lead_out(self.map.why_misplaced(), None, self._now)
         self._cell = cell
         self._standing.look(cell, self._now)
         if not len(route.path.cells):
@@ -174,9 +206,9 @@ class Executive:
         return None
 
     def _run_errand(self) -> Doing | None:
-        """Drive home or to the dock; afterwards resume the path."""
+        """Drive home or to the dock; rest on arrival, and resume the path afterwards."""
         if self.orders.order_state.errand:
-            return self._errands.run(self._cell, self._update, self._state, self._now)
+            return self._errands.run(self._cell, self._update, self._now) or self._rest()
         self._update = self.route.take_up("goes on", self._now) or self._update
         return None
 

@@ -9,18 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fasaco_edge.errors import LedgerMismatchError, NotPublished
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.company import OthersCells
 from fasaco_edge.mission.company_kind import ALONE, CompanyKind
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.blocked_follower import BlockedFollower
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
 from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.events import (
@@ -38,31 +32,23 @@ from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.core.standing import BlockedFollower
 from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.trail_layer import TrailLayer
 from fasaco_edge.mission.core.trouble import Trouble
 from fasaco_edge.mission.core.way_out import WayOut
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter, DriveTimes
+from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import (
     Coverage,
-    RoomProgress,
-    ZoneProgress,
-    room_progress,
-    seconds_in,
-    zone_progress,
 )
 from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
-from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
-from fasaco_edge.mission.coverage.unreached import Unreached
-from fasaco_edge.mission.line.figures import AheadFigures, FloorToSweep
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_cells import RoomCells
 from fasaco_edge.mission.map.room_watch import RoomWatch
@@ -81,8 +67,11 @@ class Mission:
 
     Attributes:
         state, reason: its state, and the reason.
+        map, orders, covered, line, drive: owners of the map, the order, the cells covered by this
+            robot and others, the line, the measured driving; read-only.
         route: the path and the pending plan, with counts; read-only.
         company: the other robots; read-only.
+        room_cells: the cells of the rooms; read-only.
         charging: the battery, and when to charge; read-only.
         time_limit: when the order has to end; read-only.
     """
@@ -92,7 +81,7 @@ class Mission:
     ) -> None:
         """Start with an order, by default for everything reachable, and a kind of company."""
         self._config, self._kind = config, kind
-        self._drive, self._gauge = DriveMeter(), BatteryGauge()
+        self.drive, self._gauge = DriveMeter(), BatteryGauge()
         self._angle = LatticeAngle(config)
         self._idle = IdlePlaces(config)
         self._rooms = RoomWatch()
@@ -108,43 +97,37 @@ class Mission:
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
         config = self._rotation.config(self._config)
-        self._map = MapState(config)
+        self.map = MapState(config)
         cell_m, sweeping = config.footprint.cell_m, config.sweeping
         tool_m, ahead_m = (sweeping.tool_m, sweeping.ahead_m) if sweeping else (cell_m, 0.0)
-        radius_m, sight, map_state = config.footprint.robot_radius_m, None, self._map
-        if sweeping and tool_m > 2.0 * radius_m:
-            sight = ToolSight(
-                tool_m, radius_m, config.footprint.free_at_most, lambda: map_state.grid
-            )
-        self._ledger = MissionLedger(cell_m, tool_m, ahead_m, self._kind.cells(), sight)
+        footprint, sight, map_state = config.footprint, None, self.map
+        if sweeping and tool_m > 2.0 * (radius_m := footprint.robot_radius_m):
+            sight = ToolSight(tool_m, radius_m, footprint.free_at_most, lambda: map_state.grid)
+        self.covered = MissionLedger(cell_m, tool_m, ahead_m, self._kind.cells(), sight)
         monitor = InputMonitor(config)
-        self.company = self._kind.company(config, self._map, self._ledger)
-        self._room_cells = RoomCells(self._rooms, self._rotation.deg)
-        room_price = RoomPrice(config.policy.by_room, self._room_cells)
-        self._orders = Sequencer(config, self._map, self._ledger, self.company, room_price)
-        self.route = Route(config.spare_share, self._map, self._orders)
-        owners = self._map, self._ledger, monitor, self._orders, self.route
-        self._line = LineLayer(sweeping, self._map, self._ledger, self._orders, self.route)
-        self._trail = TrailLayer(config, self._map, self.route)
-        self.charging = Charging(config, self._map, self._orders, self.route, self._gauge)
-        self.time_limit = TimeLimit(config, self._map, self._orders)
-        ordered = self._map, self._ledger, self._orders, self.route, self._line
-        is_alone = self._kind is ALONE
-        self._changes = OrderChanges(
-            *(*ordered, config.policy, self._rooms),
-            *(self._rotation.deg, is_alone, config.speed_m_s),
-        )
-        way_out = WayOut(self._map, self.route)
+        self.company = self._kind.company(config, self.map, self.covered)
+        self.room_cells = RoomCells(self._rooms, self._rotation.deg)
+        room_price = RoomPrice(config.policy.by_room, self.room_cells)
+        self.orders = Sequencer(config, self.map, self.covered, self.company, room_price)
+        self.route = Route(config.spare_share, self.map, self.orders)
+        owners = self.map, self.covered, monitor, self.orders, self.route
+        self.line = LineLayer(sweeping, self.map, self.covered, self.orders, self.route)
+        self._trail = TrailLayer(config, self.map, self.route)
+        self.charging = Charging(config, self.map, self.orders, self.route, self._gauge)
+        self.time_limit = TimeLimit(config, self.map, self.orders)
+        ordered = self.map, self.covered, self.orders, self.route, self.line
+        self._changes = OrderChanges(config, *ordered, self._rooms, self._kind is ALONE)
+        way_out = WayOut(self.map, self.orders, self.route)
         blocked = BlockedFollower()
-        measured = self._drive, self.company, self._gauge, way_out, blocked
+        measured = self.drive, self.company, self._gauge, way_out, blocked
         self._handler = EventHandler(
-            *owners, self._line, self._trail, *measured, self._changes, self._rooms
+            *owners, self.line, self._trail, *measured, self._changes, self._rooms
         )
         self.giving_way = self._kind.waiting(
-            config, self._map, self._orders, self.route, self.company
+            config, self.map, self.orders, self.route, self.company
         )
-        decided_by = self._line, self.company, self.charging, self.time_limit, self.giving_way
-        in_dock = InDock(self._map, self._gauge)
+        decided_by = self.line, self.company, self.charging, self.time_limit, self.giving_way
+        in_dock = InDock(self.map, self._gauge)
         mask = mask_frame(self._config.policy.keep_out_mask)
         self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)
 
@@ -162,14 +145,14 @@ class Mission:
     def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         self._rotated_by_deg = self._rotation.deg - before.lattice_deg
         before = rotated_ledger(before, self._rotation.deg)
-        self._ledger.resume(before, is_confirmed=is_confirmed)
+        self.covered.resume(before, is_confirmed=is_confirmed)
         self._trail.resume(before.trail)
-        self._map.frames.activate(before.frame)
+        self.map.frames.activate(before.frame)
 
     def restore_order(self, order: OrderState) -> None:
         """Continue an order from before a restart; to be called before the first step, and after
         ``restore_rooms``."""
-        self._map.places.resume(order.places)
+        self.map.places.resume(order.places)
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
         self._changes.begin(self._rotation.order(order, self._rotated_by_deg))
@@ -189,15 +172,15 @@ class Mission:
         cell_m, was = self._config.footprint.cell_m, before._config.footprint.cell_m
         if before.rotation != self.rotation or cell_m != was:
             return
-        self._orders.succeed(before._orders)
+        self.orders.succeed(before.orders)
         self._executive.way_out.succeed(before._executive.way_out)
         if before.is_in_doubt:
-            self._map.watch_on(before._map.building)
+            self.map.watch_on(before.map.building)
 
     def held(self) -> list[Event]:
         """Return the newest map, pose and priorities as events for a succeeding mission."""
         monitor = self._executive.monitor
-        priorities = self._rotation.grid(self._orders.scope.worth.given)
+        priorities = self._rotation.grid(self.orders.scope.worth.given)
         return [
             *([MapReceived(self.grid, monitor.map_at)] if self.grid is not None else []),
             *([PoseReceived(self.pose, monitor.pose_at)] if self.pose is not None else []),
@@ -207,7 +190,7 @@ class Mission:
     @property
     def is_in_doubt(self) -> bool:
         """Whether the map may show another building than before."""
-        return self._map.building.is_foreign or bool(self._map.building.why)
+        return self.map.building.is_foreign or bool(self.map.building.why)
 
     def step(self, events: Iterable[Event], now: float) -> Decision:
         """Apply events in order and decide.
@@ -219,14 +202,14 @@ class Mission:
         """
         events = list(events)
         begun = self._make_room(events, now)
-        happened = self._along_lanes(self._handle(events, now), now)
+        happened = self._align(self._handle(events, now), now)
         happened = self._look_for_rooms(happened, now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
         stop = self.route.stop(self.reason, now) if self.state.is_at_rest else None
         path = stop or decided.path or happened.path or begun
         self._trail.finish(path)
-        path = self._line.finish(path, now)
+        path = self.line.finish(path, now)
         self.state, self.reason = self._executive.status()
         if path is not None:
             path = self._rotation.path(path, self.lattice)
@@ -250,30 +233,23 @@ class Mission:
     def _handle(self, events: Iterable[Event], now: float) -> Decision:
         return self._handler.handle(map(self._rotation.event, events), now)
 
-    def _along_lanes(self, happened: Decision, now: float) -> Decision:
-        """Rotate the lattice to a pass's lanes, or to the walls; return the combined decision."""
-        state, grid = self.order_state, self.grid
-        is_busy = state.current_zone is None or bool(state.errand) or self.is_in_doubt
-        if is_busy or grid is None or self.pose is None:
-            return self._along_walls(happened, now)
-        if not self._angle.rotates_to_pass(state.current_pass.angle_deg, grid):
-            return self._along_walls(happened, now)
-        why = f"cells lie along the lanes of the pass, at {self._angle.deg:.1f} degrees to the map"
-        stop = self._rotate_lattice(f"{why} frame", now)
-        return replace(happened, path=stop or happened.path)
-
-    def _along_walls(self, happened: Decision, now: float) -> Decision:
-        """Rotate the lattice to the walls once these are certain; return the combined decision."""
-        self._angle.note_faults(happened.faults)
-        # A path kept for an errand is given in present cells.
-        # A building in doubt may soon be replaced by another.
-        if self._angle.is_settled or self.order_state.errand or self.is_in_doubt:
+    def _align(self, happened: Decision, now: float) -> Decision:
+        """Rotate the lattice to a pass's lanes, or to the walls once these are certain; return the
+        combined decision."""
+        state, angle, grid, pose = self.order_state, self._angle, self.grid, self.pose
+        angle.note_faults(happened.faults)
+        # A path kept for an errand is given in present cells; a building in doubt may soon be
+        # replaced by another.
+        if state.errand or self.is_in_doubt or grid is None or pose is None:
             return happened
-        pose, grid = self.pose, self.grid
-        if pose is None or grid is None or not self._angle.rotates_to_walls(grid, pose):
+        sweeps = state.current_zone is not None
+        if sweeps and angle.rotates_to_pass(state.current_pass.angle_deg, grid):
+            along = "along the lanes of the pass,"
+        elif not angle.is_settled and angle.rotates_to_walls(grid, pose):
+            along = "along the walls from now on,"
+        else:
             return happened
-        deg = self._angle.deg
-        why = f"cells lie along the walls from now on, at {deg:.1f} degrees to the map frame"
+        why = f"cells lie {along} at {angle.deg:.1f} degrees to the map frame"
         stop = self._rotate_lattice(why, now)
         return replace(happened, path=stop or happened.path)
 
@@ -287,8 +263,8 @@ class Mission:
     def _rotate_lattice(self, why: str, now: float) -> PathUpdate | None:
         """Continue on a lattice at the new angle; return the path that stops the robot, if any."""
         before, route = self.snapshot(), self.route
-        order = replace(self.order_state, reached=self._orders.reached)
-        is_confirmed = self._ledger.is_confirmed and not self._map.building.is_foreign
+        order = replace(self.order_state, reached=self.orders.reached)
+        is_confirmed = self.covered.is_confirmed and not self.map.building.is_foreign
         executive, held = self._executive, self.held()
         # The robot must not drive a path that is no longer checked.
         stop = route.stop(why, now)
@@ -297,10 +273,15 @@ class Mission:
         self.restore_order(order)
         self.route.succeed(route)
         self._executive.succeed(executive)
-        self._drive.break_track()
+        self.drive.break_track()
         self._handle(held, now)
         self.route.want(why)
         return stop
+
+    @property
+    def doing(self) -> State:
+        """Its activity, regardless of troubles."""
+        return self._executive.doing
 
     @property
     def troubles(self) -> tuple[Trouble, ...]:
@@ -314,67 +295,22 @@ class Mission:
         """
         if self.grid is None:
             return ""
-        is_theirs = not self._map.places.why
-        order = self._orders.order_state
+        is_theirs = not self.map.places.why
+        order = self.orders.order_state
         return self._idle.look(self.grid, self.map_revision, order, now, is_theirs=is_theirs)
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""
-        lattice = self._map.lattice
+        lattice = self.map.lattice
         return (
-            None
-            if lattice is None
-            else self._map.coverage(self._ledger, self._orders.known(lattice))
+            None if lattice is None else self.map.coverage(self.covered, self.orders.known(lattice))
         )
-
-    @property
-    def first_from(self) -> int:
-        """The priority from which on floor is planned now; 0 while all is."""
-        return self._orders.scope.worth.least
-
-    def floor_to_sweep(self) -> FloorToSweep | None:
-        """Return the areas of floor to sweep; None if cells are counted."""
-        return self._line.to_sweep
-
-    def unswept(self) -> OccupancyGrid | None:
-        """Return why floor is not swept, in the map frame, see ``Unswept``; None if unknown."""
-        found, grid = self._line.unswept(), self._map.grid
-        if found is None or grid is None:
-            return None
-        geometry = self.rotation.geometry(found[0])
-        return OccupancyGrid(geometry, found[1].view(np.int8), grid.frame, grid.stamp_ns)
-
-    def line_ahead(self) -> AheadFigures | None:
-        """Return figures of the line ahead; None if cells are counted."""
-        return self._line.ahead()
-
-    def drive_times(self) -> DriveTimes:
-        """Return speed and turn durations, measured from poses."""
-        return self._drive.times
-
-    def unreached(self) -> Unreached:
-        """Return the part of the order that stays uncovered at present."""
-        return self._orders.unreached()
-
-    def zone_progress(self) -> list[ZoneProgress]:
-        """Return the progress of each zone of the order."""
-        return zone_progress(self.order_state, self._map.area, self._ledger)
-
-    def room_progress(self) -> dict[int, RoomProgress]:
-        """Return the progress in each room, by its number."""
-        area, ahead, line = self._map.area, self.route.path.ahead, self.line_ahead()
-        rooms = None if area is None else self._room_cells.on(area.lattice)
-        to_go_s: dict[int, float] = {}
-        if area is not None and rooms is not None:
-            ahead_s = self._config.cost.of_walk(ahead) if line is None else line.seconds
-            to_go_s = seconds_in(rooms, area.lattice.window, ahead, ahead_s)
-        return room_progress(self.rooms, self._rotation.deg, area, self._ledger, to_go_s)
 
     def snapshot(self) -> LedgerSnapshot:
         """Return the state kept over a restart: coverage, and the order's progress."""
         trail = self._trail.snapshot()
-        note = replace(self.order_state, reached=self._orders.reached).to_json()
-        ledger, lattice_deg = self._ledger.snapshot(), self._rotation.deg
+        note = replace(self.order_state, reached=self.orders.reached).to_json()
+        ledger, lattice_deg = self.covered.snapshot(), self._rotation.deg
         return replace(ledger, trail=trail, note=note, lattice_deg=lattice_deg)
 
     @property
@@ -390,81 +326,43 @@ class Mission:
     @property
     def order_state(self) -> OrderState:
         """The order and its progress."""
-        state, places = self._orders.order_state, self._map.places.note
+        state, places = self.orders.order_state, self.map.places.note
         return state if state.places == places else replace(state, places=places)
 
     @property
     def home(self) -> Cell | None:
         """The cell (row, col) the robot returns to; None for none."""
-        return self._orders.goal()
+        return self.orders.goal()
 
     @property
     def grid(self) -> OccupancyGrid | None:
         """The newest map; None before there is one."""
-        if self._map.given is not self._laid_grid:
-            given = self._map.given
+        if self.map.given is not self._laid_grid:
+            given = self.map.given
             self._laid_grid, self._given_grid = given, self._rotation.grid(given)
         return self._given_grid
 
     @property
     def map_revision(self) -> int:
         """Counter of map states; 0 before the first."""
-        return self._map.map_revision
+        return self.map.map_revision
 
     @property
     def pose(self) -> StampedPose | None:
         """The newest pose; None before there is one."""
-        return self._rotation.pose(self._map.pose)
+        return self._rotation.pose(self.map.pose)
 
     @property
     def lattice(self) -> CoverageLattice | None:
         """The lattice over the newest map, in its own frame; None before there is a map."""
-        return self._map.lattice
-
-    @property
-    def area(self) -> ReachableArea | None:
-        """The reachable area, in the lattice's frame."""
-        return self._map.area
+        return self.map.lattice
 
     @property
     def ledger(self) -> CoverageLedger:
         """The covered cells."""
-        return self._ledger.current
-
-    @property
-    def covered(self) -> MissionLedger:
-        """The cells covered by this robot and others."""
-        return self._ledger
-
-    @property
-    def shared(self) -> OthersCells:
-        """The cells swept by other robots."""
-        return self._ledger.shared
-
-    def next_metres(self) -> NDArray[np.float64]:
-        """Return the points of the path's next metres in the map frame [m], float64 (n, 2)."""
-        line = self.giving_way.line()[1:]
-        return rotated_points(line, self._rotation.deg) if len(line) else line
-
-    @property
-    def waits_for(self) -> str:
-        """Name of the robot that this one waits or makes way for, or that sweeps the rest."""
-        is_covering = self._executive.doing is State.COVERING
-        stands = is_covering and len(self.route.path.ahead) < 2
-        if self.giving_way.waits_for or not (stands and self._orders.waits_for_others):
-            return self.giving_way.waits_for
-        return self.company.busiest(self._orders.cells.open_cells)
-
-    def open_cells(self) -> int:
-        """Return the number of cells still to be swept, by this robot or another."""
-        return self._orders.cells.left()
+        return self.covered.current
 
     @property
     def trail(self) -> LivingTrail:
         """The living trail."""
         return self._trail.trail
-
-    @property
-    def floor(self) -> SweptFloor:
-        """The swept floor, in the lattice's frame."""
-        return self._ledger.floor

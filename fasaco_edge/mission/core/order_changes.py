@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from fasaco_edge.errors import CommandError, FasacoError, OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
-from fasaco_edge.mission.config import MissionPolicy
+from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.events import Answer, CommandReceived, PathUpdate
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.loss import loss_in
@@ -30,35 +30,38 @@ OTHERS_FIRST = "priorities have changed"
 class OrderChanges:
     """Changes the order and its consequences: keep-outs, reachable area, path."""
 
+    config: MissionConfig
     map: MapState
     ledger: MissionLedger
     orders: Sequencer
     route: Route
     line: LineLayer
-    policy: MissionPolicy
     rooms: RoomWatch
-    # Angle of the cells' rows to the x axis of the map frame [deg].
-    lattice_deg: float = 0.0
     # Whether there is no fleet, whose robots share cells.
-    is_alone: bool = True
-    # Speed of the robot [m/s]; 0 if not known.
-    speed_m_s: float = 0.0
+    is_alone: bool
     # Keep-out polygons of every order.
     _standing: tuple[Polygon, ...] = field(default=(), init=False)
     # Version of the rooms, and the order, that were compared last.
     _followed: tuple[int, MissionOrder | None] = field(default=(-1, None), init=False)
 
     def __post_init__(self) -> None:
-        self._standing = self.policy.keep_out + mask_polygons(self.policy.keep_out_mask)
+        policy = self.config.policy
+        self._standing = policy.keep_out + mask_polygons(policy.keep_out_mask)
+
+    @property
+    def lattice_deg(self) -> float:
+        """Angle of the cells' rows to the x axis of the map frame [deg]."""
+        return self.config.lattice_deg or 0.0
 
     def begin(self, order: OrderState) -> None:
-        """Begin another order, or none; ``update_area`` must be called next."""
+        """Begin another order, or none."""
         self.route.abandon()
         self._keep_out(order)
         self.orders.start(order)
+        self.update_area()
 
     def _keep_out(self, order: OrderState) -> None:
-        """Keep out of all areas under an order; ``update_area`` must be called next."""
+        """Keep out of all areas under an order."""
         ordered = order.order.keep_out if order.order else ()
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:
@@ -105,10 +108,10 @@ class OrderChanges:
         """Raise OrderError if passes of a fleet have angles, or one is faster than the robot."""
         kinds = [kind for zone in order.zones for kind in zone.kinds]
         fastest = max((kind.speed_m_s or 0.0 for kind in kinds), default=0.0)
-        if self.speed_m_s and fastest > self.speed_m_s:
+        usual = self.config.speed_m_s
+        if usual and fastest > usual:
             raise OrderError(
-                f"passes: speed_m_s: expected at most robot.speed_m_s, {self.speed_m_s:g}, "
-                f"got {fastest:g}"
+                f"passes: speed_m_s: expected at most robot.speed_m_s, {usual:g}, got {fastest:g}"
             )
         if not self.is_alone and any(kind.angle_deg is not None for kind in kinds):
             raise OrderError(
@@ -121,7 +124,6 @@ class OrderChanges:
         before, update = self.orders.order_state, None
         if after.order is not before.order:
             self.begin(after)
-            self.update_area()
         elif after.keep_out != before.keep_out:
             update = self._change_keep_outs(after, now)
         elif after.paused and not before.paused:

@@ -9,11 +9,10 @@ import numpy as np
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.company import Company
-from fasaco_edge.mission.core.doing import Doing
 from fasaco_edge.mission.core.errands import NO_WAY, Errands
-from fasaco_edge.mission.core.events import PathUpdate, State
+from fasaco_edge.mission.core.events import Doing, PathUpdate, State
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.shut_in import ShutIn
+from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
@@ -32,7 +31,7 @@ class OrderWork:
     line: LineLayer
     company: Company
     errands: Errands
-    shut_in: ShutIn
+    way_out: WayOut
 
     def plan(self, cell: Cell, update: PathUpdate | None, state: State, now: float) -> Doing:
         """Request the wanted plan; if nothing is left to cover, continue with the order.
@@ -70,14 +69,14 @@ class OrderWork:
         line has missed, cells that it cannot reach; then the next stage of the order.
         """
         route, orders, area = self.route, self.orders, self.map.area
-        if area is not None and (why := self.shut_in.why(area)):
-            return self.shut_in.lead_out(why, update, now)
+        if area is not None and (why := self.way_out.why_shut_in(area)):
+            return self.way_out.lead_out(why, update, now)
         if reason := orders.explore(cell):
             route.want(reason)
             return None
         if why := orders.why_looking(cell, now):
             return self._stand_by(why, update, now)
-        if self.line.open_missed():
+        if self.line.left.open_missed():
             return None
         if orders.pass_over_unreachable():
             self.share(cell, now, at_once=True)
@@ -102,8 +101,8 @@ class OrderWork:
         orders, area = self.orders, self.map.area
         if not orders.is_waiting:
             return Doing(State.DONE, orders.ending, update)
-        if area is not None and (why := self.shut_in.why(area)):
-            return self.shut_in.lead_out(why, update, now)
+        if area is not None and (why := self.way_out.why_shut_in(area)):
+            return self.way_out.lead_out(why, update, now)
         return Doing(State.BLOCKED, orders.waiting_reason(), update)
 
     def wait_for_room(self, name: str, update: PathUpdate | None, now: float) -> Doing:
@@ -134,7 +133,7 @@ class OrderWork:
             return self.settle(update, now)
         path = self.errands.way(area, cell, home)
         if not len(path):
-            return self.shut_in.lead_out(NO_WAY.format("home"), update, now, home)
+            return self.way_out.lead_out(NO_WAY.format("home"), update, now, home)
         if not np.array_equal(path, route.path.ahead):
             why = ": time is up" if self.orders.order_state.late else ""
             update = self.errands.lead(path, f"returning home{why}", "home", now)

@@ -61,7 +61,7 @@ class PathChecks:
         has_stopped = waited and not self._standing.turns
         at_end = path.finished and (has_visited or has_stopped)
         if at_end or (has_stopped and self._standing.is_at(last)):
-            self._line.open_missed()
+            self._line.left.open_missed()
             self._end_path(now)
         elif waited and (path.is_far(cell) or self._standing.is_beside_path):
             route.want("robot left the path")
@@ -91,7 +91,7 @@ class PathChecks:
 
     def _sum_up(self) -> str:
         """Return what else to say at the end of an order, as text that follows another."""
-        floor = self._line.sum_up()
+        floor = self._line.left.sum_up()
         if not self._monitor.are_poses_far_apart:
             return floor
         return f"{floor}; {FAR_APART}, and what lies between them does not count"
@@ -103,7 +103,7 @@ class PathChecks:
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
             return
         self._worth_at = now
-        if not self._line.is_worth_driving and not self._orders.scope.is_any_planned_left:
+        if not self._line.left.is_worth_driving and not self._orders.scope.is_any_planned_left:
             route.want("others have swept what lay ahead")
 
     def check_time(self, now: float) -> None:

@@ -17,14 +17,17 @@ from fasaco_edge.mission.core.events import (
     PlanReady,
     PlanRequest,
 )
-from fasaco_edge.mission.core.plan_requests import BROKEN_S, PlanRequests
-from fasaco_edge.mission.core.spare_time import Attempt, SpareTime
+from fasaco_edge.mission.core.plan_requests import (
+    BROKEN_S,
+    Attempt,
+    PlanRequests,
+    SpareTime,
+)
 from fasaco_edge.mission.coverage.progress import PathProgress
 from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
-from fasaco_edge.planners.path import FIRST_PIECE
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
 
@@ -38,6 +41,7 @@ class Route(PlanRequests):
         unchanged, outdated: count the plans that were not published because they equal the current
             path, or because they no longer hold.
         published_at: when a path was last published or confirmed by a plan.
+        aside: the rest of the path at the start of an errand, int32 (n, 2); None without one.
         is_way_out: whether the published path is a way out, along no cells.
         begun_at: when a path with something to drive last followed one without.
         beside: other robots that the path's line keeps clear of, float64 (k, 3): x, y, least
@@ -50,18 +54,16 @@ class Route(PlanRequests):
         self.path = PathProgress(NO_CELLS)
         # The part of a path kept for later: beyond a block, or the whole rest after a stop.
         self._kept = PathProgress(NO_CELLS)
-        # The rest of the path at the start of an errand; None without one.
-        self._aside: NDArray[np.int32] | None = None
+        self.aside: NDArray[np.int32] | None = None
         # Heading at the end of the path [rad]; None for that of the last segment.
         self._end_yaw: float | None = None
         # The path over a map that has moved, until the first pose on the moved map shows the
         # motion.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Counts of cell numberings, and of walks (paths over other cells). The last walk searched
-        # as a whole, and when a needed plan last changed the walk [s].
+        # Counts of cell numberings, and of walks (paths over other cells); the last walk searched
+        # as a whole.
         self._numberings = self._walks = self._searched = 0
-        self._changed_at = 0.0
         self.unchanged = self.outdated = 0
         self.published_at = self.begun_at = 0.0
         self.is_way_out = False
@@ -100,27 +102,22 @@ class Route(PlanRequests):
     def abandon(self) -> None:
         """Cancel the wanted plan, and discard the pending one: it is for another order."""
         super().abandon()
-        self._kept, self._before_motion, self._aside = PathProgress(NO_CELLS), None, None
-
-    @property
-    def aside(self) -> NDArray[np.int32] | None:
-        """The rest of the path at the start of an errand, int32 (n, 2); None without one."""
-        return self._aside
+        self._kept, self._before_motion, self.aside = PathProgress(NO_CELLS), None, None
 
     def set_aside(self) -> bool:
         """Keep the path for after an errand; return whether it was not kept before."""
-        if self._aside is not None:
+        if self.aside is not None:
             return False
         self.pause()
-        self._aside, self._kept = self.path_to_keep, PathProgress(NO_CELLS)
+        self.aside, self._kept = self.path_to_keep, PathProgress(NO_CELLS)
         return True
 
     def take_up(self, reason: str, now: float) -> PathUpdate | None:
         """Resume the kept path after an errand, once a plan connects to it."""
-        if self._aside is None:
+        if self.aside is None:
             return None
         update = self.publish(NO_CELLS, reason, now) if len(self.path.cells) else None
-        self._kept, self._aside = PathProgress(self._from_nearer_end(self._aside)), None
+        self._kept, self.aside = PathProgress(self._from_nearer_end(self.aside)), None
         self.want(reason)
         return update
 
@@ -229,7 +226,6 @@ class Route(PlanRequests):
             self.unchanged += 1
             self.published_at = now
             return None
-        self._changed_at = now
         update = self.publish(cells, request.reason, now, event, request.changed)
         return replace(update, may_wait=True)
 
@@ -239,7 +235,7 @@ class Route(PlanRequests):
         """Publish the path with a better rest; None if that saves too little."""
         if attempt.numbering != self._numberings:
             return None
-        cells = attempt.joined(self.path, event.path.cells, now - self._changed_at)
+        cells = attempt.joined(self.path, event.path.cells)
         if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
         return replace(self.publish(cells, BETTER, now, event), may_wait=True)
@@ -259,14 +255,8 @@ class Route(PlanRequests):
 
     def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:
         """Return the index of the first cell that needs a visit; that of the last if none does."""
-        is_open = self._orders.cells.open_cells(window)
-        begin, piece = 0, FIRST_PIECE
-        while begin < len(cells):
-            found = window.values_at(is_open, cells[begin : begin + piece], True)
-            if found.any():
-                return begin + int(np.argmax(found))
-            begin, piece = begin + piece, 4 * piece
-        return len(cells) - 1
+        found = window.values_at(self._orders.cells.open_cells(window), cells, True)
+        return int(np.argmax(found)) if found.any() else len(cells) - 1
 
     def publish(
         self,

@@ -1,4 +1,5 @@
-"""Standing: how long the robot has been in its cell, and in one place with a path to drive.
+"""Standing: how long the robot has been in its cell, and in one place with a path to drive; and
+what its follower reports to hold it.
 
 A new path alone does not reset the count of a standing robot: only a motion does, or a rest by
 command or at the end of an order. Time without a path, for instance while the map flickers ahead of
@@ -9,7 +10,9 @@ from __future__ import annotations
 
 import math
 
+from fasaco_edge.errors import WrongFrame
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.events import FollowerBlocked
 from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.map.map_state import MapState
 
@@ -154,3 +157,55 @@ class Standing:
         assert self._map.pose is not None
         since, since_ns = self._since
         return max(self._now - since, (self._map.pose.stamp_ns - since_ns) * 1e-9)
+
+
+# A follower repeats its report once a second; a report not repeated for this long is over.
+SHOWN_S = 3.0
+# Period of new paths for a follower that cannot join its path, or is blocked at an unknown place.
+AGAIN_S = 5.0
+
+
+class BlockedFollower:
+    """Keeps the newest report."""
+
+    def __init__(self) -> None:
+        self._newest: FollowerBlocked | None = None
+        self._at = self._asked_at = -math.inf
+
+    def take(self, event: FollowerBlocked, map_state: MapState, revision: int, now: float) -> bool:
+        """Take in a report on a path, and close floor for a while on which an obstacle is reported;
+        return whether that changes the map.
+
+        Raises:
+            WrongFrame: the report is in another frame than the map's.
+        """
+        grid = map_state.grid
+        # A follower that has a newer path by now repeats the report if it still applies.
+        if grid is None or event.revision not in (0, revision):
+            return False
+        if event.frame != grid.frame:
+            raise WrongFrame(
+                f"blocked in frame {event.frame!r}, map in {grid.frame!r}",
+                hint="let the follower report in the frame of the path that it drives",
+            )
+        self._newest, self._at = event, now
+        is_closed = map_state.obstacles.close(event.points, (event.x, event.y), now)
+        if is_closed:
+            map_state.draw_obstacles()
+        return is_closed
+
+    def why(self, now: float) -> str:
+        """Return what keeps the robot from driving; "" for nothing."""
+        report = self._report(now)
+        return f"the robot stands: {report.detail}, for {report.held_s:.0f} s" if report else ""
+
+    def asks_again(self, now: float) -> str:
+        """Return why a new path from the robot's place is due, or ""."""
+        report = self._report(now)
+        if report is None or report.points or now - self._asked_at < AGAIN_S:
+            return ""
+        self._asked_at = now
+        return f"the robot cannot follow it: {report.detail}"
+
+    def _report(self, now: float) -> FollowerBlocked | None:
+        return self._newest if now - self._at <= SHOWN_S else None

@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Pose2D
+from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.mission.core.events import Doing, PathUpdate, State
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.line.lead_out import LEAST_SHARE, fitting_radius
-from fasaco_edge.mission.line.way import is_clear_between
+from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius, is_clear_between
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # Length of the track that is kept, and spacing of its points [m].
 TRACK_M, SPACING_M = 40.0, 0.05
@@ -40,15 +42,15 @@ NO_WAY: NDArray[np.float64] = np.empty((0, 2))
 
 
 class WayOut:
-    """Keeps the track, and the way out along it.
+    """Keeps the track, and leads the robot out along it.
 
     Attributes:
         why: what shuts the robot in; "" for nothing.
     """
 
-    def __init__(self, map_state: MapState, route: Route) -> None:
+    def __init__(self, map_state: MapState, orders: Sequencer, route: Route) -> None:
         self.why = ""
-        self._map, self._route = map_state, route
+        self._map, self._orders, self._route = map_state, orders, route
         self._track: deque[Point] = deque(maxlen=round(TRACK_M / SPACING_M))
         # Where the way out leads to, and the floor on which it was found.
         self._to: Point | None = None
@@ -76,18 +78,47 @@ class WayOut:
         """Forget the track: the robot was carried, or drove it on another map."""
         self._track.clear()
 
-    def lead(
-        self, leads_on: Callable[[ReachableArea], bool], why: str, now: float
-    ) -> NDArray[np.float64] | None:
-        """Return the way to publish, float64 (n, 2): x, y [m]; None to go on as before.
+    def lead_out(
+        self, why: str, update: PathUpdate | None, now: float, goal: Cell | None = None
+    ) -> Doing:
+        """Lead the robot back along its track, to a place where it can continue, or to a goal.
 
-        To be called in each step while the robot is shut in.
+        A robot in a keep-out zone stays, as a person has drawn the zone. To be called in each step
+        while the robot cannot continue.
 
         Args:
-            leads_on: whether the robot can go on in an area.
             why: what shuts it in.
-            now: the time [s].
+            update: the path that this step has made up to now: an empty path is not withdrawn
+                again.
+            now: time [s].
+            goal: destination; None for the nearest work.
         """
+        if self._map.is_kept_out:
+            return Doing(State.BLOCKED, why, update)
+
+        def leads_on(area: ReachableArea) -> bool:
+            return area.contains(goal) if goal else not self._orders.is_shut_in(area)
+
+        way = self._lead(leads_on, why, now)
+        back = f"{why}: drives back along its track"
+        if way is not None:
+            reason = back if len(way) else why
+            update = self._route.publish_way_out(way, reason, now) or update
+        if self._route.is_way_out:
+            return Doing(State.COVERING, back, update)
+        return Doing(State.BLOCKED, why, update)
+
+    def why_shut_in(self, area: ReachableArea) -> str:
+        """Return what shuts the robot in; "" if it can reach most of its former area."""
+        if not self._orders.is_shut_in(area):
+            return ""
+        reached, once = self._orders.reached_m2(area)
+        return f"shut in: {reached:.1f} of {once:.1f} m2 in reach"
+
+    def _lead(
+        self, leads_on: Callable[[ReachableArea], bool], why: str, now: float
+    ) -> NDArray[np.float64] | None:
+        """Return the way to publish, float64 (n, 2): x, y [m]; None to go on as before."""
         self.why = why
         floor, stamped, drives = self._map.floor, self._map.pose, self._route.is_way_out
         assert stamped is not None
@@ -106,20 +137,17 @@ class WayOut:
         knows_none = self._to is None and not (has_moved or self._tries)
         if is_same_floor and (drives or knows_none):
             return None
-        way = self.find(leads_on)
+        way = self._find(leads_on)
         to, self._to = self._to, tuple(way[-1].tolist()) if len(way) else None
         if drives:
             return None if to == self._to else way
         self._since = now
         return way
 
-    def find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
-        """Return the way back to where the robot can go on from, float64 (n, 2): x, y [m].
+    def _find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
+        """Return the way from the robot back to where it can go on, float64 (n, 2): x, y [m].
 
-        It begins at the robot. (0, 2) if there is none, or cells are counted.
-
-        Args:
-            leads_on: whether the robot can go on in an area.
+        (0, 2) if there is none, or cells are counted.
         """
         floor, lattice, stamped = self._map.floor, self._map.lattice, self._map.pose
         if floor is None or lattice is None or stamped is None or self._map.grid is None:

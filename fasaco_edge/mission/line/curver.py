@@ -19,9 +19,9 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.kernels.floor.bits import WORD, Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import disc_rows, places_of
 from fasaco_edge.kernels.floor.sweeps import NEVER
-from fasaco_edge.mission.line.lead_out import LEAST_SHARE, fitting_radius
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import CURVED, Points
+from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import Curve, curve_along
 

@@ -18,12 +18,10 @@ from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map, raster_to
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
-from fasaco_edge.mission.line.lead_out import fitting_radius, lead_out, leads_out
-from fasaco_edge.mission.line.offset import Beside
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
 from fasaco_edge.mission.line.place_on_line import (
     LOOK_AHEAD_M,
-    LineAside,
+    Beside,
     PlaceOnLine,
     aligned,
     by_distance,
@@ -41,8 +39,14 @@ from fasaco_edge.mission.line.polyline import (
     lengths,
 )
 from fasaco_edge.mission.line.tally import SweepTally
-from fasaco_edge.mission.line.way import corners_between, is_clear_between, shortened
-from fasaco_edge.planners.path import common_beginning
+from fasaco_edge.mission.line.way import (
+    corners_between,
+    fitting_radius,
+    is_clear_between,
+    lead_out,
+    leads_out,
+    shortened,
+)
 
 # Number of nearest cells tried for one that the robot can drive to straight.
 TRIED = 8
@@ -67,13 +71,6 @@ class LineAhead:
         self.cell = 0
         self._floor, self._geometry, self._is_curved = floor, floor.geometry, is_curved
         self._walk: Walk = np.empty((0, 2), np.int32)
-        # Number of published cells of a walk that was cut off, 0 after a stop; the rest is kept
-        # until the next walk. None for a complete walk.
-        self._cut: int | None = None
-        # Window of later maps that was not checked beyond the cut.
-        self._unchecked: Window | None = None
-        # The line from before an errand, while that is driven.
-        self._aside: LineAside | None = None
         self._place = PlaceOnLine()
 
     def follow_floor(self, floor: FloorMap) -> bool:
@@ -93,8 +90,6 @@ class LineAhead:
             self._carry(before)
             return False
         dropped, self.line = bool(len(self.line)), Line()
-        self._cut = self._unchecked = None
-        self._aside = self._aside and LineAside()
         return dropped
 
     def _carry(self, before: GridGeometry) -> None:
@@ -103,14 +98,9 @@ class LineAhead:
         If a mapper's map begins at the farthest point seen, all its pixels move with that point.
         """
         carried = partial(raster_to_raster, before, self._geometry)
-        whole = Window(0, 0, self._geometry.rows, self._geometry.cols)
         self.line = self.line.at(carried(self.line.points))
         self.tally.exchange(NO_EDGES, edges_between(self.line.points))
         self._place.here = carried(self._place.here[None])[0]
-        self._unchecked = whole if self.is_cut else None
-        if self._aside is not None:
-            line = self._aside.line
-            self._aside = LineAside(self._aside.walk, line.at(carried(line.points)), whole)
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
         """Move to a raster of another shape, (rows, cols), and shift."""
@@ -125,34 +115,17 @@ class LineAhead:
         self.tally.move(shape, by)
         self.tally.exchange(NO_EDGES, edges_between(moved, is_edge))
         self._place.here = self._place.here + np.array(by)
-        self._unchecked = self._unchecked and self._unchecked.moved(*by)
-        self._aside = self._aside and self._aside.moved(by)
 
-    def set_aside(self) -> None:
-        """Keep the line for after an errand, which replaces it."""
-        if self._aside is not None:
-            return
-        self._aside = LineAside()
-        if len(self.line) > 1:
-            place = self._place.on(self.line.points)
-            self._aside = LineAside.of(self._walk, self.line, self.cell, place)
-
-    def take_up(self) -> None:
-        """Put back the line that was set aside, if any; the next walk keeps parts of it."""
-        aside, self._aside = self._aside, None
-        if aside is None or not len(aside.line):
-            return
-        self._take([Piece(aside.line, -1)])
-        self._walk, self.cell, self._cut, self._place.along = aside.walk, 0, None, 0.0
-        if aside.touched is not None:
-            self._unchecked = Window.around(self._unchecked, aside.touched)
+    def stop(self) -> None:
+        """Leave the line for a path that is kept while the robot stands, as in a pause."""
+        self.line = self.line.renumbered(-self.cell)
+        self._walk, self.cell = self._walk[self.cell :], 0
 
     def lay(
         self,
         walk: NDArray[np.int32],
         pose: Pose2D,
         *,
-        is_cut: bool = False,
         keeps: bool = True,
         beside: NDArray[np.float64] | None = None,
     ) -> None:
@@ -161,8 +134,6 @@ class LineAhead:
         Args:
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
-            is_cut: whether the walk ends where the previous one was cut off; the line beyond is
-                kept for the next walk.
             keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
                 cells in another order, and by far longer ways.
             beside: discs that such a way keeps clear of, as ``Route.beside``.
@@ -175,37 +146,25 @@ class LineAhead:
         if is_off.any():
             walk = walk[: int(np.argmax(is_off))]
         ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
-        is_beginning = is_cut and common_beginning(walk, ahead) == len(walk)
-        if len(walk) < len(ahead) > 1 and len(line) and is_beginning:
-            self._walk, self.line, self.cell, self._cut = ahead, line, 0, len(walk)
-            if self._unchecked is not None:
-                self.check(self._unchecked)
+        if keeps and len(walk) and self.is_followed and np.array_equal(walk, ahead):
+            self._walk, self.line, self.cell = walk, line, 0
             return
-        if self.is_cut and self.is_followed and np.array_equal(walk, ahead):
-            self._walk, self.line, self.cell, self._cut = ahead, line, 0, None
-        else:
-            pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
-            if pieces and pieces[0].begin == 0 and not self.is_followed:
-                # The robot is no longer behind its first point.
-                rest = pieces[0].without_first()
-                pieces[:1] = [rest] if len(rest.line) else []
-            self._walk, self.cell, self._cut = walk, 0, None
-            self._join(pieces, skips=beside is None)
-            if not keeps and len(self.line):
-                kept = shortened(self.line.points, self._floor, beside)
-                self._take([Piece(self.line.only(kept), -1)])
-        unchecked, self._unchecked = self._unchecked, None
-        if unchecked is not None:
-            self.check(unchecked)
+        pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
+        if pieces and pieces[0].begin == 0 and not self.is_followed:
+            # The robot is no longer behind its first point.
+            rest = pieces[0].without_first()
+            pieces[:1] = [rest] if len(rest.line) else []
+        self._walk, self.cell = walk, 0
+        self._join(pieces, skips=beside is None)
+        if not keeps and len(self.line):
+            kept = shortened(self.line.points, self._floor, beside)
+            self._take([Piece(self.line.only(kept), -1)])
 
-    def _join(
-        self, pieces: list[Piece], beyond: Piece | None = None, *, skips: bool = True
-    ) -> None:
+    def _join(self, pieces: list[Piece], *, skips: bool = True) -> None:
         """Replace the line by one joined from pieces.
 
         Args:
             pieces: in order.
-            beyond: the kept part beyond the cut, if the walk was cut off.
             skips: whether it may skip the stand of the robot's cell, where that is swept.
         """
         if not len(self._walk):
@@ -218,7 +177,7 @@ class LineAhead:
         stands, tally = self._floor.stands, self.tally
         joiner = Joiner(
             here,
-            self._walk[: self._cut],
+            self._walk,
             self.cell,
             stand=stands.stand,
             raw=stands.line,
@@ -226,30 +185,7 @@ class LineAhead:
             is_swept=lambda cell: skips and not tally.is_open(stands.stand(cell)),
             way=lambda a, b: corners_between(self._floor, a, b),
         )
-        joined = joiner.joined(pieces)
-        if beyond is not None and joined:
-            joined += self._put_behind(joined[-1].line.points[-1], beyond)
-        self._take(joined)
-
-    def _put_behind(self, last: Points, beyond: Piece) -> list[Piece]:
-        """Return the kept part beyond the cut, to follow a point.
-
-        The connection is checked when the next walk comes.
-        """
-        while len(beyond.line) and np.abs(last - beyond.line.points[0]).sum() < LEAST_EDGE:
-            beyond = beyond.without_first()
-        if not len(beyond.line):
-            return []
-        ends = np.stack([last, beyond.line.points[0]])
-        (row0, col0), (row1, col1) = np.floor(ends.min(axis=0)), np.ceil(ends.max(axis=0)) + 1.0
-        joint = Window(int(row0), int(col0), int(row1), int(col1))
-        self._unchecked = Window.around(self._unchecked, joint)
-        return [beyond]
-
-    @property
-    def is_cut(self) -> bool:
-        """Whether the walk was cut off, and the next one is awaited."""
-        return self._cut is not None
+        self._take(joiner.joined(pieces))
 
     def check(self, touched: Window) -> bool:
         """Replace parts that a new map blocks by stands; return whether it blocks any.
@@ -257,10 +193,7 @@ class LineAhead:
         Args:
             touched: window of the raster that may have changed.
         """
-        line, self._aside = self.line, self._aside and self._aside.on_map(touched)
-        if self._cut is not None:
-            self._unchecked = Window.around(self._unchecked, touched)
-            line = line.part(0, line.before(self._cut - 1))
+        line = self.line
         margin = self._floor.discs.radius_m / self._floor.geometry.resolution + 1.0
         blocked = [
             number
@@ -274,9 +207,7 @@ class LineAhead:
             return False
         first, last = blocked[0], blocked[-1] + 1
         head = [Piece(line.part(0, first + 1), 0)] if first else []
-        # Beyond the cut the walk may contain cells that no longer exist: the line there stays.
-        beyond = Piece(self.line.part(len(line)), len(line)) if self.is_cut else None
-        self._join([*head, Piece(line.part(last), last)], beyond)
+        self._join([*head, Piece(line.part(last), last)])
         return True
 
     def drive(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
@@ -349,44 +280,25 @@ class LineAhead:
         return raster_to_map(self._floor.geometry, points)
 
     def leads_on(self, xy: Points) -> bool:
-        """Return whether the robot, on a line that is cut off, can drive along points for a while.
+        """Return whether the robot can drive straight to the first of some points, and along them.
 
-        Args:
-            xy: float64 (n, 2): x, y [m]; the robot is between the first two.
+        ``xy``: float64 (n, 2): x, y [m]; False without any.
         """
-        if not self.is_cut or len(xy) < 2:
-            return False
-        points = np.array([map_to_raster(self._floor.geometry, x, y) for x, y in xy.tolist()])
-        edge, here = points[1] - points[0], self._place.here
-        share = float(np.dot(here - points[0], edge)) / max(float(np.dot(edge, edge)), 1e-9)
-        points[0] += min(max(share, 0.0), 1.0) * edge
-        if np.hypot(*(points[0] - here)) > self._tool:
-            return False
-        return all(self._is_clear(a, b) for a, b in pairwise(points))
+        points = [np.array(map_to_raster(self._geometry, x, y)) for x, y in xy.tolist()]
+        ways = pairwise([self._place.here, *points])
+        return bool(points) and all(self._is_clear(a, b) for a, b in ways)
 
     def next_xy(self, count: int) -> Points:
         """Return the first points of ``xy``, from the robot's place on, at most ``count``."""
         return raster_to_map(self._floor.geometry, self._from_place()[:count])
 
     def _from_place(self) -> Points:
-        """Return the points to publish, from the robot's place on the line up to its cut."""
+        """Return the line from the robot's place on it."""
         points = self.line.points
         if len(points) > 1:
             points = points.copy()
             points[0] = self._place.on(points)
-        return points if self._cut is None else self._up_to_cut(points, self._cut)
-
-    def _up_to_cut(self, points: Points, cut: int) -> Points:
-        """Return the beginning of points that leads to the last cell before a cut."""
-        if not cut or not len(points):
-            return points[:0]
-        end = self._floor.stands.stand(self._walk[cut - 1])
-        count = max(self.line.before(cut - 1), 1)
-        while count > 1 and not self._is_clear(points[count - 1], end):
-            count -= 1
-        if not self._is_clear(points[count - 1], end):
-            return points[:1]
-        return np.concatenate([points[:count], end[None]])
+        return points
 
     def put(self, first: int, end: int, points: Points) -> None:
         """Replace the points from ``first`` to ``end`` by polished ones, and update the counts.
@@ -408,10 +320,9 @@ class LineAhead:
         line, geometry = self.line, self._floor.geometry
         points = np.array([map_to_raster(geometry, x, y) for x, y in xy.tolist()])
         begin, last = int(line.cells[first]), int(line.cells[end - 1])
-        cells, stands = np.full(len(points), begin), self._stands(begin, last + 1)
-        # A line may lead beyond a walk that was cut off.
-        if len(points) > 1 and len(stands):
-            cells = begin + aligned(points, stands)
+        cells = np.full(len(points), begin)
+        if len(points) > 1:
+            cells = begin + aligned(points, self._stands(begin, last + 1))
         part = Line(points, cells, np.full(len(points), CURVED, np.uint8))
         while end < len(line) and np.abs(points[-1] - line.points[end]).sum() < LEAST_EDGE:
             end += 1

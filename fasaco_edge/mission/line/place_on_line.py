@@ -1,26 +1,29 @@
-"""Place on line: where on its line the robot is, in which cells, and the line that it set aside.
+"""Place on line: where on its line the robot is, in which cells, and whether always beside it.
 
 Lengths are in pixels of the fine raster, as the line's points, float64 (n, 2).
-
-Line aside: the rest of a polished line, kept while the robot drives an errand or makes way.
 
 Alignment of a line with its walk: the cell of the walk that each point stands for.
 
 The polisher moves, removes and inserts points, and its lanes may differ from those of the walk; so
 the cells are found again by place (dynamic time warping, Sakoe and Chiba 1978).
+
+Offset: a robot strays from its line at corners and after a push, to either side. A robot that stays
+on one side by the same distance, metre after metre, has a fault that it cannot detect: its pose is
+not that of the point that its base leads along the line, or the base pulls to a side.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from collections import deque
+from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.line.offset import CORNER_M, Beside
-from fasaco_edge.mission.line.polyline import Line, Numbers, Points, Walk
+from fasaco_edge.grid.geometry import Point
+from fasaco_edge.mission.line.polyline import Numbers, Points
 
 # The robot is searched for this far ahead on its line, or as far as it can have driven [m]: farther
 # ahead, another lane may be as near.
@@ -31,6 +34,33 @@ ARRIVED_M, STANDING_POSES = 0.05, 10
 # Cosine of the largest angle between a robot that cannot turn on the spot and the edge it is on:
 # its curve crosses itself within the distance in which it is searched for.
 ALONG = math.cos(math.radians(40.0))
+
+# Offsets are taken this far apart, at this distance from corners; farther apart two poses are a
+# jump [m].
+STEP_M, CORNER_M, JUMP_M = 0.05, 0.25, 1.0
+# A bend of more than this is a corner [rad].
+BEND_RAD = math.radians(10.0)
+# Number of samples used, of the last 10 m; and least number, of 5 m.
+MOST, LEAST = 200, 100
+# The least offset that counts: a share of the tool's width, and a distance that no follower can
+# keep more exactly [m].
+TOOL_SHARE, LEAST_M = 0.1, 0.03
+# Share of the offsets that must be on that side.
+ONE_SIDE = 0.8
+
+
+class Beside(NamedTuple):
+    """Where a robot is beside its line.
+
+    Attributes:
+        left_m: how far left of the line, negative to its right [m].
+        heading: direction of the line there [rad].
+        bend: angle between that and the way to a point ``CORNER_M`` ahead [rad].
+    """
+
+    left_m: float
+    heading: float
+    bend: float
 
 
 class PlaceOnLine:
@@ -135,41 +165,50 @@ class PlaceOnLine:
         return self._poses_there >= STANDING_POSES
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LineAside:
-    """A line on the raster on which it will be resumed; empty if there is none.
+class Offset:
+    """Collects offsets of the robot from its line, and judges them."""
 
-    Attributes:
-        walk: int32 (n, 2), its cells.
-        line: its points, beginning where the robot left it.
-        touched: window of the raster that maps may have changed since; None for none.
-    """
+    def __init__(self, tool_m: float) -> None:
+        """Begin; ``tool_m``: width of the tool [m]."""
+        self._limit_m = max(TOOL_SHARE * tool_m, LEAST_M)
+        self._left_m: deque[float] = deque(maxlen=MOST)
+        # The last pose, the line's heading there, and how far it was driven since a corner and
+        # since the last offset.
+        self._last: tuple[Point, float] | None = None
+        self._straight_m = self._since_m = 0.0
 
-    walk: Walk = field(default_factory=lambda: np.empty((0, 2), np.int32))
-    line: Line = field(default_factory=Line)
-    touched: Window | None = None
+    def succeed(self, before: Offset) -> None:
+        """Take over the samples of a predecessor."""
+        self._left_m = before._left_m
 
-    @classmethod
-    def of(cls, walk: Walk, line: Line, cell: int, place: Points) -> LineAside:
-        """Set a line aside.
+    def note(self, at: Point, beside: Beside | None) -> None:
+        """Note a pose at x, y [m] beside its line; None for no line there."""
+        before, self._last = self._last, (at, beside.heading) if beside else None
+        if beside is None or before is None:
+            self._straight_m = 0.0
+            return
+        driven_m, turned = math.dist(before[0], at), beside.heading - before[1]
+        if abs(math.remainder(turned, math.tau)) > BEND_RAD or driven_m > JUMP_M:
+            self._straight_m = 0.0
+            return
+        self._straight_m += driven_m
+        self._since_m += driven_m
+        is_straight = self._straight_m >= CORNER_M and abs(beside.bend) <= BEND_RAD
+        if is_straight and self._since_m >= STEP_M:
+            self._left_m.append(beside.left_m)
+            self._since_m = 0.0
 
-        Args:
-            walk, line: the walk and the line along it.
-            cell: index of the robot's cell in the walk.
-            place: the robot's place on the first edge, (2,).
-        """
-        points = line.points.copy()
-        points[0] = place
-        return cls(walk[cell:], Line(points, np.maximum(line.cells - cell, 0), line.state))
-
-    def moved(self, by: tuple[int, int]) -> LineAside:
-        """Return this line shifted by rows and columns of the raster."""
-        touched = self.touched and self.touched.moved(*by)
-        return LineAside(self.walk, self.line.moved(by), touched)
-
-    def on_map(self, touched: Window) -> LineAside:
-        """Return this line on another map, which differs within a window."""
-        return replace(self, touched=Window.around(self.touched, touched))
+    @property
+    def why(self) -> str:
+        """How far beside its line the robot drives; "" if it does not."""
+        if len(self._left_m) < LEAST:
+            return ""
+        middle_m = median(self._left_m)
+        same = sum(left_m * middle_m > 0.0 for left_m in self._left_m)
+        if abs(middle_m) < self._limit_m or same < ONE_SIDE * len(self._left_m):
+            return ""
+        side = "left" if middle_m > 0.0 else "right"
+        return f"drives {100 * abs(middle_m):.0f} cm {side} of its line"
 
 
 # Squared distance to a cell without a stand [pixels2]: more than any other.

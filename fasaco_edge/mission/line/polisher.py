@@ -69,7 +69,7 @@ class Polisher:
             held: how many of its first points stay as they are.
             is_settled: whether the map is complete.
         """
-        if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3 or ahead.is_cut:
+        if self._config.price_s_m2 == 0.0 or len(ahead.line) < 3:
             return
         begin = ahead.line.first_below(MOVED)
         if begin < len(ahead.line):

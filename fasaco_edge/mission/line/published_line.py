@@ -92,7 +92,7 @@ class PublishedLine:
             now: [s].
             is_settled: whether nothing is under way that changes the next metres.
             leads_on: whether the robot can drive along the next points of the published line,
-                float64 (n, 2): x, y [m], of which the first is behind it, while a plan is made.
+                float64 (n, 2): x, y [m], while a plan is made.
         """
         if self.differs_m > self._due_m:
             self._due_since = math.inf
@@ -103,10 +103,10 @@ class PublishedLine:
         return self.differs_m <= self._near_m and not leads_on(self._near())
 
     def _near(self) -> Points:
-        """Return the points around the next metre of the published line."""
-        rest = self._xy[max(self._next - 1, 0) :][:SEEN_POINTS]
-        ways = np.hypot(*np.diff(rest[1:], axis=0).T) if len(rest) > 1 else np.empty(0)
-        return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 3]
+        """Return the points of the next metre of the published line."""
+        rest = self._xy[self._next :][:SEEN_POINTS]
+        ways = np.hypot(*np.diff(rest, axis=0).T) if len(rest) > 1 else np.empty(0)
+        return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 2]
 
     def take(self, xy: Points, polished: int) -> None:
         """Note that a line is published, and the number of its polished points."""
@@ -178,7 +178,9 @@ class Publication:
                 route.keep_back()
                 plan = waiting.plan if waiting and update.plan is None else update.plan
                 waiting = self._waiting = replace(update, plan=plan)
-            is_due = self._line.is_due(now, self._is_settled(ahead), ahead.leads_on)
+            is_due = self._line.is_due(
+                now, self._is_settled(ahead), lambda xy: route.is_cut and ahead.leads_on(xy)
+            )
             is_due = is_due or (stands and waiting is not None)
             if not (waiting or reason if is_way else is_due):
                 self._why = reason or self._why
@@ -190,6 +192,9 @@ class Publication:
         if update.xy is not None:
             self.forget()
             return update  # a way out, along no cells
+        if not len(update.cells):
+            self.forget()
+            return replace(update, xy=NONE)
         polished = ahead.line.first_below(POLISHED)
         self._line.take(ahead.next_xy(len(ahead.line) + 1), polished)
         return replace(update, xy=ahead.xy())

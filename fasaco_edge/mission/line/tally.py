@@ -26,8 +26,7 @@ from fasaco_edge.kernels.floor.open_floor import (
     set_open,
 )
 from fasaco_edge.kernels.floor.sweeps import BLOCK, NEVER, Scratch, Sweeps, sweep_edges
-from fasaco_edge.mission.line.figures import Unswept
-from fasaco_edge.mission.line.missed_floor import Cause
+from fasaco_edge.mission.line.unswept import OUT_OF_REACH, Unswept
 from fasaco_edge.planners.line import blocks_of, left_in_blocks, memory_for_moves
 
 
@@ -62,7 +61,7 @@ class SweepTally:
         # Numbers of wanted pixels, of swept ones among them, and of open ones.
         self._wanted_pixels = self._swept_pixels = self._open_pixels = 0
         # Number of pixels out of reach by cause; the first element is unused.
-        self._beyond_pixels = np.zeros(len(Cause) + 1, np.int64)
+        self._beyond_pixels = np.zeros(len(OUT_OF_REACH) + 1, np.int64)
         # Window of the pixels that the line has passed.
         self._passed: Window | None = None
         self._tool = floor.discs.tool_m / 2 / self.unit_m
@@ -116,7 +115,8 @@ class SweepTally:
         self._open_pixels += more_open
 
     def set_causes(self, part: Window, causes: NDArray[np.uint8]) -> None:
-        """Set the causes of being out of reach in a window, uint8 (rows, cols), see ``Cause``."""
+        """Set the causes of being out of reach in a window, uint8 (rows, cols), see
+        ``causes_of``."""
         set_causes(self._state, (part.row0, part.col0), causes, self._beyond_pixels)
 
     def pass_line(self, points: NDArray[np.float64]) -> None:
@@ -192,9 +192,10 @@ class SweepTally:
         return int(self.sweeps.left.sum()) * self.unit_m**2
 
     @property
-    def beyond_m2(self) -> dict[Cause, float]:
-        """Free area out of the tool's reach, by cause [m2]."""
-        return {cause: int(self._beyond_pixels[cause]) * self.unit_m**2 for cause in Cause}
+    def beyond_m2(self) -> dict[str, float]:
+        """Free area out of the tool's reach, by reason [m2]."""
+        square_m2 = self.unit_m**2
+        return {why: int(self._beyond_pixels[at]) * square_m2 for at, why in OUT_OF_REACH.items()}
 
     def is_open(self, point: NDArray[np.float64]) -> bool:
         """Return whether a point, y, x [pixels], is still to be swept."""
@@ -205,4 +206,6 @@ class SweepTally:
 def _count_causes(state: NDArray[np.uint8]) -> NDArray[np.int64]:
     """Return the number of pixels with each cause, int64 (4,)."""
     causes = state & np.uint8(CAUSE)
-    return np.array([np.count_nonzero(causes == cause << CAUSE_SHIFT) for cause in (0, *Cause)])
+    return np.array(
+        [np.count_nonzero(causes == cause << CAUSE_SHIFT) for cause in (0, *OUT_OF_REACH)]
+    )

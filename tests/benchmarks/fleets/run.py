@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fasaco_edge.fleet.mission.kind import FleetKind
+from fasaco_edge.fleet.mission.kind import FleetKind, giving_way_of
 from fasaco_edge.fleet.mission.message import Messages
 from fasaco_edge.fleet.review.report import RobotTrack, find_again
 from fasaco_edge.grid.geometry import Pose2D, Window
@@ -33,7 +33,7 @@ from fasaco_edge.mission.core.events import (
     State,
 )
 from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.core.spare_time import most_s
+from fasaco_edge.mission.core.plan_requests import most_s
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
@@ -152,7 +152,7 @@ class FleetRun:
         self.robots = []
         for name, (x, y) in zip(names, fleet.starts, strict=True):
             mission = Mission(fleet.config(), kind=FleetKind(name))
-            mission.shared.begin(1)
+            mission.covered.shared.begin(1)
             world = World(fleet.truth, Pose2D(x, y), simulated)
             ledger, messages = CoverageLedger(fleet.cell_m), Messages(name, fleet.radius_m)
             self.robots.append(FleetRobot(name, mission, world, ledger, messages))
@@ -232,7 +232,7 @@ class FleetRun:
     def _tell(self) -> None:
         for number, speaker in enumerate(self.robots):
             due = self._next_report[number]
-            if speaker.mission.giving_way.is_near:
+            if giving_way_of(speaker.mission).is_near:
                 due -= self.fleet.period_s * 0.75
             if speaker.is_dead or self.now < due:
                 continue
@@ -252,7 +252,7 @@ class FleetRun:
             robot.swept_ms.setdefault(cell, at_ms)
             by = self._swept_by.setdefault(cell, set())
             if by and robot.name not in by:
-                swept = robot.mission.shared.swept(Window(*cell, cell[0] + 1, cell[1] + 1))
+                swept = robot.mission.covered.shared.swept(Window(*cell, cell[0] + 1, cell[1] + 1))
                 self.unheard += not swept[0, 0]
             by.add(robot.name)
 

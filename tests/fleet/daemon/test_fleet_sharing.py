@@ -85,4 +85,4 @@ def test_a_daemon_takes_over_the_room_when_the_other_is_killed(router, tmp_path)
         pass
     assert (record.gap, replay.difference) == ("", None)
     assert replay.mission.state == "done"
-    assert replay.mission.shared.cells_of("r2") > 20
+    assert replay.mission.covered.shared.cells_of("r2") > 20

@@ -17,6 +17,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.fleet.daemon.exchange import TILES, FleetReceiver, FleetSender
 from fasaco_edge.fleet.mission.kind import FleetKind
+from fasaco_edge.fleet.mission.message import next_metres
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import MapReceived, Part
@@ -167,7 +168,7 @@ def test_a_robot_sends_pace_and_all_tiles_after_it_forgets_cells():
         ledger.visit((64 * row, 0))
     robot.mission.company.step_s = 7.5
     for now in (0.0, 1.0, 2.0):
-        robot.mission.shared.note_forgotten()
+        robot.mission.covered.shared.note_forgotten()
         sender.publish(robot.mission, now)
     assert [said.step_s for said in listener.heard] == [7.5] * 3
     assert [len(said.swept) for said in listener.heard] == [TILES] * 3
@@ -180,7 +181,7 @@ def test_a_robot_sends_which_known_cells_precede_their_epoch():
     sender.publish(robot.mission, 0.0)
     before = {tile.row: tile for tile in listener.heard[-1].swept}
     assert listener.heard[-1].kept is None
-    robot.mission.shared.note_forgotten()
+    robot.mission.covered.shared.note_forgotten()
     sender.publish(robot.mission, 1.0)
     ledger.visit((64, 9))
     ledger.visit((128, 0))
@@ -196,10 +197,10 @@ def test_a_robot_sends_its_next_metres_for_any_cell_size(cell_m, monkeypatch):
     monkeypatch.setattr(world, "CELL", cell_m)
     footprint = Footprint(cell_m=cell_m, robot_radius_m=cell_m / 2)
     drive = Drive((0, 0), config=replace(WORLD, footprint=footprint), kind=FleetKind("r1"))
-    drive.mission.shared.begin(1)
+    drive.mission.covered.shared.begin(1)
     drive.tell(MapReceived(building("." * 600)), pose_at(0, 0))
     drive.plan()
-    line, listener = drive.mission.next_metres(), Listener()
+    line, listener = next_metres(drive.mission), Listener()
     FleetSender(listener, CONFIG).publish(drive.mission, 0.0)
     told = np.array(listener.heard[-1].ahead)
     assert told[-1] == pytest.approx(line[-1], abs=1e-3)
@@ -216,7 +217,7 @@ def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
     drives, subscriptions = {}, {}
     for name, cell in ends.items():
         drives[name] = Drive(cell, config=WORLD, kind=FleetKind(name))
-        drives[name].mission.shared.begin(1)
+        drives[name].mission.covered.shared.begin(1)
         drives[name].tell(MapReceived(building(*["." * 12] * 4, at=corner)), pose_at(*cell))
         drives[name].plan()
         subscriptions[name] = FleetReceiver(structs.replace(CONFIG, robot=RobotConfig(name=name)))

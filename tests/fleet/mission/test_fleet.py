@@ -149,7 +149,7 @@ def test_a_reset_elsewhere_sweeps_again_and_keeps_the_order():
     before = ours.mission.order_state.order
     other.command("reset")
     fleet.run(2)
-    assert ours.mission.shared.cells_of("r2") <= 4
+    assert ours.mission.covered.shared.cells_of("r2") <= 4
     assert ours.mission.order_state.order == before
     fleet.finish_one(ours)
 
@@ -169,7 +169,7 @@ def test_a_robot_that_does_not_fit_is_named_and_left_out(changes, why):
     ours.tick()
     assert ours.mission.company.members["r2"].absence(ours.now).startswith(why)
     assert not ours.mission.company.has_company
-    assert ours.mission.shared.cells_of("r2") == 0
+    assert ours.mission.covered.shared.cells_of("r2") == 0
 
 
 def test_what_others_swept_outlives_a_restart():
@@ -178,13 +178,13 @@ def test_what_others_swept_outlives_a_restart():
     ours = fleet.robots["r1"].mission
     kept = ours.snapshot()
     again = FleetRobot("r1", (0, 0), HALL, before=kept)
-    assert again.mission.shared.cells_of("r2") == ours.shared.cells_of("r2") > 20
-    assert again.mission.shared.epoch == ours.shared.epoch
+    assert again.mission.covered.shared.cells_of("r2") == ours.covered.shared.cells_of("r2") > 20
+    assert again.mission.covered.shared.epoch == ours.covered.shared.epoch
     # What is disregarded stays so.
     sweeps_everything_again(again)
     restarted = FleetRobot("r1", (0, 0), HALL, before=again.mission.snapshot())
     restarted.tell(fleet.robots["r2"].report())
-    assert restarted.mission.shared.cells_of("r2") == 0
+    assert restarted.mission.covered.shared.cells_of("r2") == 0
 
 
 @pytest.mark.parametrize(
@@ -324,7 +324,7 @@ def test_a_second_order_counts_cells_swept_for_it_out_of_range():
     fleet.hears = lambda speaker, listener: True
     fleet.run(2)
     # All but what it passed before it first told of the order.
-    assert ours.mission.shared.cells_of("r2") >= other.mission.snapshot().cells - 2 > 35
+    assert ours.mission.covered.shared.cells_of("r2") >= other.mission.snapshot().cells - 2 > 35
 
 
 def test_disregarded_cells_are_dropped_with_the_cells_or_if_many():
@@ -382,8 +382,8 @@ def test_what_many_robots_say_in_a_moment_holds_nobody_up():
     before = time.thread_time()
     ours.tell(*said(2), *said(4), after=0.0)
     assert time.thread_time() - before < 0.1
-    assert ours.mission.shared.cells_of("m7") == 24 * 3
-    assert np.count_nonzero(ours.mission.shared.swept(Window(0, 0, 300, 300))) == 24 * 3
+    assert ours.mission.covered.shared.cells_of("m7") == 24 * 3
+    assert np.count_nonzero(ours.mission.covered.shared.swept(Window(0, 0, 300, 300))) == 24 * 3
 
 
 def test_robots_beyond_the_limit_do_not_replace_each_other():

@@ -9,6 +9,7 @@ import pytest
 
 from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.members import HANGING_S
+from fasaco_edge.fleet.mission.message import waits_for
 from fasaco_edge.fleet.mission.shared_work import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -58,7 +59,7 @@ def test_a_robot_without_a_part_stands_while_another_sweeps():
     assert not ours.walk
     assert ours.mission.route.plans == plans
     # By that others know that it does not hang.
-    assert ours.mission.waits_for == "r2"
+    assert waits_for(ours.mission) == "r2"
     shared.run(len(CELLS) - shared.swept)
     assert ours.mission.state == "done"
 
@@ -79,7 +80,7 @@ def test_cells_tried_in_vain_stay_the_others_despite_new_maps():
     ours.cannot = other.cannot = {(12, 5)}
 
     def untried():
-        area = ours.mission.area
+        area = ours.mission.map.area
         return ours.mission.company.untried(area.reachable, area)[area.lattice.local((12, 5))]
 
     while untried():
@@ -131,9 +132,9 @@ def test_a_robot_does_not_wait_again_for_others_that_stood(swept):
 def test_a_paused_robot_sends_that_it_waits_for_none():
     shared = Shared()
     shared.run(40)
-    assert shared.ours.mission.waits_for == "r2"
+    assert waits_for(shared.ours.mission) == "r2"
     shared.ours.tell(CommandReceived(1, "pause"), after=1.0)
-    assert (shared.ours.mission.state, shared.ours.mission.waits_for) == ("paused", "")
+    assert (shared.ours.mission.state, waits_for(shared.ours.mission)) == ("paused", "")
 
 
 def test_a_standing_robot_in_trouble_sends_which_it_waits_for():
@@ -142,14 +143,14 @@ def test_a_standing_robot_in_trouble_sends_which_it_waits_for():
     shared.run(40)
     mission = shared.ours.mission
     assert [trouble.code for trouble in mission.troubles] == ["no_map"]
-    assert (mission.state, mission.waits_for) == ("degraded", "r2")
+    assert (mission.state, waits_for(mission)) == ("degraded", "r2")
 
 
 def test_a_robot_whose_part_only_others_see_sweeps_what_it_sees():
     # The east half is still unknown to it, and its part lies there.
     ours = FleetRobot("r1", (0, 0), [row[:12] for row in HALL])
     other = FleetRobot("r2", (6, 12), HALL)
-    report = replace(other.report(), ground=GroundQueue().next(other.mission.area, 100))
+    report = replace(other.report(), ground=GroundQueue().next(other.mission.map.area, 100))
     parts = (Part("r1", (6, 22), 0.0, 1.0), Part("r2", (6, 4), 0.0, 1.0))
     for second in range(20):
         place = 3.0 + 0.2 * (second % 2)
@@ -175,7 +176,7 @@ def heard_from_the_east(other, number, to_r1):
     seed = (6, 22) if to_r1 else (0, 0)
     return replace(
         other.report(),
-        ground=GroundQueue().next(other.mission.area, 100),
+        ground=GroundQueue().next(other.mission.map.area, 100),
         tiles=tiles_of([cell for cell in CELLS if cell[1] < 12]),
         parts=(Part("r1", seed, 0.0 if to_r1 else 1e6, 1.0), Part("r2", (6, 14), 0.0, 1.0)),
         division=number,
@@ -262,10 +263,10 @@ def test_a_robot_plans_anew_once_others_have_swept_what_came_first():
     ours.command("start", {"until_min": 2.0})
     for _ in range(5):
         ours.tick()
-    assert ours.mission.first_from == 90
+    assert ours.mission.orders.scope.worth.least == 90
     swept = tiles_of([(row, col) for row in range(12) for col in east])
     ours.tell(replace(report, tiles=swept))
     for _ in range(3):
         ours.tick()
     assert "others have swept what lay ahead" in [each.reason for each in ours.updates]
-    assert ours.mission.first_from == 0
+    assert ours.mission.orders.scope.worth.least == 0

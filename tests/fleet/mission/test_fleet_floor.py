@@ -11,6 +11,7 @@ import pytest
 
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.layer import MANY_TAKEN
+from fasaco_edge.fleet.mission.message import next_metres
 from fasaco_edge.judge.floor import judge_floor
 from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part, State
 from fasaco_edge.mission.core.mission import Mission
@@ -46,7 +47,7 @@ def divided_by(member, number):
 def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
     grid = room(4.5, 3.5)
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.shared.begin(1)
+    robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(grid))
     for number in range(1, 2000):
         if robot.mission.state is State.DONE:
@@ -59,13 +60,13 @@ def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
 
 def test_a_polished_line_survives_the_wait_for_another_robot():
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.shared.begin(1)
+    robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(60)
-    while math.dist(robot.at, robot.mission.next_metres()[1]) > 2 * CELL_M:
+    while math.dist(robot.at, next_metres(robot.mission)[1]) > 2 * CELL_M:
         robot.drive()
-    before = {tuple(point) for point in robot.mission._line._ahead.xy().tolist()}
-    x, y = robot.mission.next_metres()[1].tolist()
+    before = {tuple(point) for point in robot.mission.line._ahead.xy().tolist()}
+    x, y = next_metres(robot.mission)[1].tolist()
     in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
     robot.tell(in_the_way)
     assert robot.mission.giving_way.waits_for == "r2"
@@ -79,12 +80,12 @@ def test_a_polished_line_survives_the_wait_for_another_robot():
 
 def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.shared.begin(1)
+    robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(40)
-    while math.dist(robot.at, robot.mission.next_metres()[1]) > 2 * CELL_M:
+    while math.dist(robot.at, next_metres(robot.mission)[1]) > 2 * CELL_M:
         robot.drive()
-    x, y = robot.mission.next_metres()[1].tolist()
+    x, y = next_metres(robot.mission)[1].tolist()
     in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
     robot.tell(in_the_way)
     assert robot.mission.giving_way.waits_for == "r2"
@@ -101,12 +102,12 @@ def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
 
 def test_a_robot_leaves_the_rest_of_a_line_without_open_floor():
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.shared.begin(1)
+    robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     alone = replace(divided_by("r2", 0), parts=(), by="")
     robot.tell(alone)
     # Fewer are no reason for another path at once.
-    while robot.mission.open_cells() > MANY_TAKEN - 1:
+    while robot.mission.orders.cells.left() > MANY_TAKEN - 1:
         robot.drive(is_checked=False)
     assert len(robot.line) > 5
     robot.tell(replace(alone, tiles=tiles_of(product(range(-2, 30), range(-2, 30)))))
@@ -124,7 +125,7 @@ def nearest_to(line, place):
 def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     # Both stood in a doorway for good: straight to its refuge meant into the other's side.
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.shared.begin(1)
+    robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(150)
     angle, apart = toward * math.tau / 12, 2 * RADIUS_M + 0.01
@@ -139,7 +140,7 @@ def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     assert len(robot.line) > 1
     assert nearest_to(robot.line, (x, y)) >= apart - 1e-6
     # Others are told where it goes, not of the path that it has set aside.
-    assert math.dist(robot.mission.next_metres()[-1], robot.line[-1]) < CELL_M
+    assert math.dist(next_metres(robot.mission)[-1], robot.line[-1]) < CELL_M
     robot.reasons.clear()
     for _ in range(6):
         robot.now += 0.3

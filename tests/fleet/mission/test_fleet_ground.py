@@ -29,7 +29,7 @@ LARGER = MemberReceived("r2", frame="map", epoch=1, ground=(((0, 0), b"\xff" * T
 def area_of(*rows, cell=(0, 0)):
     drive = FleetDrive(rows, {"r1": cell})
     drive.tick()
-    return drive.robots["r1"].mission.area
+    return drive.robots["r1"].mission.map.area
 
 
 def cells_of(area):

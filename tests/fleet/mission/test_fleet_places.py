@@ -46,13 +46,13 @@ def cells_in(window, mask):
 
 def swept_by_others(mission):
     window = mission.lattice.window
-    return cells_in(window, mission.shared.swept(window))
+    return cells_in(window, mission.covered.shared.swept(window))
 
 
 def test_a_moved_map_of_another_robot_drops_its_earlier_cells():
     """It was restarted with an origin put right, and keeps its epoch."""
     receiver, drive = FleetReceiver(HALL), Drive((3, 3), kind=IN_FLEET)
-    drive.mission.shared.begin(1)
+    drive.mission.covered.shared.begin(1)
     drive.tell(MapReceived(building(*["." * 60] * 20)), pose_at(3, 3))
     drive.tell(receiver.event(told_from(0.0)))
     assert swept_by_others(drive.mission) == BLOCK
@@ -124,7 +124,7 @@ class OnFloors(Drive):
         super().__init__((0, 0), kind=FleetKind("r1", place))
         if before is not None:
             self.mission.restore_ledger(before)
-        self.mission.shared.begin(1)
+        self.mission.covered.shared.begin(1)
         fleet = FleetConfig("hall", frame, place.origin[0])
         self.receiver = FleetReceiver(structs.replace(HALL, fleet=fleet))
         self.listener = Listener()

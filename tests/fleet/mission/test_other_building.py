@@ -20,6 +20,6 @@ def test_cells_of_others_on_the_previous_floor_do_not_count():
     stand(drive, 8.0, NEW)
     drive.tell(other)
     assert drive.mission.coverage().remaining == 39
-    assert "another building" in drive.mission.shared.why_misplaced("map")
+    assert "another building" in drive.mission.covered.shared.why_misplaced("map")
     drive.command("reset")
-    assert drive.mission.shared.why_misplaced("map") == ""
+    assert drive.mission.covered.shared.why_misplaced("map") == ""

@@ -29,7 +29,7 @@ def around(cell):
 def begun():
     """A robot, r1, that has passed cells of a room beside another one; and one of those."""
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.shared.begin(1)
+    robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
     robot.drive(40, is_checked=False)
@@ -42,12 +42,12 @@ def test_floor_of_a_passed_cell_stays_with_the_robot_that_passed():
     for is_left in (False, True):
         robot, cell = begun()
         if is_left:
-            robot.mission.floor.forget(around(cell))
+            robot.mission.covered.floor.forget(around(cell))
         for number in range(1, 9):
             robot.tell(replace(divided_by("r2", number), x=0.3 + 0.2 * (number % 2)))
             robot.drive(is_checked=False)
         assert robot.mission.company.part_cells() == 0
-        to_sweep = robot.mission.floor_to_sweep()
+        to_sweep = robot.mission.line.left.areas
         unswept_m2.append(to_sweep.ahead_m2 + to_sweep.left_m2)
     assert unswept_m2[1] - unswept_m2[0] > 0.5 * CELL_M**2
 
@@ -58,5 +58,5 @@ def test_unswept_floor_in_a_passed_cell_does_not_delay_others():
         if robot.mission.state is State.DONE:
             break
         robot.drive(is_checked=False)
-        robot.mission.floor.forget(around(cell))
+        robot.mission.covered.floor.forget(around(cell))
     assert robot.mission.state is State.DONE
