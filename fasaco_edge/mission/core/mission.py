@@ -136,7 +136,7 @@ class Mission:
 
         To be called before the first step, and before ``restore_order``. A contradiction, see
         ``coverage.fit``, is reported as a fault (LedgerMismatchError) with the map that
-        shows it; coverage since the restart is kept then.
+        shows it; coverage begins from zero then.
         """
         if self._angle.resume(before.lattice_deg):
             self._lay_cells()
