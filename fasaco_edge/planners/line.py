@@ -66,7 +66,7 @@ class LineConfig:
     price_s_m2: float = 200.0
     speed_m_s: float = 0.25
     turning: Turning = TURNING
-    moves_m2: int = 5000
+    moves_m2: int = 6000
     swept: float | None = None
 
     def prices(self, unit_m: float, tool_m: float) -> kernel.Price:
