@@ -36,7 +36,7 @@ def noisy(cells, rng):
 def true_rooms(book, grid, floor):
     """For each room how many of its squares lie in each true room."""
     raster = book.sheet.raster
-    cols, rows = grid.geometry.to_pixels(*centres(raster.window, raster.square_m))
+    cols, rows = grid.geometry.to_pixels(*centres(raster.window, raster.square_m).T)
     rows, cols = np.floor(rows).astype(int), np.floor(cols).astype(int)
     inside = (rows >= 0) & (cols >= 0) & (rows < grid.geometry.rows) & (cols < grid.geometry.cols)
     truth = np.zeros(len(rows), np.int32)
