@@ -21,7 +21,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import MissionOrder, Zone
+from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
@@ -69,7 +69,7 @@ class RunData:
         commands: arrival and name of each, and the order of a ``start``.
         grid: the map at the end, with all updates.
         ordered_keep_out: polygons of the last order.
-        zones: of the last order; empty without an order, or if it is for everything.
+        zones: polygons of the last order; empty without an order, or if it is for everything.
         rooms: as they were at the end; none if none were recorded.
         config, version, robot: of the daemon, by its last status.
         undecodable: samples that could not be read, by topic.
@@ -85,7 +85,7 @@ class RunData:
     commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
     grid: OccupancyGrid | None = None
     ordered_keep_out: tuple[Polygon, ...] = ()
-    zones: tuple[Zone, ...] = ()
+    zones: tuple[Polygon, ...] = ()
     rooms: Rooms = field(default_factory=Rooms)
     config: Settings = field(default_factory=dict)
     version: str = ""
@@ -271,13 +271,15 @@ class _SampleReader:
         self.data.commands.append((self._now, name, order))
         if name == "start":
             self.data.ordered_keep_out = order.keep_out
-            self.data.zones = tuple(zone for zone in order.zones if zone.polygon is not None)
+            self.data.zones = tuple(zone.polygon for zone in order.zones if zone.polygon)
 
     def _status(self, arrival: Arrival) -> None:
         status, data = decode_tolerant(arrival.sample.payload, Status), self.data
         data.config = renamed(status.config) or data.config
         data.version = status.version or data.version
         data.robot = status.robot or data.robot
+        # An order may name a standing zone or a room in place of a polygon.
+        data.zones = tuple(z.polygon for z in status.mission.zones if z.polygon) or data.zones
         known = known_settings(data.config)
         self._poses.schema = known.pose.schema or self._poses.schema
         if frames := known.ros2.frames:

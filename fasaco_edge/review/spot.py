@@ -238,7 +238,7 @@ class _Judge:
     def _missed(self, missed_m: float, nearest_s: float) -> Spot:
         """Return why the tool missed it."""
         by = f"the tool's edge passed {100 * missed_m:.0f} cm from it at {clock(nearest_s)}"
-        if self._data.zones and not self._is_within([zone.polygon for zone in self._data.zones]):
+        if self._data.zones and not self._is_within(self._data.zones):
             return self._spot("not ordered", f"in no zone of the last order; {by}")
         if (gap := self._gap()) is not None:
             words = (
@@ -298,8 +298,8 @@ class _Judge:
         # A shorter line leaves floor that is not worth the distance.
         return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words
 
-    def _is_within(self, polygons: Sequence[Polygon | None]) -> bool:
-        return any(p is not None and is_near(p, (self._x, self._y), 0.0) for p in polygons)
+    def _is_within(self, polygons: Sequence[Polygon]) -> bool:
+        return any(is_near(polygon, (self._x, self._y), 0.0) for polygon in polygons)
 
 
 def _distances(line: NDArray[np.float64], place: tuple[float, float]) -> NDArray[np.float64]:

@@ -37,7 +37,8 @@ from tests.support.senders import Sender
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "planner": {"line": "thorough"}}
 KEEP_OUT = [[2.6, 0.4], [3.4, 0.4], [3.4, 1.0], [2.6, 1.0]]
 ZONE = [[0.1, 0.1], [3.9, 0.1], [3.9, 2.3], [0.1, 2.3]]
-ORDER = {"zones": [{"name": "a", "polygon": ZONE}], "keep_out": [KEEP_OUT], "return_home": True}
+# Of a standing zone, by its name: the status has its polygon.
+ORDER = {"zones": [{"name": "a"}], "keep_out": [KEEP_OUT], "return_home": True}
 Y = 0.45
 
 
@@ -78,7 +79,8 @@ def parts(tmp_path_factory):
 
             def status(state, reason, **more):
                 said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
-                tell("status", encode_json(said | more))
+                mission = {"zones": [{"name": "a", "polygon": ZONE}] if sent > 2 else []}
+                tell("status", encode_json(said | {"mission": mission | more}))
 
             tell("map", map_bytes(seen_first()))
             status("idle", "waits for an order")
@@ -97,7 +99,7 @@ def parts(tmp_path_factory):
                 tell("pose", pose_bytes(float(x), Y, yaw=math.pi))
             tell("command", encode_json({"command": "pause"}))
             area = {"cells": 4, "m2": 0.36, "x": 3.0, "y": 0.7, "reason": "in a keep-out zone"}
-            status("paused", "paused by command", mission={"unreached": {"areas": [area]}})
+            status("paused", "paused by command", unreached={"areas": [area]})
             recorder.written(sent)
             recorder.process.terminate()
             recorder.process.wait(120)

@@ -67,6 +67,7 @@ class Scene:
         # The order, by the last command, and the operator's keep-outs, by the last status.
         self._order = EVERYTHING_ONCE
         self._kept_out: list[tuple[str, Polygon]] = []
+        self._zones: list[tuple[str, Polygon]] = []
         self._rooms: list[tuple[str, Polygon]] = []
         self._troubles: set[str] = set()
         # What was drawn last of the grids that a daemon publishes again unchanged.
@@ -127,7 +128,7 @@ class Scene:
         self.add_line(entities.MISSION_LOG, f"command: {command.name}{which}")
         if command.name in ("start", "cancel", "reset"):
             # Only a start has an order; other commands remove its zones.
-            self._order = command.order
+            self._order, self._zones = command.order, []
             self._draw_areas()
 
     def add_rooms(self, found: Rooms) -> None:
@@ -145,7 +146,9 @@ class Scene:
     def _draw_areas(self) -> None:
         """Draw the zones of the order, its keep-outs and the operator's."""
         order = self._order
-        zones = [(zone.name, zone.polygon) for zone in order.zones]
+        # An order may name a standing zone or a room in place of a polygon.
+        zones: Sequence[tuple[str, Polygon | None]] = self._zones
+        zones = zones or [(zone.name, zone.polygon) for zone in order.zones]
         keep_out = [("keep out", polygon) for polygon in order.keep_out] + self._kept_out
         for entity, style, polygons in (
             (entities.ZONES, draw.ZONE, zones),
@@ -225,8 +228,9 @@ class Scene:
             for keep_out in status.mission.keep_outs
             if keep_out.by == "operator"
         ]
-        if kept_out != self._kept_out:
-            self._kept_out = kept_out
+        zones = [(zone.name, zone.polygon) for zone in status.mission.zones if zone.polygon]
+        if (kept_out, zones) != (self._kept_out, self._zones):
+            self._kept_out, self._zones = kept_out, zones
             self._draw_areas()
         if status.state not in UNDER_WAY:
             # The plans came before, and a viewer orders lines of one time by entity.

@@ -61,7 +61,7 @@ def draw_map(review: Review) -> Image.Image | None:
         driven=driven,
         swept=MapLayer(floor.geometry, floor.swept) if floor and is_line else None,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
-        zones=[zone.polygon for zone in review.data.zones if zone.polygon],
+        zones=review.data.zones,
         keep_out=review.data.keep_out,
         rooms=[(one_line(room.title), room.outline) for room in outlined(review.data)],
     )
@@ -86,7 +86,7 @@ def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
     drive, driven = _thinned(data, slice(near[0], near[-1] + 1) if len(near) else slice(0))
     plot = Plot(View.over(bounds_of(grid, lattice, drive), lattice.cell_m))
     plot.ground(grid)
-    key = draw_order(plot, [zone.polygon for zone in data.zones if zone.polygon], data.keep_out)
+    key = draw_order(plot, data.zones, data.keep_out)
     for line, colour, width, label in (
         (scene.before, palette.RULE, 4.0, "path before"),
         (scene.line, palette.PURPLE, 3.0, "path in force"),
@@ -124,7 +124,7 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     key = []
     if review.floor is not None:
         key += draw_unswept(plot, MapLayer(review.floor.geometry, review.floor.unswept))
-    key += draw_order(plot, [zone.polygon for zone in data.zones if zone.polygon], data.keep_out)
+    key += draw_order(plot, data.zones, data.keep_out)
     if driven.any():
         plot.track(drive[:-1][driven], drive[1:][driven], DRIVE_M)
     gaps = [drive[at : at + 2] for at in np.flatnonzero(~driven).tolist()]
