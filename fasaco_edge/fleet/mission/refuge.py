@@ -17,7 +17,7 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.kernels.lattice.ways import FAR, ways_from
-from fasaco_edge.mission.line.way import comes_nearer
+from fasaco_edge.mission.line.way import comes_nearer, corner_past
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 Places = Callable[[NDArray[np.int32]], Points]
@@ -83,11 +83,19 @@ def refuge(
     begins = [
         (math.dist(place, point) / lattice.cell_m, (begin[0], begin[1]))
         for begin, point in zip(at[is_beside].tolist(), points[is_beside], strict=True)
-        if sees(first, point) and not comes_nearer(first, point, beside)
+        if _leads_away(first, point, beside, sees)
     ]
     way = _nearest(steps, begins, at[is_free], corner)
     # If each way leads nearer to another robot, that robot may still let it pass.
     return _nearest(steps, [(0.0, local)], at[is_free], corner) if way is None else way
+
+
+def _leads_away(here: Points, to: Points, beside: Points, sees: Sees) -> bool:
+    """Return whether a straight drive, or one with a corner, comes no nearer to any robot."""
+    if not comes_nearer(here, to, beside):
+        return sees(here, to)
+    corner = corner_past(here, to, beside)
+    return corner is not None and sees(here, corner) and sees(corner, to)
 
 
 def _nearest(

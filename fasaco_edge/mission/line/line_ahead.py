@@ -40,7 +40,10 @@ from fasaco_edge.mission.line.polyline import (
 )
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.way import (
+    comes_nearer,
+    corner_past,
     corners_between,
+    discs_on,
     fitting_radius,
     is_clear_between,
     lead_out,
@@ -159,8 +162,20 @@ class LineAhead:
         self._walk, self.cell = walk, 0
         self._join(pieces, skips=beside is None)
         if not keeps and len(self.line):
-            kept = shortened(self.line.points, self._floor, beside)
-            self._take([Piece(self.line.only(kept), -1)])
+            way = self._past(discs_on(self._floor, beside))
+            self._take([Piece(way.only(shortened(way.points, self._floor, beside)), -1)])
+
+    def _past(self, discs: Points) -> Line:
+        """Return the line with a corner by which the robot comes no nearer to discs, if it can."""
+        line = self.line
+        if not len(discs) or len(line) < 2:
+            return line
+        here, to = line.points[:2]
+        corner = corner_past(here, to, discs) if comes_nearer(here, to, discs) else None
+        if corner is None or not (self._is_clear(here, corner) and self._is_clear(corner, to)):
+            return line
+        state = np.full(1, POLISHED, np.uint8)
+        return line.part(0, 1).joined(Line(corner[None], line.cells[:1], state), line.part(1))
 
     def _join(self, pieces: list[Piece], *, skips: bool = True) -> None:
         """Replace the line by one joined from pieces.

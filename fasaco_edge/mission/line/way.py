@@ -58,17 +58,41 @@ def sees_on(floor: FloorMap, a: Points, b: Points) -> bool:
     return is_clear_between(floor, ends[0], ends[1])
 
 
-def comes_nearer(a: Points, b: Points, beside: Points) -> bool:
+def comes_nearer(a: Points, b: Points, beside: Points, start: Points | None = None) -> bool:
     """Return whether a straight way enters one of some discs, or goes farther into one.
 
     Args:
         a, b: its ends, (2,).
         beside: the discs, float64 (k, 3): their middles, in the same units, and radii.
+        start: where the robot begins, which may be in a disc; None for ``a``.
     """
     edge, to = b - a, beside[:, :2] - a
     share = np.clip(to @ edge / max(float(edge @ edge), 1e-12), 0.0, 1.0)
     nearest = np.hypot(*(to - share[:, None] * edge).T)
-    return bool((nearest < np.minimum(beside[:, 2], np.hypot(*to.T)) - 1e-6).any())
+    at_start = np.hypot(*(beside[:, :2] - (a if start is None else start)).T)
+    return bool((nearest < np.minimum(beside[:, 2], at_start) - 1e-6).any())
+
+
+def corner_past(a: Points, b: Points, beside: Points) -> Points | None:
+    """Return the corner of a way from ``a`` to ``b`` that comes no nearer to any disc.
+
+    First across the direction to the nearest disc, then on; None if that comes nearer, too.
+
+    Args:
+        a, b, beside: as for ``comes_nearer``; at least one disc.
+    """
+    away = a - beside[np.argmin(np.hypot(*(beside[:, :2] - a).T)), :2]
+    across = b - a - away * ((b - a) @ away / max(float(away @ away), 1e-12))
+    corner: Points = a + across
+    is_nearer = comes_nearer(a, corner, beside) or comes_nearer(corner, b, beside, a)
+    return None if is_nearer else corner
+
+
+def discs_on(floor: FloorMap, beside: NDArray[np.float64] | None) -> Points:
+    """Return discs as of ``Route.beside`` on the raster, float64 (k, 3): y, x, radius [pixels]."""
+    near, unit_m = () if beside is None else beside.tolist(), floor.geometry.resolution
+    discs = [(*map_to_raster(floor.geometry, x, y), radius_m / unit_m) for x, y, radius_m in near]
+    return np.array(discs, np.float64).reshape(-1, 3)
 
 
 def shortened(
@@ -81,10 +105,7 @@ def shortened(
         floor: the floor.
         beside: discs that no straight part comes too near to, as ``Route.beside``.
     """
-    geometry = floor.geometry
-    near = () if beside is None else beside.tolist()
-    on_raster = [(*map_to_raster(geometry, x, y), m / geometry.resolution) for x, y, m in near]
-    discs = np.array(on_raster, np.float64).reshape(-1, 3)
+    discs = discs_on(floor, beside)
 
     def may_skip(a: Points, b: Points) -> bool:
         return is_clear_between(floor, a, b) and not comes_nearer(a, b, discs)

@@ -182,10 +182,10 @@ def test_a_robot_close_to_another_escapes_past_cells_near_it():
     free[0, 4], free[1, 4:] = True, True
     area = area_of(free, (0, 4))
     other = heard("r2", (0.7, 0.45), at((0, 4)))
-    # 0.41 m from the other; its cell is at 0.54 m, the next one of the way at 0.43 m.
+    # 0.41 m from the other; the first cell of the way, at 0.43 m, is reached by a corner.
     way = refuge_of(area, (0, 4), other, place=(1.02, 0.2))
     assert way is not None
-    assert way.tolist() == [[0, 4], [1, 4], [1, 5], [1, 6]]
+    assert way.tolist() == [[1, 4], [1, 5], [1, 6]]
     assert refuge_of(area, (0, 4), other) is None
 
 
