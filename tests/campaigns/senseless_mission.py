@@ -277,7 +277,9 @@ class MissionTrial:
 
     def _floor(self, grid: OccupancyGrid) -> bytes:
         """Return the swept floor as it is published, b"" where it is too wide to be shown."""
-        shown = self._mission.floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+        shown = self._mission.covered.floor.snapshot().shown(
+            MOST_SQUARES, grid.frame, grid.stamp_ns
+        )
         return b"" if shown is None else encode_occupancy_grid(shown)
 
     def _unswept(self) -> bytes:
@@ -324,7 +326,7 @@ class MissionTrial:
         _hold(set(floor_again) == set(floor), "tiles of floor")
         for place, swept in floor.items():
             _hold(bool((floor_again[place] == swept).all()), f"tile of floor {place}")
-        _hold(snapshot.floor.pixels == self._mission.floor.pixels, "swept pixels")
+        _hold(snapshot.floor.pixels == self._mission.covered.floor.pixels, "swept pixels")
         _hold(OrderState.from_json(again.note).to_json() == snapshot.note, "note")
         rooms = encode_rooms(self._mission.rooms)
         _hold(encode_rooms(decode_rooms(rooms)) == rooms, "rooms")

@@ -167,7 +167,9 @@ class Product:
         reply = StatusBoard(self._config).reply(self._runner)
         shown, grid = None, self._mission.grid
         if grid is not None:
-            shown = self._mission.floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+            shown = self._mission.covered.floor.snapshot().shown(
+                MOST_SQUARES, grid.frame, grid.stamp_ns
+            )
         if shown is not None:
             turned = self._mission.rotation.geometry(shown.geometry)
             shown = OccupancyGrid(turned, shown.cells, shown.frame, shown.stamp_ns)
