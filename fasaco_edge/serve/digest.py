@@ -94,6 +94,8 @@ def state(
     if status is None:
         return found
     mission, floor = status.mission, status.floor
+    if order is None and ordered is not None:
+        order = _order_of(view, ordered.mission)
     return found | {
         "state": status.state,
         "word": plain.WORDS.get(status.state, status.state),
@@ -184,6 +186,32 @@ def _mission(mission: MissionReport) -> Digest:
         "left_out": list(mission.left_out),
         "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
+    }
+
+
+def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
+    """Return the order by command that a status reports: its command came before this server began.
+
+    A zone with the name of a room is that room. The status says how often, and not in which way.
+    """
+    if mission.ordered != "command":
+        return None
+    standing = {zone.name for zone in view.settings.mission.zones}
+    rooms = {room.title: room for room in view.rooms.rooms if room.title not in standing}
+    zones: list[Digest] = []
+    for zone in mission.zones:
+        found: Digest = {"name": zone.name, "passes": zone.passes}
+        if room := rooms.get(zone.name):
+            found["room"], usual = room.id, room.passes or 1
+            if zone.passes == (usual if isinstance(usual, int) else len(usual)):
+                del found["passes"]
+        elif zone.polygon:
+            found["polygon"] = zone.polygon
+        zones.append(found)
+    return {
+        "zones": zones,
+        "keep_out": [each.polygon for each in mission.keep_outs if each.by == "order"],
+        "return_home": mission.return_home,
     }
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import Token
+from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.serve import served_view
 from fasaco_edge.serve.served_view import OTHER_LASTS_S, ServedView
 from fasaco_edge.wire.documents.fleet import FleetMember
@@ -66,6 +67,40 @@ def test_an_order_that_has_ended_can_be_given_again(ended):
     tell(view, "command", {"command": "start", "order": {"passes": 1, "keep_out": []}}, 4.0)
     tell(view, "status", {"state": "done", "mission": ended, "uptime_s": 9.0}, 4.0)
     assert heard(view, "state", 4.0)["again"] == {}
+
+
+def test_an_order_from_before_this_server_can_be_given_again_by_the_status_alone():
+    """Rooms are ordered by their numbers, and as often as they are set where nothing else was."""
+    view = ServedView(Keys())
+    rooms = [
+        {"id": 3, "name": "bath", "outline": CORNERS, "passes": ["auto", "cross"]},
+        {"id": 4, "outline": CORNERS},
+        {"id": 5, "name": "porch", "outline": CORNERS},
+    ]
+    tell(view, "rooms", {"rooms": rooms}, 1.0)
+    names = {"bath": 2, "room 4": 3, "porch": 1, "area 1": 1}
+    zones = [{"name": name, "passes": of, "polygon": CORNERS} for name, of in names.items()]
+    keep_outs = [{"polygon": CORNERS, "by": by} for by in ("order", "operator")]
+    mission = {"ordered": "command", "stage": "over", "zones": zones, "keep_outs": keep_outs}
+    config = {"mission": {"zones": [{"name": "porch", "polygon": CORNERS}]}}
+    tell(view, "status", {"state": "done", "mission": mission, "config": config}, 2.0)
+    again = heard(view, "state", 2.0)["again"]
+    assert again == {
+        "zones": [
+            {"name": "bath", "room": 3},
+            {"name": "room 4", "passes": 3, "room": 4},
+            {"name": "porch", "passes": 1, "polygon": CORNERS},
+            {"name": "area 1", "passes": 1, "polygon": CORNERS},
+        ],
+        "keep_out": [CORNERS],
+        "return_home": False,
+        "keep_covered": False,
+    }
+    read_order(again)
+    # What the robot has begun by itself, Start does.
+    itself = {"ordered": "itself", "stage": "over"}
+    tell(view, "status", {"state": "done", "mission": itself}, 3.0)
+    assert heard(view, "state", 3.0)["again"] is None
 
 
 def test_the_zones_of_an_order_are_drawn_by_the_status_alone():
