@@ -53,6 +53,7 @@ class Way:
             heading = towards
             lengths.append(way_m)
             quarters.append(turns)
+        self._is_known = len(xy) > 0
         self._lengths, self._quarters = lengths[::-1], quarters[::-1]
 
     def left_s(
@@ -60,10 +61,10 @@ class Way:
     ) -> float | None:
         """Return the remaining time from ``beyond_m`` [m] beyond point ``at`` [s].
 
-        None if no speed is known.
+        None if no speed or no path is known.
         """
         speed_m_s = drive.speed_m_s or robot.speed_m_s
-        if not speed_m_s > 0.0:
+        if not speed_m_s > 0.0 or not self._is_known:
             return None
         if not 0 <= at < len(self._lengths):
             return 0.0
@@ -157,8 +158,10 @@ def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
     if status.state not in UNDERWAY or view.gone_since is not None:
         return None
     path = status.path
+    if path is None:  # a daemon that has begun anew has not planned yet
+        return None
     left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)
-    if path is not None and not path.steps:
+    if not path.steps:
         # A paused robot continues on its last path. Without that path, as after a restart of this
         # server, only the daemon knows how long it takes. In any other state it drives nowhere.
         is_paused = status.state == "paused"
@@ -174,6 +177,8 @@ def _mission(mission: MissionReport) -> Digest:
         "zone": mission.zone,
         "pass": mission.pass_number,
         "passes": mission.passes,
+        "part": _part(mission),
+        "more": _comes_more(mission),
         "zones": [
             {
                 "name": zone.name,
@@ -187,6 +192,22 @@ def _mission(mission: MissionReport) -> Digest:
         "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
+
+
+def _part(mission: MissionReport) -> str:
+    """Return which part of the order the figures are of: pass, place, or "" for all of it."""
+    if mission.stage != "covering" or mission.passes is None:
+        return ""
+    return "pass" if mission.passes > 1 else "place" if len(mission.zones) > 1 else ""
+
+
+def _comes_more(mission: MissionReport) -> bool:
+    """Return whether another pass or zone comes after the present one."""
+    if mission.stage != "covering" or mission.passes is None:
+        return False
+    is_last_pass = (mission.pass_number or 1) >= mission.passes
+    is_last_zone = mission.zone in (None, *(zone.name for zone in mission.zones[-1:]))
+    return not (is_last_pass and is_last_zone)
 
 
 def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:

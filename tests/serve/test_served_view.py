@@ -200,7 +200,7 @@ def walk_of(view: ServedView, steps: int, now: float, **more: Any) -> dict[str, 
 
 def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
     """It is told to stand by an empty path, and goes on with the one before."""
-    view = ServedView(Keys())
+    view, now = ServedView(Keys()), 4.0
     drives = walk_of(view, 4, 1.0, state="covering", pose={"x": 1.0})
     assert (drives["to_go_s"], drives["shown"]) == (12, 5)
     paused = walk_of(view, 0, 2.0, state="paused", pose={"x": 1.5})
@@ -212,6 +212,34 @@ def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
     # A viewer that joins while it is paused has no path, but the daemon's time.
     joined = walk_of(ServedView(Keys()), 0, 1.0, state="paused", path={"line_s": 90.4})
     assert joined["to_go_s"] == 90
+    # After a restart of the daemon, or before its path has come, nobody knows.
+    for state, path in (("paused", None), ("covering", {"revision": 3, "steps": 9})):
+        tell(view, "status", {"state": state, "path": path, "uptime_s": 1.0}, now := now + 1.0)
+        assert heard(view, "state", now)["to_go_s"] is None
+        view = ServedView(Keys())
+
+
+@pytest.mark.parametrize(
+    ("zones", "at", "stage", "part", "more"),
+    [
+        ("", ("", 1, 1), "covering", "", False),
+        ("", ("", 1, 2), "covering", "pass", True),
+        ("", ("", 2, 2), "covering", "pass", False),
+        ("bath", ("bath", 1, 1), "covering", "", False),
+        ("bath den", ("bath", 1, 1), "covering", "place", True),
+        ("bath den", ("bath", 2, 2), "covering", "pass", True),
+        ("bath den", ("den", 1, 1), "covering", "place", False),
+        ("bath den", ("den", None, None), "over", "", False),
+        ("bath den", ("", None, None), "retrying", "", False),
+    ],
+)
+def test_figures_of_a_part_of_the_order_are_said_to_be_of_that_part(zones, at, stage, part, more):
+    view, (zone, number, passes) = ServedView(Keys()), at
+    mission = {"ordered": "command", "stage": stage, "zone": zone or None}
+    mission |= {"pass": number, "passes": passes, "zones": [{"name": of} for of in zones.split()]}
+    tell(view, "status", {"state": "covering", "mission": mission}, 1.0)
+    told = heard(view, "state", 1.0)["mission"]
+    assert (told["part"], told["more"]) == (part, more)
 
 
 def test_of_a_robot_that_is_gone_the_last_is_said_as_such():

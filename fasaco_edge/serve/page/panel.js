@@ -25,8 +25,15 @@ function duration(seconds) {
   return minutes < 120 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+// Which part of the order the figures are of.
+function partOf({ mission }) {
+  const isRoom = foundRooms().some((room) => room.title === mission.zone);
+  return { pass: "in this pass", place: `in this ${isRoom ? "room" : "area"}` }[mission.part];
+}
+
 // When a robot that drives will be done, by the clock.
 function ends(state) {
+  if (state.mission.more) return `to go ${partOf(state)}`;
   if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return state.grows ? "to go at least" : "to go";
   const end = new Date(Date.now() + (1000 * state.to_go_s) / state.time_scale);
   // While it still finds rooms, there is more to do than it knows.
@@ -112,6 +119,7 @@ function showProgress(state) {
   const share = knows ? floor.reached_m2 / floor.reachable_m2 : state.cells;
   find("share").textContent = share === null || share === undefined ? "–" : percent(share);
   find("area").textContent = floor ? squares(knows ? floor.reached_m2 : floor.swept_m2) : "–";
+  find("share-of").textContent = partOf(state) || "of the floor in reach";
   find("area-of").textContent = knows ? `of ${squares(floor.reachable_m2)}` : "swept";
   find("togo").textContent = duration(state.to_go_s || 0);
   find("togo").parentElement.hidden = state.to_go_s === null;
@@ -120,7 +128,9 @@ function showProgress(state) {
   find("bar").parentElement.setAttribute("aria-valuenow", Math.round(100 * (share || 0)));
   const lines = state.mission.zones.map((zone) => {
     const pass = zone.passes > 1 ? `, pass ${zone.pass} of ${zone.passes}` : "";
-    return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${percent(zone.share)}${pass}` : "to come"]);
+    // The figures above are of the present one.
+    const share = zone.name === state.mission.zone ? "now" : percent(zone.share);
+    return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${share}${pass}` : "to come"]);
   });
   if (!lines.length && state.mission.passes > 1) lines.push(item(["span", "", "everything"], ["span", "quiet", `pass ${state.mission.pass} of ${state.mission.passes}`]));
   for (const name of state.mission.left_out) lines.push(item(["span", "", name], ["span", "quiet", "left out"]));
