@@ -189,6 +189,7 @@ def _mission(mission: MissionReport) -> Digest:
             for zone in mission.zones[:MOST_AREAS]
         ],
         "left_out": list(mission.left_out),
+        "return_home": mission.return_home,
         "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }

@@ -375,7 +375,10 @@ def test_of_an_older_daemon_the_page_says_why_it_shows_no_place(tmp_path):
         said = tab.js("find('leftname').textContent")
         assert said == f"{reason} (the robot's program is too old to say where)"
         photograph(tab, "old_daemon")
+        assert tab.js("find('absent').innerText").startswith("No robot named robot ")
         assert tab.complaints == []
+        page.process.terminate()
+        until(lambda: tab.js("find('absent').innerText") == "No connection; trying again")
 
 
 def show_left(tab: Tab, reason: str) -> None:

@@ -31,6 +31,7 @@ function command(name, members, then = {}) {
   send({ kind: "command", id: asked, command: name, ...members });
 }
 
+const isLinked = () => find("link").classList.contains("on");
 function showLink(on, title) {
   find("link").classList.toggle("on", on);
   find("link").title = title;
@@ -50,10 +51,7 @@ function join() {
     socket = null;
     showLink(false, "no connection; trying again");
     if (event.code === 4401) return;
-    if (!find("absent").textContent || find("absent").hidden) {
-      find("absent").textContent = "No connection; trying again";
-      find("absent").hidden = false;
-    }
+    showAbsent();
     if (!document.hidden) setTimeout(rejoin, pause);
     pause = Math.min(2 * pause, 8000);
   };
@@ -69,6 +67,7 @@ function show(message) {
       model.role = message.role;
       pause = 500;
       showLink(true, message.role === "operator" ? "connected; may command" : "connected; to look only");
+      showAbsent();
       wants();
       showCommands();
       showRooms();
