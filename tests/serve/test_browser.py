@@ -444,8 +444,20 @@ def test_a_page_asks_for_its_token(tmp_path):
         token = file.read_text().split("operator: ")[1].strip()
         with browsing(page.url, tmp_path / "one") as tab:
             until(lambda: tab.js("find('login').open"))
+            assert tab.js("find('wrong').hidden")
+            tab.js("find('token').value = 'guessed'; find('login').close()")
+            until(lambda: tab.js("find('login').open && !find('wrong').hidden"))
+            photograph(tab, "wrong_token")
             tab.js(f"find('token').value = {token!r}; find('login').close()")
             until(lambda: tab.js("model.role") == "operator")
         with browsing(f"{page.url}#{token}", tmp_path / "two") as tab:
             until(lambda: tab.js("model.role") == "operator")
             assert tab.js("location.hash") == ""
+            # A link opened in a tab that has the page is taken, too: whether it is a wrong one...
+            tab.call("Page.navigate", url=f"{page.url}#guessed")
+            until(lambda: tab.js("find('login').open && !find('wrong').hidden"))
+            # ... or the right one, as the page asks for it.
+            tab.js("model.role = ''")
+            tab.call("Page.navigate", url=f"{page.url}#{token}")
+            until(lambda: tab.js("model.role") == "operator")
+            assert tab.js("!find('login').open && location.hash === ''")

@@ -74,7 +74,8 @@ function show(message) {
       break;
     case "denied":
       try { sessionStorage.removeItem("token"); } catch (error) { /* nothing was kept */ }
-      find("login").showModal();
+      find("wrong").hidden = message.asks;
+      if (!find("login").open) find("login").showModal();
       break;
     case "answer": showAnswer(message); break;
     case "state": showState(); redraw(); break;
@@ -94,6 +95,18 @@ find("login").addEventListener("close", () => {
   find("token").value = "";
   try { sessionStorage.setItem("token", token); } catch (error) { /* it is asked for again */ }
   rejoin();
+});
+
+// The whole link, opened in a tab that has the page already.
+window.addEventListener("hashchange", () => {
+  if (location.hash.length < 2) return;
+  remembered();
+  find("token").value = token;
+  if (find("login").open) find("login").close();
+  else {
+    if (socket) socket.close();
+    join();
+  }
 });
 
 let sleeping = 0;
