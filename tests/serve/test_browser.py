@@ -377,6 +377,12 @@ def test_of_an_older_daemon_the_page_says_why_it_shows_no_place(tmp_path):
         photograph(tab, "old_daemon")
         assert tab.js("find('absent').innerText").startswith("No robot named robot ")
         assert tab.complaints == []
+        # A server that is silent is gone: the page waits 15 s, here none. It finds it again.
+        page.process.send_signal(signal.SIGSTOP)
+        tab.js("heardAt -= SILENT_MS")
+        until(lambda: tab.js("find('absent').innerText") == "No connection; trying again")
+        page.process.send_signal(signal.SIGCONT)
+        until(lambda: tab.js("find('absent').innerText").startswith("No robot named robot "))
         page.process.terminate()
         until(lambda: tab.js("find('absent').innerText") == "No connection; trying again")
 

@@ -1,6 +1,9 @@
 // The link to the server: it reconnects by itself, and closes while the page is hidden.
 let socket = null, asked = 0, pause = 500, taking = Promise.resolve();
 const HIDDEN_MS = 30000;
+// A server says every 5 s that it is there: one that is silent for this long is gone.
+const SILENT_MS = 15000;
+let heardAt = 0;
 let token = "";
 
 function remembered() {
@@ -41,21 +44,30 @@ function showLink(on, title) {
 function join() {
   const live = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
   socket = live;
+  heardAt = Date.now();
   live.binaryType = "arraybuffer";
   live.onopen = () => send({ kind: "hello", token });
   live.onmessage = (event) => {
+    heardAt = Date.now();
     taking = taking.then(() => take(event.data)).then(show).catch((error) => console.error(error));
   };
-  live.onclose = (event) => {
-    if (socket !== live) return;
-    socket = null;
-    showLink(false, "no connection; trying again");
-    if (event.code === 4401) return;
-    showAbsent();
-    if (!document.hidden) setTimeout(rejoin, pause);
-    pause = Math.min(2 * pause, 8000);
-  };
+  live.onclose = (event) => socket === live && lose(event.code);
 }
+
+function lose(code) {
+  socket = null;
+  showLink(false, "no connection; trying again");
+  if (code === 4401) return;
+  showAbsent();
+  if (!document.hidden) setTimeout(rejoin, pause);
+  pause = Math.min(2 * pause, 8000);
+}
+
+setInterval(() => {
+  if (!socket || Date.now() - heardAt < SILENT_MS) return;
+  socket.close();
+  lose(0);
+}, 2000);
 
 function rejoin() {
   if (!socket) join();
@@ -86,6 +98,7 @@ function show(message) {
     case "rooms": showRooms(); break;
     case "shares": showShares(); break;
     case "unswept": showBars(); break;
+    case "alive": break;
     default: redraw();
   }
 }
