@@ -196,10 +196,12 @@ def _mission(mission: MissionReport) -> Digest:
 
 
 def _part(mission: MissionReport) -> str:
-    """Return which part of the order the figures are of: pass, place, or "" for all of it."""
-    if mission.stage != "covering" or mission.passes is None:
-        return ""
-    return "pass" if mission.passes > 1 else "place" if len(mission.zones) > 1 else ""
+    """Return what the figures are of: pass, place, places, or "" for all floor in reach."""
+    is_covering = mission.stage == "covering"
+    if is_covering and (mission.passes or 1) > 1:
+        return "pass"
+    count = len(mission.zones)
+    return "" if not count else "place" if is_covering or count == 1 else "places"
 
 
 def _comes_more(mission: MissionReport) -> bool:

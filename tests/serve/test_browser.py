@@ -227,6 +227,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
             assert tab.js(COVERED) == 0
         tab.size(PHONE, "light")
         assert tab.js("find('does').textContent") == "Sweeps area 1"
+        assert tab.js("find('share-of').textContent") == "in this area"
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         assert tab.js("find('technical').textContent").startswith("covering: ")
         # A pause, and a page opened anew, lose neither the path nor what is drawn.

@@ -225,12 +225,13 @@ def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
         ("", ("", 1, 1), "covering", "", False),
         ("", ("", 1, 2), "covering", "pass", True),
         ("", ("", 2, 2), "covering", "pass", False),
-        ("bath", ("bath", 1, 1), "covering", "", False),
+        ("bath", ("bath", 1, 1), "covering", "place", False),
         ("bath den", ("bath", 1, 1), "covering", "place", True),
         ("bath den", ("bath", 2, 2), "covering", "pass", True),
         ("bath den", ("den", 1, 1), "covering", "place", False),
-        ("bath den", ("den", None, None), "over", "", False),
-        ("bath den", ("", None, None), "retrying", "", False),
+        ("bath den", ("", None, None), "over", "places", False),
+        ("bath", ("", None, None), "retrying", "place", False),
+        ("", ("", None, None), "over", "", False),
     ],
 )
 def test_figures_of_a_part_of_the_order_are_said_to_be_of_that_part(zones, at, stage, part, more):

@@ -25,10 +25,11 @@ function duration(seconds) {
   return minutes < 120 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
-// Which part of the order the figures are of.
+// What the figures are of: all that is ordered, or a part of it.
 function partOf({ mission }) {
-  const isRoom = foundRooms().some((room) => room.title === mission.zone);
-  return { pass: "in this pass", place: `in this ${isRoom ? "room" : "area"}` }[mission.part];
+  const places = mission.zone ? [mission.zone] : mission.zones.map((zone) => zone.name);
+  const what = places.every((name) => foundRooms().some((room) => room.title === name)) ? "room" : "area";
+  return { pass: "in this pass", place: `in this ${what}`, places: `in these ${what}s` }[mission.part];
 }
 
 // When a robot that drives will be done, by the clock.
