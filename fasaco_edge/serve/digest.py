@@ -53,6 +53,7 @@ class Way:
             heading = towards
             lengths.append(way_m)
             quarters.append(turns)
+        self._is_known = len(xy) > 0
         self._lengths, self._quarters = lengths[::-1], quarters[::-1]
 
     def left_s(
@@ -60,10 +61,10 @@ class Way:
     ) -> float | None:
         """Return the remaining time from ``beyond_m`` [m] beyond point ``at`` [s].
 
-        None if no speed is known.
+        None if no speed or no path is known.
         """
         speed_m_s = drive.speed_m_s or robot.speed_m_s
-        if not speed_m_s > 0.0:
+        if not speed_m_s > 0.0 or not self._is_known:
             return None
         if not 0 <= at < len(self._lengths):
             return 0.0
@@ -94,6 +95,8 @@ def state(
     if status is None:
         return found
     mission, floor = status.mission, status.floor
+    if order is None and ordered is not None:
+        order = _order_of(view, ordered.mission)
     return found | {
         "state": status.state,
         "word": plain.WORDS.get(status.state, status.state),
@@ -155,8 +158,10 @@ def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
     if status.state not in UNDERWAY or view.gone_since is not None:
         return None
     path = status.path
+    if path is None:  # a daemon that has begun anew has not planned yet
+        return None
     left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)
-    if path is not None and not path.steps:
+    if not path.steps:
         # A paused robot continues on its last path. Without that path, as after a restart of this
         # server, only the daemon knows how long it takes. In any other state it drives nowhere.
         is_paused = status.state == "paused"
@@ -172,6 +177,8 @@ def _mission(mission: MissionReport) -> Digest:
         "zone": mission.zone,
         "pass": mission.pass_number,
         "passes": mission.passes,
+        "part": _part(mission),
+        "more": _comes_more(mission),
         "zones": [
             {
                 "name": zone.name,
@@ -182,8 +189,53 @@ def _mission(mission: MissionReport) -> Digest:
             for zone in mission.zones[:MOST_AREAS]
         ],
         "left_out": list(mission.left_out),
+        "return_home": mission.return_home,
         "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
+    }
+
+
+def _part(mission: MissionReport) -> str:
+    """Return what the figures are of: pass, place, places, or "" for all floor in reach."""
+    is_covering = mission.stage == "covering"
+    if is_covering and (mission.passes or 1) > 1:
+        return "pass"
+    count = len(mission.zones)
+    return "" if not count else "place" if is_covering or count == 1 else "places"
+
+
+def _comes_more(mission: MissionReport) -> bool:
+    """Return whether another pass or zone comes after the present one."""
+    if mission.stage != "covering" or mission.passes is None:
+        return False
+    is_last_pass = (mission.pass_number or 1) >= mission.passes
+    is_last_zone = mission.zone in (None, *(zone.name for zone in mission.zones[-1:]))
+    return not (is_last_pass and is_last_zone)
+
+
+def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
+    """Return the order by command that a status reports: its command came before this server began.
+
+    A zone with the name of a room is that room. The status says how often, and not in which way.
+    """
+    if mission.ordered != "command":
+        return None
+    standing = {zone.name for zone in view.settings.mission.zones}
+    rooms = {room.title: room for room in view.rooms.rooms if room.title not in standing}
+    zones: list[Digest] = []
+    for zone in mission.zones:
+        found: Digest = {"name": zone.name, "passes": zone.passes}
+        if room := rooms.get(zone.name):
+            found["room"], usual = room.id, room.passes or 1
+            if zone.passes == (usual if isinstance(usual, int) else len(usual)):
+                del found["passes"]
+        elif zone.polygon:
+            found["polygon"] = zone.polygon
+        zones.append(found)
+    return {
+        "zones": zones,
+        "keep_out": [each.polygon for each in mission.keep_outs if each.by == "order"],
+        "return_home": mission.return_home,
     }
 
 

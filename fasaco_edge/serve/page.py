@@ -15,6 +15,7 @@ SCRIPTS = (
     "drawing.js",
     "panel.js",
     "rooms.js",
+    "orders.js",
     "timeline.js",
     "link.js",
 )

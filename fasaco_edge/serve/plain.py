@@ -24,6 +24,7 @@ WORDS = {
 """One word for each state whose own name is not plain."""
 DOES = {
     "idle": "Ready to sweep",
+    "no map": "Ready, but has no map of the rooms yet",
     "waiting for map": "Waits for its map of the rooms",
     "waiting for pose": "Finds out where it is",
     "loading": "Starts up",
@@ -59,17 +60,20 @@ UNSAVED = "It cannot save what it has swept: after a power cut it would start ov
 
 # Floor that is still to come, in the words of ``floor.left``.
 TO_COME = ("on the path", "to come", "not planned yet")
+CLOSED = "closed off: no way leads there that the robot fits through"
+BEHIND, OBSTACLES = "closed off by a keep-out zone", "closed off by obstacles"
+NO_WAY = "no way in: a closed door, or something in the way"
+BEHIND_OR_NO_WAY = "no way in: behind a keep-out, a closed door, or something in the way"
 LEFT = {
     "too narrow for the robot, or too near to a wall or to furniture": "too narrow for the robot, "
     "or too close to a wall or furniture",
-    "closed off: no way leads there that the robot fits through": "no way in: a closed door, or "
-    "something in the way",
+    CLOSED: NO_WAY,
     "in a keep-out zone, or too near to one": "in a keep-out, or close to one",
     "passed, or in narrow strips, and not known to be swept": "thin strips that it may have missed",
     "beside the path, and not worth the way": "small spots, not worth the way",
     "in a keep-out zone": "in a keep-out, or close to one",
-    "closed off by a keep-out zone": "behind a keep-out",
-    "closed off by obstacles": "no way in: a closed door, or something in the way",
+    BEHIND: "behind a keep-out",
+    OBSTACLES: NO_WAY,
     "no longer free on the map": "something stands there now",
     "unknown to the map": "it has not seen that part",
 }
@@ -85,7 +89,7 @@ MUCH = 0.1
 PASSED, BESIDE = 8, 16
 MARKS = {
     "too narrow for the robot, or too near to a wall or to furniture": 1,
-    "closed off: no way leads there that the robot fits through": 2,
+    CLOSED: 2,
     "in a keep-out zone, or too near to one": 4,
     "passed, or in narrow strips, and not known to be swept": PASSED,
     "beside the path, and not worth the way": BESIDE,
@@ -109,8 +113,9 @@ def does(status: Status) -> str:
     mission, path = status.mission, status.path
     if status.state == "blocked" and mission.waits_for_room:
         return f"Waits for {mission.waits_for_room}"
-    if status.state in DOES:
-        return DOES[status.state]
+    state = "no map" if status.state == "idle" and status.map is None else status.state
+    if state in DOES:
+        return DOES[state]
     if status.state == "paused":
         return "Paused at home" if _is_home(status) else "Paused: waits for Resume"
     if status.state == "charging":
@@ -186,7 +191,8 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
             continue
         _of(found, reason, marks).m2 += part.m2
     for part in floor.out_of_reach or ():
-        _of(found, LEFT.get(part.reason, OTHERWISE), MARKS.get(part.reason, 0)).m2 += part.m2
+        reason = _why_closed(of) if part.reason == CLOSED else LEFT.get(part.reason, OTHERWISE)
+        _of(found, reason, MARKS.get(part.reason, 0)).m2 += part.m2
     for area in mission.unreached.areas:
         # Where reasons of floor are known, cells are not counted, so that no spot counts twice.
         if floor.left is None or area.reason in NO_FLOOR:
@@ -209,6 +215,17 @@ def _why_left(part: FloorLeft, of: Status) -> tuple[str, int]:
     if marks == BESIDE and tried_m2 >= LEAST_M2:
         return NOT_REACHED, marks
     return LEFT.get(part.reason, OTHERWISE), marks
+
+
+def _why_closed(of: Status) -> str:
+    """Return why no way leads to floor, in the owner's words: only cells tell what closes it."""
+    m2 = {BEHIND: 0.0, OBSTACLES: 0.0}
+    for area in of.mission.unreached.areas:
+        if area.reason in m2:
+            m2[area.reason] += area.m2
+    if m2[BEHIND] < LEAST_M2:
+        return NO_WAY
+    return LEFT[BEHIND] if m2[OBSTACLES] < LEAST_M2 else BEHIND_OR_NO_WAY
 
 
 def _of(found: dict[str, LeftFloor], reason: str, marks: int = 0) -> LeftFloor:

@@ -30,6 +30,9 @@ LOG = logging.getLogger(__name__)
 # Timeout of a client that does not identify itself, does not read, or sends no token [s].
 HELLO_S, SEND_S, REFUSED_S = 5.0, 10.0, 1.0
 ANSWER_S = 8.0
+# Without news a viewer is told this often that the server is there [s]: the page takes one that is
+# silent for three times as long for gone, which no browser notices by itself.
+ALIVE_S = 5.0
 # Close codes of a connection, from the range for applications.
 DENIED, MALFORMED = 4401, 4400
 
@@ -113,7 +116,11 @@ class Viewer:
                 if sent.get(kind) != number and (kind not in asked or asked[kind]()):
                     sent[kind] = number
                     await self._send(message)
-            await self.news.wait()
+            try:
+                async with asyncio.timeout(ALIVE_S):
+                    await self.news.wait()
+            except TimeoutError:
+                await self._send(message_text("alive"))
 
     async def _send(self, message: str | bytes) -> None:
         try:

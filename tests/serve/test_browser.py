@@ -227,6 +227,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
             assert tab.js(COVERED) == 0
         tab.size(PHONE, "light")
         assert tab.js("find('does').textContent") == "Sweeps area 1"
+        assert tab.js("find('share-of').textContent") == "in this area"
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         assert tab.js("find('technical').textContent").startswith("covering: ")
         # A pause, and a page opened anew, lose neither the path nor what is drawn.
@@ -375,7 +376,16 @@ def test_of_an_older_daemon_the_page_says_why_it_shows_no_place(tmp_path):
         said = tab.js("find('leftname').textContent")
         assert said == f"{reason} (the robot's program is too old to say where)"
         photograph(tab, "old_daemon")
+        assert tab.js("find('absent').innerText").startswith("No robot named robot ")
         assert tab.complaints == []
+        # A server that is silent is gone: the page waits 15 s, here none. It finds it again.
+        page.process.send_signal(signal.SIGSTOP)
+        tab.js("heardAt -= SILENT_MS")
+        until(lambda: tab.js("find('absent').innerText") == "No connection; trying again")
+        page.process.send_signal(signal.SIGCONT)
+        until(lambda: tab.js("find('absent').innerText").startswith("No robot named robot "))
+        page.process.terminate()
+        until(lambda: tab.js("find('absent').innerText") == "No connection; trying again")
 
 
 def show_left(tab: Tab, reason: str) -> None:
@@ -441,8 +451,20 @@ def test_a_page_asks_for_its_token(tmp_path):
         token = file.read_text().split("operator: ")[1].strip()
         with browsing(page.url, tmp_path / "one") as tab:
             until(lambda: tab.js("find('login').open"))
+            assert tab.js("find('wrong').hidden")
+            tab.js("find('token').value = 'guessed'; find('login').close()")
+            until(lambda: tab.js("find('login').open && !find('wrong').hidden"))
+            photograph(tab, "wrong_token")
             tab.js(f"find('token').value = {token!r}; find('login').close()")
             until(lambda: tab.js("model.role") == "operator")
         with browsing(f"{page.url}#{token}", tmp_path / "two") as tab:
             until(lambda: tab.js("model.role") == "operator")
             assert tab.js("location.hash") == ""
+            # A link opened in a tab that has the page is taken, too: whether it is a wrong one...
+            tab.call("Page.navigate", url=f"{page.url}#guessed")
+            until(lambda: tab.js("find('login').open && !find('wrong').hidden"))
+            # ... or the right one, as the page asks for it.
+            tab.js("model.role = ''")
+            tab.call("Page.navigate", url=f"{page.url}#{token}")
+            until(lambda: tab.js("model.role") == "operator")
+            assert tab.js("!find('login').open && location.hash === ''")

@@ -109,6 +109,28 @@ def test_floor_left_is_listed_once_with_its_marks():
     assert told_left(forgotten, underway) == []
 
 
+@pytest.mark.parametrize(
+    ("behind_m2", "obstacles_m2", "said"),
+    [
+        (0.0, 0.5, plain.NO_WAY),
+        (0.0, 0.0, plain.NO_WAY),
+        (0.5, 0.0, "behind a keep-out"),
+        (0.5, 0.2, plain.BEHIND_OR_NO_WAY),
+    ],
+)
+def test_floor_behind_a_keep_out_is_said_to_be(behind_m2, obstacles_m2, said):
+    areas = [{"m2": behind_m2, "reason": plain.BEHIND}]
+    areas += [{"m2": obstacles_m2, "reason": plain.OBSTACLES}]
+    floor = {"swept_m2": 9.0, "left": [], "out_of_reach": [{"m2": 2.0, "reason": plain.CLOSED}]}
+    mission = {"ordered": "command", "stage": "over", "unreached": {"areas": areas}}
+    assert told_left(status(floor=floor, mission=mission)) == [(2.0, said, 2, [])]
+
+
+def test_a_robot_without_a_map_is_said_to_have_none():
+    assert "no map" in plain.does(status(state="idle", map=None))
+    assert plain.does(status(state="idle")) == "Ready to sweep"
+
+
 def told_left(of: Status, ordered: Status | None = None) -> list[tuple[object, ...]]:
     """Return the parts of the floor that are left."""
     parts = plain.left(of, ordered)

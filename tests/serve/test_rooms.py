@@ -23,6 +23,11 @@ from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, two_rooms
 from tests.support.waiting import until
 
+IN_VIEW = """(() => {
+  const { top, bottom, height } = find("answer").getBoundingClientRect();
+  return height > 0 && top >= 0 && bottom <= innerHeight;
+})()"""
+
 
 def square(x: float, y: float, size: float = 3.0) -> tuple[tuple[float, float], ...]:
     return (x, y), (x + size, y), (x + size, y + size), (x, y + size)
@@ -117,6 +122,7 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
         tab.click("rename")
         until(lambda: tab.js("find('answer').innerText").startswith("Choose another name"))
         assert "is 'kitchen' already" in tab.js("find('answer').innerText")
+        assert is_said_in_view(tab)
         assert tab.js("find('roomtitle').innerText") == "bath"
         tab.click("roomcross")
         until(lambda: tab.js("JSON.stringify(roomOf(pickedRoom).passes)") == '["auto","cross"]')
@@ -128,18 +134,7 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
         photograph(tab, "room")
 
-        # In the order of the taps, each as it is set.
-        tab.click("chooseroom")
-        tap(tab, 1.05, 2.5)
-        tab.click("chooseroom")
-        assert tab.js("find('roomsnow').textContent") == "Sweep bath, then kitchen"
-        # By number: a standing zone of that name would come first.
-        by_number = "order().zones.every((zone) => roomOf(zone.room).name === zone.name)"
-        assert tab.js(f"chosen.size === 2 && {by_number}")
-        tab.click("roomsnow")
-        mission = outsider.wait_status(lambda s: s["mission"]["zones"])["mission"]
-        assert [(z["name"], z["passes"]) for z in mission["zones"]] == [("bath", 2), ("kitchen", 1)]
-        until(lambda: tab.js("chosen.size") == 0 and tab.js("find('room').hidden"))
+        order_both(tab, outsider)
 
         # What is left out of an order for everything, the page says.
         tap(tab, 4.65, 2.5)
@@ -166,6 +161,39 @@ def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
         )
         photograph(tab, "split")
         assert tab.complaints == []
+
+
+def order_both(tab: Tab, outsider: Outsider) -> None:
+    """Order the picked bath, then the kitchen: in the order of the taps, each as it is set."""
+    tab.click("chooseroom")
+    tap(tab, 1.05, 2.5)
+    tab.click("chooseroom")
+    assert tab.js("find('roomsnow').textContent") == "Sweep bath, then kitchen"
+    assert tab.js("find('roomnow').hidden && find('start').hidden")
+    assert tab.js("find('chose').innerText").startswith("You chose or drew bath, kitchen: ")
+    # By number: a standing zone of that name would come first.
+    by_number = "order().zones.every((zone) => roomOf(zone.room).name === zone.name)"
+    assert tab.js(f"chosen.size === 2 && {by_number}")
+    tab.click("roomsnow")
+    mission = outsider.wait_status(lambda s: s["mission"]["zones"])["mission"]
+    assert [(z["name"], z["passes"]) for z in mission["zones"]] == [("bath", 2), ("kitchen", 1)]
+    until(lambda: tab.js("chosen.size") == 0 and tab.js("find('room').hidden"))
+    # The figures are of one of its parts; the same order goes on.
+    until(lambda: tab.js("find('togo-of').innerText") == "to go in this pass")
+    assert tab.js("find('share-of').innerText") == "in this pass"
+    assert "now, pass 1 of 2" in tab.js("find('zones').innerText")
+    same = "[...mission.zones].map(({ name }) => foundRooms().find((r) => r.name === name).id)"
+    tab.js(f"{{ const {{ mission }} = model.state; {same}.forEach(choose); }}")
+    photograph(tab, "under_way")
+    tab.click("order")
+    until(lambda: tab.js("find('answer').innerText").startswith("It goes on"))
+    photograph(tab, "goes_on")
+
+
+def is_said_in_view(tab: Tab) -> bool:
+    """Tell whether all of an answer is on the screen, wherever the page is scrolled to."""
+    tops = (0, 9_999)
+    return all(tab.js(f"scrollTo(0, {top}); {IN_VIEW}") for top in tops)
 
 
 def tap(tab: Tab, x: float, y: float) -> None:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 import base64
 import hashlib
+import json
 import re
 import socket
 import stat
 import time
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import ExitStack
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,8 +27,10 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.processes import own_mb
+from fasaco_edge.serve import viewer
 from fasaco_edge.serve.guard import Guard
 from fasaco_edge.serve.live import LiveServer
+from fasaco_edge.serve.messages import message_text
 from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS
 from fasaco_edge.wire.keys import Keys
@@ -473,3 +477,28 @@ def test_an_order_beyond_the_limits_fails_for_its_sender_alone(covering, tmp_pat
         assert "must be from" in answer["text"]
         other.wait("state", is_told)
         assert page.process.poll() is None
+
+
+class SilentBrowser:
+    """A browser that says nothing for 0.1 s, and then goes."""
+
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+
+    async def send(self, message: str) -> None:
+        """Take a message in."""
+        self.heard.append(json.loads(message)["kind"])
+
+    async def __aiter__(self) -> AsyncIterator[str]:
+        await asyncio.sleep(0.1)
+        for nothing in ():
+            yield nothing
+
+
+def test_a_viewer_without_news_hears_that_the_server_is_there(monkeypatch):
+    monkeypatch.setattr(viewer, "ALIVE_S", 0.01)
+    browser: Any = SilentBrowser()
+    source: Any = SimpleNamespace(newest=lambda: [("state", 1, message_text("state"))])
+    asyncio.run(viewer.Viewer(browser, source, Guard(frozenset())).serve("viewer"))
+    assert browser.heard[0] == "state"
+    assert set(browser.heard[1:]) == {"alive"}

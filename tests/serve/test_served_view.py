@@ -10,6 +10,7 @@ import pytest
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import Token
+from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.serve import served_view
 from fasaco_edge.serve.served_view import OTHER_LASTS_S, ServedView
 from fasaco_edge.wire.documents.fleet import FleetMember
@@ -66,6 +67,40 @@ def test_an_order_that_has_ended_can_be_given_again(ended):
     tell(view, "command", {"command": "start", "order": {"passes": 1, "keep_out": []}}, 4.0)
     tell(view, "status", {"state": "done", "mission": ended, "uptime_s": 9.0}, 4.0)
     assert heard(view, "state", 4.0)["again"] == {}
+
+
+def test_an_order_from_before_this_server_can_be_given_again_by_the_status_alone():
+    """Rooms are ordered by their numbers, and as often as they are set where nothing else was."""
+    view = ServedView(Keys())
+    rooms = [
+        {"id": 3, "name": "bath", "outline": CORNERS, "passes": ["auto", "cross"]},
+        {"id": 4, "outline": CORNERS},
+        {"id": 5, "name": "porch", "outline": CORNERS},
+    ]
+    tell(view, "rooms", {"rooms": rooms}, 1.0)
+    names = {"bath": 2, "room 4": 3, "porch": 1, "area 1": 1}
+    zones = [{"name": name, "passes": of, "polygon": CORNERS} for name, of in names.items()]
+    keep_outs = [{"polygon": CORNERS, "by": by} for by in ("order", "operator")]
+    mission = {"ordered": "command", "stage": "over", "zones": zones, "keep_outs": keep_outs}
+    config = {"mission": {"zones": [{"name": "porch", "polygon": CORNERS}]}}
+    tell(view, "status", {"state": "done", "mission": mission, "config": config}, 2.0)
+    again = heard(view, "state", 2.0)["again"]
+    assert again == {
+        "zones": [
+            {"name": "bath", "room": 3},
+            {"name": "room 4", "passes": 3, "room": 4},
+            {"name": "porch", "passes": 1, "polygon": CORNERS},
+            {"name": "area 1", "passes": 1, "polygon": CORNERS},
+        ],
+        "keep_out": [CORNERS],
+        "return_home": False,
+        "keep_covered": False,
+    }
+    read_order(again)
+    # What the robot has begun by itself, Start does.
+    itself = {"ordered": "itself", "stage": "over"}
+    tell(view, "status", {"state": "done", "mission": itself}, 3.0)
+    assert heard(view, "state", 3.0)["again"] is None
 
 
 def test_the_zones_of_an_order_are_drawn_by_the_status_alone():
@@ -165,7 +200,7 @@ def walk_of(view: ServedView, steps: int, now: float, **more: Any) -> dict[str, 
 
 def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
     """It is told to stand by an empty path, and goes on with the one before."""
-    view = ServedView(Keys())
+    view, now = ServedView(Keys()), 4.0
     drives = walk_of(view, 4, 1.0, state="covering", pose={"x": 1.0})
     assert (drives["to_go_s"], drives["shown"]) == (12, 5)
     paused = walk_of(view, 0, 2.0, state="paused", pose={"x": 1.5})
@@ -177,6 +212,35 @@ def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
     # A viewer that joins while it is paused has no path, but the daemon's time.
     joined = walk_of(ServedView(Keys()), 0, 1.0, state="paused", path={"line_s": 90.4})
     assert joined["to_go_s"] == 90
+    # After a restart of the daemon, or before its path has come, nobody knows.
+    for state, path in (("paused", None), ("covering", {"revision": 3, "steps": 9})):
+        tell(view, "status", {"state": state, "path": path, "uptime_s": 1.0}, now := now + 1.0)
+        assert heard(view, "state", now)["to_go_s"] is None
+        view = ServedView(Keys())
+
+
+@pytest.mark.parametrize(
+    ("zones", "at", "stage", "part", "more"),
+    [
+        ("", ("", 1, 1), "covering", "", False),
+        ("", ("", 1, 2), "covering", "pass", True),
+        ("", ("", 2, 2), "covering", "pass", False),
+        ("bath", ("bath", 1, 1), "covering", "place", False),
+        ("bath den", ("bath", 1, 1), "covering", "place", True),
+        ("bath den", ("bath", 2, 2), "covering", "pass", True),
+        ("bath den", ("den", 1, 1), "covering", "place", False),
+        ("bath den", ("", None, None), "over", "places", False),
+        ("bath", ("", None, None), "retrying", "place", False),
+        ("", ("", None, None), "over", "", False),
+    ],
+)
+def test_figures_of_a_part_of_the_order_are_said_to_be_of_that_part(zones, at, stage, part, more):
+    view, (zone, number, passes) = ServedView(Keys()), at
+    mission = {"ordered": "command", "stage": stage, "zone": zone or None}
+    mission |= {"pass": number, "passes": passes, "zones": [{"name": of} for of in zones.split()]}
+    tell(view, "status", {"state": "covering", "mission": mission}, 1.0)
+    told = heard(view, "state", 1.0)["mission"]
+    assert (told["part"], told["more"]) == (part, more)
 
 
 def test_of_a_robot_that_is_gone_the_last_is_said_as_such():

@@ -1,6 +1,9 @@
 // The link to the server: it reconnects by itself, and closes while the page is hidden.
 let socket = null, asked = 0, pause = 500, taking = Promise.resolve();
 const HIDDEN_MS = 30000;
+// A server says every 5 s that it is there: one that is silent for this long is gone.
+const SILENT_MS = 15000;
+let heardAt = 0;
 let token = "";
 
 function remembered() {
@@ -31,6 +34,7 @@ function command(name, members, then = {}) {
   send({ kind: "command", id: asked, command: name, ...members });
 }
 
+const isLinked = () => find("link").classList.contains("on");
 function showLink(on, title) {
   find("link").classList.toggle("on", on);
   find("link").title = title;
@@ -40,24 +44,30 @@ function showLink(on, title) {
 function join() {
   const live = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/live`);
   socket = live;
+  heardAt = Date.now();
   live.binaryType = "arraybuffer";
   live.onopen = () => send({ kind: "hello", token });
   live.onmessage = (event) => {
+    heardAt = Date.now();
     taking = taking.then(() => take(event.data)).then(show).catch((error) => console.error(error));
   };
-  live.onclose = (event) => {
-    if (socket !== live) return;
-    socket = null;
-    showLink(false, "no connection; trying again");
-    if (event.code === 4401) return;
-    if (!find("absent").textContent || find("absent").hidden) {
-      find("absent").textContent = "No connection; trying again";
-      find("absent").hidden = false;
-    }
-    if (!document.hidden) setTimeout(rejoin, pause);
-    pause = Math.min(2 * pause, 8000);
-  };
+  live.onclose = (event) => socket === live && lose(event.code);
 }
+
+function lose(code) {
+  socket = null;
+  showLink(false, "no connection; trying again");
+  if (code === 4401) return;
+  showAbsent();
+  if (!document.hidden) setTimeout(rejoin, pause);
+  pause = Math.min(2 * pause, 8000);
+}
+
+setInterval(() => {
+  if (!socket || Date.now() - heardAt < SILENT_MS) return;
+  socket.close();
+  lose(0);
+}, 2000);
 
 function rejoin() {
   if (!socket) join();
@@ -69,13 +79,15 @@ function show(message) {
       model.role = message.role;
       pause = 500;
       showLink(true, message.role === "operator" ? "connected; may command" : "connected; to look only");
+      showAbsent();
       wants();
       showCommands();
       showRooms();
       break;
     case "denied":
       try { sessionStorage.removeItem("token"); } catch (error) { /* nothing was kept */ }
-      find("login").showModal();
+      find("wrong").hidden = message.asks;
+      if (!find("login").open) find("login").showModal();
       break;
     case "answer": showAnswer(message); break;
     case "state": showState(); redraw(); break;
@@ -86,6 +98,7 @@ function show(message) {
     case "rooms": showRooms(); break;
     case "shares": showShares(); break;
     case "unswept": showBars(); break;
+    case "alive": break;
     default: redraw();
   }
 }
@@ -95,6 +108,18 @@ find("login").addEventListener("close", () => {
   find("token").value = "";
   try { sessionStorage.setItem("token", token); } catch (error) { /* it is asked for again */ }
   rejoin();
+});
+
+// The whole link, opened in a tab that has the page already.
+window.addEventListener("hashchange", () => {
+  if (location.hash.length < 2) return;
+  remembered();
+  find("token").value = token;
+  if (find("login").open) find("login").close();
+  else {
+    if (socket) socket.close();
+    join();
+  }
 });
 
 let sleeping = 0;

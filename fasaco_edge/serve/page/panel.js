@@ -25,21 +25,35 @@ function duration(seconds) {
   return minutes < 120 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
+// What the figures are of: all that is ordered, or a part of it.
+function partOf({ mission }) {
+  const places = mission.zone ? [mission.zone] : mission.zones.map((zone) => zone.name);
+  const what = places.every((name) => foundRooms().some((room) => room.title === name)) ? "room" : "area";
+  return { pass: "in this pass", place: `in this ${what}`, places: `in these ${what}s` }[mission.part];
+}
+
 // When a robot that drives will be done, by the clock.
 function ends(state) {
+  if (state.mission.more) return `to go ${partOf(state)}`;
   if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return state.grows ? "to go at least" : "to go";
   const end = new Date(Date.now() + (1000 * state.to_go_s) / state.time_scale);
   // While it still finds rooms, there is more to do than it knows.
   return `${state.grows ? "not before" : "done at"} ${end.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false })}`;
 }
 
+// What the server last said of the robot is old without a connection.
+function showAbsent() {
+  const { absent, others } = model.state || { absent: "", others: [] };
+  const named = absent.includes("No robot named") && others.length ? ` There are: ${others.join(", ")}.` : "";
+  find("absent").textContent = isLinked() ? absent + named : "No connection; trying again";
+  find("absent").hidden = !find("absent").textContent;
+}
+
 function showState() {
   const state = model.state;
   find("robot").textContent = state.robot;
   document.title = `${state.robot} · ${state.word || "waiting"}`;
-  find("absent").hidden = !state.absent;
-  const others = state.others.length ? ` There are: ${state.others.join(", ")}.` : "";
-  find("absent").textContent = state.absent && state.absent + (state.absent.includes("of the name") ? others : "");
+  showAbsent();
   find("progress").hidden = !state.state;
   if (!state.state) {
     find("state").textContent = "waiting";
@@ -112,6 +126,7 @@ function showProgress(state) {
   const share = knows ? floor.reached_m2 / floor.reachable_m2 : state.cells;
   find("share").textContent = share === null || share === undefined ? "–" : percent(share);
   find("area").textContent = floor ? squares(knows ? floor.reached_m2 : floor.swept_m2) : "–";
+  find("share-of").textContent = partOf(state) || "of the floor in reach";
   find("area-of").textContent = knows ? `of ${squares(floor.reachable_m2)}` : "swept";
   find("togo").textContent = duration(state.to_go_s || 0);
   find("togo").parentElement.hidden = state.to_go_s === null;
@@ -120,7 +135,9 @@ function showProgress(state) {
   find("bar").parentElement.setAttribute("aria-valuenow", Math.round(100 * (share || 0)));
   const lines = state.mission.zones.map((zone) => {
     const pass = zone.passes > 1 ? `, pass ${zone.pass} of ${zone.passes}` : "";
-    return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${percent(zone.share)}${pass}` : "to come"]);
+    // The figures above are of the present one.
+    const share = zone.name === state.mission.zone ? "now" : percent(zone.share);
+    return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${share}${pass}` : "to come"]);
   });
   if (!lines.length && state.mission.passes > 1) lines.push(item(["span", "", "everything"], ["span", "quiet", `pass ${state.mission.pass} of ${state.mission.passes}`]));
   for (const name of state.mission.left_out) lines.push(item(["span", "", name], ["span", "quiet", "left out"]));
@@ -154,28 +171,14 @@ function showCommands() {
   find("start").hidden = underway || mission.paused || chose;
   const again = state.state ? lastOrder(state) : null;
   find("again").hidden = !again || underway || mission.paused || chose;
+  find("chose").hidden = !chose || underway || mission.paused;
+  find("chose").textContent = `You chose or drew ${[...[...chosen].map(titleOf), ...drafts.map((draft) => draft.name)].join(", ")}: start or apply it below, or take it out. Then Start is here again.`;
   if (again) find("again").textContent = `Last order again: ${inWords(again)}`;
   find("order").textContent = chose && underway ? "Start anew with these" : chose ? "Start with these" : underway ? "Start anew with everything" : "Start with everything";
   find("pause").hidden = Boolean(mission.paused) || !underway;
   find("resume").hidden = !mission.paused;
   find("cancel").hidden = !underway;
   find("home").disabled = !state.state || state.state === "returning";
-}
-
-// An order that has ended can be given again, also after a restart of the server.
-function lastOrder(state) {
-  const key = `last order of ${state.robot}`;
-  try {
-    if (state.again) localStorage.setItem(key, JSON.stringify(state.again));
-    const kept = JSON.parse(localStorage.getItem(key));
-    return kept && kept.zones ? kept : null;
-  } catch (error) { return state.again && state.again.zones ? state.again : null; }
-}
-
-function inWords(order) {
-  const names = order.zones.map((zone) => zone.name).join(", ") || "everything";
-  const often = Array.isArray(order.passes) ? order.passes.length : order.passes;
-  return names + (often > 1 ? `, ${often} times` : "");
 }
 
 function showDrafts() {
@@ -250,26 +253,8 @@ function action(text, act, look = "") {
   return button;
 }
 
-const chosen = new Set();
-
-function order() {
-  const zones = [
-    ...[...chosen].map(zoneOf),
-    ...drafts.filter((draft) => draft.kind === "zone").map(({ name, polygon }) => ({ name: name.trim(), polygon })),
-  ];
-  return {
-    zones,
-    keep_out: drafts.filter((draft) => draft.kind === "keepout").map((draft) => draft.polygon),
-    passes: passesIn("passes", "cross"),
-    return_home: find("return").checked,
-  };
-}
-
 // An irreversible command asks for a second click.
 let sure = null;
-find("order").addEventListener("click", () => find("start").click());
-find("start").addEventListener("click", () => start(order()));
-find("again").addEventListener("click", () => start(lastOrder(model.state)));
 for (const name of ["pause", "resume", "home", "cancel"]) {
   find(name).addEventListener("click", () => {
     if (name !== "cancel" || isSure(find(name))) command(name);
@@ -296,28 +281,6 @@ function calm() {
   sure = null;
 }
 
-// A start that would forget what is covered is refused: the page then asks what to do.
-let refused = null;
-function start(what, discard = false) {
-  command("start", { order: what, discard }, {
-    taken: () => { drafts.length = 0; chosen.clear(); showDrafts(); pickRoom(0); },
-    refused: (answer) => {
-      if (answer.code !== "would_forget") return;
-      refused = what;
-      const swept = answer.text.match(/\(([\d.]+) m2\)/);
-      find("losstext").textContent = `${swept ? `${swept[1]} m² of it` : "Some of it"} is swept already.`;
-      say("", "");
-      find("loss").showModal();
-    },
-  });
-}
-find("loss").addEventListener("close", () => {
-  const choice = find("loss").returnValue;
-  find("loss").returnValue = "";
-  if (choice === "forget") start(refused, true);
-  if (choice === "keep") start({ ...refused, keep_covered: true });
-});
-
 // Keep-outs: the order under way goes on with them.
 function apply(draft) {
   command("keep_out_add", { keep_out: { name: draft.name.trim(), polygon: draft.polygon } }, {
@@ -332,8 +295,8 @@ function drop(name) {
 }
 find("unkeep").addEventListener("click", () => drop(picked));
 
-// An answer is shown for a while; an engineer's words for it are a tap away.
-const SAID_MS = 8000;
+// An answer is shown for a while, over the page; an engineer's words for it are a tap away.
+const SAID_MS = 8000, WHY_MS = 30000;
 let forgetting = 0;
 function say(text, tone, why = "") {
   clearTimeout(forgetting);
@@ -344,8 +307,10 @@ function say(text, tone, why = "") {
     summary.textContent = text;
     details.append(summary, why);
     find("answer").append(details);
-  } else forgetting = setTimeout(() => say("", ""), SAID_MS);
+  }
+  forgetting = setTimeout(() => say("", ""), why ? WHY_MS : SAID_MS);
 }
+find("answer").addEventListener("click", (event) => event.target.closest("details") || say("", ""));
 
 const TAKEN = {
   start: "It begins.", pause: "It stops.", resume: "It goes on.", home: "It comes home.", cancel: "It has ended.",
@@ -357,7 +322,7 @@ const REFUSED = { not_now: "That is not possible now.", bad_order: "It cannot do
 function showAnswer(answer) {
   const then = awaited.get(answer.id) || {};
   awaited.delete(answer.id);
-  if (answer.ok) say(TAKEN[then.name] || "", "good");
+  if (answer.ok) say(then.said || TAKEN[then.name] || "", "good");
   // What is wrong with a room is for its owner to mend.
   else if (answer.code === "bad_order" && then.name.startsWith("room_")) say(roomFault(answer), "bad");
   else say(REFUSED[answer.code] || "That did not work.", "bad", answer.hint ? `${answer.text} (${answer.hint})` : answer.text);

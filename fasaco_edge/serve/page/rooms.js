@@ -83,9 +83,6 @@ function showRooms() {
   const mayCommand = model.role === "operator";
   find("room").hidden = !room || !mayCommand;
   find("chooseroom").hidden = !mayCommand;
-  // An answer is shown where the command was given.
-  if (find("room").hidden) find("commands").append(find("answer"));
-  else find("room").prepend(find("answer"));
   if (room) showRoom(room);
   showRoomList();
   showShares();
@@ -104,6 +101,7 @@ function showRoom(room) {
   if (document.activeElement !== find("roompriority")) find("roompriority").value = room.priority;
   find("roomnow").textContent = `Sweep ${room.title} now`;
   find("turns").textContent = chosen.size ? "" : "Several rooms? Add them below the map, one after the other.";
+  find("roomnow").hidden = isChosen;
   find("roomnow").classList.toggle("primary", !chosen.size);
   find("roomsnow").hidden = !chosen.size;
   find("roomsnow").textContent = `Sweep ${[...chosen].map(titleOf).join(", then ")}`;

@@ -1,0 +1,74 @@
+// Orders: what is drawn and chosen, the last one again, and what a start would forget.
+const chosen = new Set();
+
+function order() {
+  const zones = [
+    ...[...chosen].map(zoneOf),
+    ...drafts.filter((draft) => draft.kind === "zone").map(({ name, polygon }) => ({ name: name.trim(), polygon })),
+  ];
+  return {
+    zones,
+    keep_out: drafts.filter((draft) => draft.kind === "keepout").map((draft) => draft.polygon),
+    passes: passesIn("passes", "cross"),
+    return_home: find("return").checked,
+  };
+}
+
+// An order that has ended can be given again, also after a restart of the server.
+function lastOrder(state) {
+  const key = `last order of ${state.robot}`;
+  try {
+    if (state.again) localStorage.setItem(key, JSON.stringify(state.again));
+    const kept = JSON.parse(localStorage.getItem(key));
+    return kept && kept.zones ? kept : null;
+  } catch (error) { return state.again && state.again.zones ? state.again : null; }
+}
+
+function inWords(order) {
+  const names = order.zones.map((zone) => zone.name).join(", ") || "everything";
+  return names + (often(order.passes) > 1 ? `, ${often(order.passes)} times` : "");
+}
+
+// Whether the robot is at that order already: a start goes on with it.
+const often = (passes) => (Array.isArray(passes) ? passes.length : passes) || 1;
+function goesOn(what) {
+  const mission = (model.state || {}).mission || {}, zones = what.zones || [], areas = model.areas || { zones: [], keep_out: [] };
+  const isKeptOut = (what.keep_out || []).length || areas.keep_out.some((area) => area.is === "order");
+  if (mission.ordered !== "command" || mission.stage === "over" || isKeptOut) return false;
+  if (Boolean(what.return_home) !== mission.return_home || zones.length !== mission.zones.length) return false;
+  if (!zones.length) return often(what.passes) === mission.passes;
+  const given = areas.zones.filter((area) => area.is === "ordered");
+  return zones.every((zone, i) => {
+    const room = roomOf(zone.room), passes = zone.passes || what.passes || (room && room.passes);
+    const isThere = zone.name === mission.zones[i].name && often(passes) === mission.zones[i].passes;
+    return isThere && (!zone.polygon || JSON.stringify(zone.polygon) === JSON.stringify((given[i] || {}).polygon));
+  });
+}
+
+find("order").addEventListener("click", () => find("start").click());
+find("start").addEventListener("click", () => start(order()));
+find("again").addEventListener("click", () => start(lastOrder(model.state)));
+
+// A start that would forget what is covered is refused: the page then asks what to do.
+let refused = null;
+function start(what, discard = false) {
+  const said = goesOn(what) ? "It goes on: it is at that already. To begin anew, Cancel first." : "";
+  command("start", { order: what, discard }, {
+    said,
+    taken: () => { drafts.length = 0; chosen.clear(); showDrafts(); pickRoom(0); },
+    refused: (answer) => {
+      if (answer.code !== "would_forget") return;
+      refused = what;
+      const swept = answer.text.match(/\(([\d.]+) m2\)/);
+      find("losstext").textContent = `${swept ? `${swept[1]} m² of it` : "Some of it"} is swept already.`;
+      say("", "");
+      find("loss").showModal();
+    },
+  });
+}
+find("loss").addEventListener("close", () => {
+  const choice = find("loss").returnValue;
+  find("loss").returnValue = "";
+  if (choice === "forget") start(refused, true);
+  if (choice === "keep") start({ ...refused, keep_covered: true });
+});
