@@ -42,6 +42,7 @@ def judged_floor(
 FLOOR = {
     "reachable_m2": 2,
     "swept_share": 4,
+    "seconds": 1,
     "seconds_per_m2": 3,
     "gap": 4,
     "patches_over_4_dm2": 0,
