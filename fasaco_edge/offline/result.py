@@ -33,6 +33,7 @@ from fasaco_edge.offline.summary import above_bound
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.living_trail import Tau, branching
+from fasaco_edge.planners.own.problem import GridProblem, posed
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.text import duration
@@ -121,6 +122,11 @@ class Plan:
         turns = count_turns(self.cells)
         metres = self.steps * self.problem.lattice.cell_m
         return Drive(metres, turns.quarter + 2 * turns.half, self.cost_s, self.gap, counts_turns)
+
+    @property
+    def grid_problem(self) -> GridProblem:
+        """The problem as a planner of your own gets it."""
+        return posed(self.problem, self.search.seed)
 
     @property
     def cells(self) -> NDArray[np.int32]:

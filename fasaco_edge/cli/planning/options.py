@@ -20,6 +20,7 @@ from fasaco_edge.offline.settings import (
     Search,
 )
 from fasaco_edge.planners.own.loading import SHAPE, is_place
+from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S
 from fasaco_edge.planners.passes import MOST_ANGLE_DEG
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 
@@ -268,8 +269,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         type=float,
         metavar="S",
         help="time for the search of walks and of the line along one [s]; a first walk and line "
-        f"are always finished, a planner of your own is ended (default: {BUDGET_S:g}; none by "
-        "planners other than colony-search)",
+        f"are always finished, a planner of your own is ended (default: {BUDGET_S:g}; "
+        f"{OWN_BUDGET_S:g} for a planner of your own; none by others than colony-search)",
     )
     group.add_argument(
         "--swept",
