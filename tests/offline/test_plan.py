@@ -162,6 +162,12 @@ def test_a_picture_that_cannot_be_written_is_named_in_the_error(tmp_path):
         planned.plot(tmp_path / "nowhere" / "walk.png")
 
 
+def test_a_robot_is_shown_as_it_can_be_typed():
+    robot = fe.Robot(tool_width_m=0.36, turn_deg_s=90.0)
+    assert eval(repr(robot), {"Robot": fe.Robot}) == robot
+    assert "tool_width_m=0.36, speed_m_s=0.25, " in repr(robot)
+
+
 def test_a_time_says_whether_turns_count(capsys):
     map, paper = fe.load_map("office"), fe.Robot(quarter_turn_s=0.0)
     for robot, said in ((fe.Robot(), " s,"), (paper, " s without turns,")):
