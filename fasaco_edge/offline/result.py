@@ -19,6 +19,7 @@ from fasaco_edge.drawing.trail import draw_trail
 from fasaco_edge.host.outputs import whole
 from fasaco_edge.judge.floor import FloorFigures, JudgedFloor, share_words
 from fasaco_edge.offline.figures import (
+    above_bound,
     curve_document,
     curve_words,
     floor_document,
@@ -29,7 +30,6 @@ from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.rooms import RoomsUnderLine
 from fasaco_edge.offline.settings import CELLS, Search
-from fasaco_edge.offline.summary import above_bound
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.living_trail import Tau, branching

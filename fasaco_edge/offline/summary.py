@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fasaco_edge.judge.floor import FloorFigures, share_words
-from fasaco_edge.offline.figures import patches_left
+from fasaco_edge.offline.figures import above_bound, patches_left
 from fasaco_edge.offline.settings import CELLS
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.passes import PassPlans
     from fasaco_edge.offline.result import Plan
-    from fasaco_edge.planners.path import CoveragePath
 
 Rows = list[tuple[str, str]]
 
@@ -59,11 +58,6 @@ def pass_words(plan: Plan) -> str:
     """Return one of several passes in words."""
     drive = plan.drive
     return f"{plan.problem.cells} cells, {plan.steps} steps, {drive.metres:,.1f} m, {drive.time}"
-
-
-def above_bound(path: CoveragePath) -> str:
-    """Return how far a walk is above its lower bound; "" if unknown."""
-    return "" if path.gap is None else f", at most {100 * path.gap:.1f} % above its bound"
 
 
 def _metres(plan: Plan) -> str:
