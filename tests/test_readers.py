@@ -61,12 +61,13 @@ MAY_END_WITH_1 = ("doctor",)
 SAYS = {
     "office.png": r"9\d\.\d% of the floor, \d+ points, \d+ s\n",
     "line.csv": "",
-    "passes.png": r"edge .*\nauto .*\ncross .*\n",
+    "passes.png": r"edge .*\nauto .*\ncross .*\n<PassPlans flat.yaml, .*>\n",
     "free[5:12, 8:14]": r"fasaco .*\naco .*\nspiral-stc .*\nzigzag .*\n",
     "budget_s in (": r"(\{.*'gap'.*\}\n){3}",
-    "from mine import": r"mine\.py:depth_first 666 333 \d+\n",
+    "from mine import": r"mine\.py:depth_first 666 333 \d+\n\(\d+, \d+\) 667 cells\n",
     "observe=fields.append": r"(\d \d+ \d\.\d+ at \(-?\d+\.\d+, -?\d+\.\d+\) m\n){8}",
-    "pheromone.parquet": r"\d+ fields; the last has \d+ cells,\nthe strongest at \(.*\) m\n",
+    "pheromone.parquet": r"\d+ fields; the last has \d+ cells,\nthe strongest at \(.*\) m\n"
+    r"from 0\.\d+ to \d\.\d+\n",
     "floor.parquet": r"monday (\{.*\})\ntuesday \1\n",
 }
 TIMEOUT_S = 120.0

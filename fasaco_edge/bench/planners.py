@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,7 @@ from fasaco_edge.config.config import PlannerConfig
 from fasaco_edge.drawing.spread import Spread, document
 from fasaco_edge.errors import FasacoError, IllegalWalk, PlannerFailed
 from fasaco_edge.planners.own.loading import UserCode, load
+from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S, TookTooLongError
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNERS as REGISTRY
 
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
     from fasaco_edge.planners.problem import CoverageProblem
 
 DEFAULT_MAPS = ("office", "flat")
+# Time of colony-search if none is requested [s].
+SEARCH_S = 1.0
 HEADER = ("planner", "steps", "revisits", "n_r_paper", "turns\n90", "CPU\n[s]")
 FIGURES = ("steps", "revisits", "recovered_cells", "n_r_paper", "turns_90")
 
@@ -51,6 +55,7 @@ class Run:
         cpu_s: time of the planning thread on a processor [s].
         bound_steps: lower bound on the steps.
         fault: why a planner of the user's own failed.
+        ended_s: time after which it was ended without a walk [s]; None if it was not.
     """
 
     grid: str
@@ -60,6 +65,7 @@ class Run:
     cpu_s: float
     bound_steps: int
     fault: FasacoError | None = None
+    ended_s: float | None = None
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -73,9 +79,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--budget",
         type=seconds_above_zero,
-        default=1.0,
         metavar="S",
-        help="of colony-search [s]; the others walk to their end (default: %(default)s)",
+        help="time of colony-search [s], and the time after which a planner of your own is ended; "
+        f"the others walk to their end (default: {SEARCH_S:g}; {OWN_BUDGET_S:g} for your own)",
     )
     parser.add_argument(
         "--end",
@@ -111,24 +117,32 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
     grids = [read_grid(name) for name in grid_names(args, DEFAULT_MAPS)]
     say("loading kernels")
     warm_up()
+    posed = []
     for grid in grids:
         end = grid.start if args.end == "home" else None
         problem = CoverageProblem.of(grid.lattice, grid.start, end=end)
-        bound = lower_bound_of(problem).steps
-        for seed in range(args.seeds):
-            for name, planner in _rows(own, replace(colony, seed=seed)):
-                say(f"{Path(grid.name).stem}: {name}, seed {seed}")
-                yield _run(grid, problem, name, planner, args.budget, bound)
+        posed.append((grid, problem, lower_bound_of(problem).steps))
+    # The user's own last: nothing is lost if one of them has to be interrupted.
+    for rows in (_known, partial(_own, own, args.budget)):
+        for grid, problem, bound in posed:
+            for seed in range(args.seeds):
+                for name, planner in rows(replace(colony, seed=seed)):
+                    say(f"{Path(grid.name).stem}: {name}, seed {seed}")
+                    yield _run(grid, problem, name, planner, args.budget or SEARCH_S, bound)
 
 
-def _rows(
-    own: Sequence[UserCode], colony: ColonyConfig
+def _own(
+    own: Sequence[UserCode], budget_s: float | None, colony: ColonyConfig
 ) -> Generator[tuple[str, CoveragePlanner], None, None]:
     from fasaco_edge.planners.own.planner import OwnPlanner  # noqa: PLC0415
-    from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
 
     for code in own:
-        yield code.name, OwnPlanner(code, colony.seed)
+        yield code.name, OwnPlanner(code, colony.seed, budget_s or OWN_BUDGET_S)
+
+
+def _known(colony: ColonyConfig) -> Generator[tuple[str, CoveragePlanner], None, None]:
+    from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
+
     for name, entry in REGISTRY.items():
         # The threshold of equation (4) that missions use, where they plan by it.
         q0 = PlannerConfig().q0 if entry.has_local_search else colony.q0
@@ -153,7 +167,9 @@ def _run(
         path = planner.plan(problem, stop, ignore)
     except (PlannerFailed, IllegalWalk) as error:
         # The others are measured all the same.
-        return Run(grid.name, problem.cells, name, None, 0.0, bound, error)
+        is_late = isinstance(error.__cause__, TookTooLongError)
+        ended_s = getattr(planner, "most_s", None) if is_late else None
+        return Run(grid.name, problem.cells, name, None, 0.0, bound, error, ended_s)
     cpu_s = time.thread_time() - cpu
     walk = walk_figures(grid.lattice, path.cells)
     return Run(grid.name, problem.cells, name, walk, cpu_s, bound)
@@ -173,7 +189,7 @@ def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
             "velocities": args.velocities,
             "seeds": args.seeds,
             "end": args.end,
-            "budget_s": args.budget,
+            "budget_s": args.budget or SEARCH_S,
             "grids": figures,
         },
         remarks=(
@@ -181,7 +197,10 @@ def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
             "way home, as in the paper's Table I",
         ),
         further=tuple(others),
-        faults=tuple({str(run.fault): run.fault for run in runs if run.fault}.values()),
+        # The lines below the first may differ from run to run.
+        faults=tuple(
+            {str(run.fault).split("\n")[0]: run.fault for run in runs if run.fault}.values()
+        ),
     )
 
 
@@ -198,6 +217,7 @@ def _figures(runs: Sequence[Run]) -> dict[str, Any]:
             row |= {what: document(spread) for what, spread in counts.items()}
         if faults := [run.fault for run in mine if run.fault]:
             row |= {"failed": len(faults), "why": str(faults[0]), "code": faults[0].code}
+            row["ended_s"] = max((run.ended_s for run in mine if run.ended_s), default=None)
         rows.append(row)
     return {
         "grid": runs[0].grid,
@@ -212,12 +232,16 @@ def _table(grid: dict[str, Any]) -> ResultTable:
     rows = tuple(
         (row["planner"], *(_range(row[what]) for what in columns), f"{row['cpu_s']['median']:.3f}")
         if row["runs"]
-        else (row["planner"], *("failed" if at == 0 else "-" for at in range(len(HEADER) - 1)))
+        else (row["planner"], _failed(row), *("-" for _ in range(len(HEADER) - 2)))
         for row in grid["rows"]
     )
     name = Path(grid["grid"]).stem
     title = f"{name}: {grid['cells']} cells, at least {grid['bound_steps']} steps"
     return ResultTable(title, HEADER, rows)
+
+
+def _failed(row: dict[str, Any]) -> str:
+    return f"no walk\nafter {row['ended_s']:g} s" if row["ended_s"] else "failed"
 
 
 def _range(spread: dict[str, float]) -> str:

@@ -61,7 +61,8 @@ def run(args: argparse.Namespace) -> int:
     if args.benchmark is None:
         args.usage.print_help()
         return 0
-    samples, interrupted = _measure(args.benchmark, args)
+    samples, interrupted_in = _measure(args.benchmark, args)
+    interrupted = interrupted_in is not None
     report: Report = args.benchmark.report(args, samples)
     if args.json:
         goals = [goal.document() for goal in report.goals]
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
         }
         print_json(document)
     else:
-        _print(report, interrupted)
+        _print(report, interrupted_in)
     for fault in report.faults:
         report_error(fault)
     for file in args.benchmark.write(args, samples):
@@ -86,24 +87,31 @@ def run(args: argparse.Namespace) -> int:
     return Exit.ERROR if report.faults or (args.check and missed) else Exit.OK
 
 
-def _measure(benchmark: Benchmark[Sample], args: argparse.Namespace) -> tuple[list[Sample], bool]:
-    """Return the samples, and whether the user interrupted the measurement."""
+def _measure(
+    benchmark: Benchmark[Sample], args: argparse.Namespace
+) -> tuple[list[Sample], str | None]:
+    """Return the samples, and which measurement the user interrupted; None for none."""
     samples: list[Sample] = []
+    present = benchmark.name
     with terminal.progress() as bar:
         task = bar.add_task(benchmark.name, total=benchmark.count(args))
+
+        def say(what: str) -> None:
+            nonlocal present
+            present = what
+            bar.update(task, description=what)
+
         try:
-            with closing(
-                benchmark.measure(args, lambda what: bar.update(task, description=what))
-            ) as measuring:
+            with closing(benchmark.measure(args, say)) as measuring:
                 for sample in measuring:
                     samples.append(sample)
                     bar.advance(task)
         except KeyboardInterrupt:
-            return samples, True
-    return samples, False
+            return samples, present
+    return samples, None
 
 
-def _print(report: Report, interrupted: bool) -> None:
+def _print(report: Report, interrupted_in: str | None) -> None:
     console = terminal.out()
     for shown in report.tables:
         table = _table(shown.title)
@@ -119,8 +127,9 @@ def _print(report: Report, interrupted: bool) -> None:
         console.print(_goals(report))
     for remark in report.remarks:
         console.print(remark, style="dim")
-    if interrupted:
-        console.print("interrupted: these are the measurements made until then", style="yellow")
+    if interrupted_in is not None:
+        said = f"interrupted in {interrupted_in}; these are the measurements made until then"
+        console.print(Text(said, "yellow"))
 
 
 def _goals(report: Report) -> Table:

@@ -108,6 +108,12 @@ class RobotConfig(Section, frozen=True):
             radius_m = self.footprint.radius() or DEFAULT_RADIUS_M
             msgspec.structs.force_setattr(self, "radius_m", radius_m)
 
+    def __repr__(self) -> str:
+        """Return the robot as Python, without what is not set."""
+        members = msgspec.structs.asdict(self).items()
+        said = (f"{name}={value!r}" for name, value in members if value is not msgspec.UNSET)
+        return f"Robot({', '.join(said)})"
+
     @property
     def assumed(self) -> str:
         """Assumptions on the robot's shape; "" if it is the configured disc."""

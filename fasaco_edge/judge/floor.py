@@ -127,8 +127,9 @@ def swept_words(swept_m2: float, reachable_m2: float) -> str:
 
 
 def share_words(share: float) -> str:
-    """Return a share in percent, rounded down."""
-    return f"{math.floor(1e3 * share + 1e-9) / 10:.1f} %"
+    """Return a share in percent; never 100.0 % before it is the whole."""
+    percent = min(100.0 * share, 99.9) if share < 1.0 else 100.0
+    return f"{percent:.1f} %"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,7 @@ from fasaco_edge.judge.floor import (
 )
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.planners.curves import Curve
+from fasaco_edge.planners.path import CoveragePath
 
 
 def judged_floor(
@@ -42,6 +43,7 @@ def judged_floor(
 FLOOR = {
     "reachable_m2": 2,
     "swept_share": 4,
+    "seconds": 1,
     "seconds_per_m2": 3,
     "gap": 4,
     "patches_over_4_dm2": 0,
@@ -84,6 +86,11 @@ def patches_left(floor: FloorFigures) -> str:
         return "no patch over 4 dm2 left"
     patches = "1 patch" if count == 1 else f"{count} patches"
     return f"{patches} over 4 dm2 left, the largest {floor.largest_patch_m2:,.2f} m2"
+
+
+def above_bound(path: CoveragePath) -> str:
+    """Return how far a walk is above its lower bound; "" if unknown."""
+    return "" if path.gap is None else f", at most {100 * path.gap:.1f} % above its bound"
 
 
 def curve_document(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> dict[str, object]:

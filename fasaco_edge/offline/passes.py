@@ -10,7 +10,6 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.config.robot import RobotConfig
@@ -22,11 +21,10 @@ from fasaco_edge.offline.figures import floor_document, floor_words, judged_floo
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.plan import plan
-from fasaco_edge.offline.result import Plan, picture_of, png_of
+from fasaco_edge.offline.result import Drive, Plan, picture_of, png_of
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
 from fasaco_edge.planners.passes import Pass, laid, read_pass
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
-from fasaco_edge.text import duration
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,7 +43,7 @@ class PassPlans:
         """Return the passes in one line, without their plans."""
         swept = "" if self.floor is None else f": {floor_words(self.floor)}"
         name = self.plans[0].map.name
-        return f"<PassPlans {name}, {', '.join(self.names)}{swept}, {duration(self.cost_s)}>"
+        return f"<PassPlans {name}, {', '.join(self.names)}{swept}, {self.drive.time}>"
 
     def _repr_png_(self) -> bytes:
         """Return the picture as PNG, as notebooks show it."""
@@ -63,8 +61,18 @@ class PassPlans:
 
     @property
     def cost_s(self) -> float:
-        """Time to drive and turn along the cells of all passes [s]."""
+        """Time to drive and turn along all walks' cells [s]; of the lines: ``drive.seconds``."""
         return math.fsum(plan.cost_s for plan in self.plans)
+
+    @property
+    def drive(self) -> Drive:
+        """What driving the lines takes: sums over the passes, without a gap."""
+        drives = [plan.drive for plan in self.plans]
+        metres, turns, seconds = (
+            math.fsum(getattr(drive, name) for drive in drives)
+            for name in ("metres", "turns", "seconds")
+        )
+        return Drive(metres, turns, seconds, None, drives[0].counts_turns)
 
     @cached_property
     def floor(self) -> FloorFigures | None:
@@ -73,8 +81,10 @@ class PassPlans:
         judged = judged_floor(first.map.grid, self.xy, first.robot)
         if judged is None:
             return None
-        # A lower bound of the time is known for single passes only.
-        return replace(judged.figures, least_s=0.0)
+        # Each pass has its own speed; a lower bound of the time is known for single passes only.
+        seconds, swept_m2 = self.drive.seconds, judged.figures.swept_m2
+        each = seconds / swept_m2 if swept_m2 else None
+        return replace(judged.figures, least_s=0.0, seconds=seconds, seconds_per_m2=each)
 
     @property
     def figures(self) -> dict[str, object]:
@@ -84,7 +94,9 @@ class PassPlans:
             "map": first.map.name,
             "line": first.line,
             "steps": sum(plan.steps for plan in self.plans),
-            "length_m": round(math.fsum(length_m(plan.xy) for plan in self.plans), 3),
+            "length_m": round(
+                math.fsum(plan.steps * plan.problem.lattice.cell_m for plan in self.plans), 3
+            ),
             "cost_s": self.cost_s,
             "wall_s": round(math.fsum(plan.wall_s for plan in self.plans), 6),
             "floor": floor_document(self.floor),
@@ -197,8 +209,3 @@ def _end(end: str | Cell, plans: Sequence[Plan]) -> str | Cell:
         return first.problem.start
     x, y = first.xy[0] // first.robot.tool_width_m
     return int(y), int(x)
-
-
-def length_m(xy: NDArray[np.float64]) -> float:
-    """Return the length of a line, float64 (n, 2) [m]."""
-    return float(np.hypot(*np.diff(xy, axis=0).T).sum())

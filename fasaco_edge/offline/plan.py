@@ -90,7 +90,8 @@ def plan(
         search: settings of the search; None for the defaults.
         planner: a planner of your own instead of a search: a function that takes a ``GridProblem``
             and returns the walk's cells (row, col) in order; or a class, or an object, with such a
-            method ``plan``. Of ``search`` it uses only the seed.
+            method ``plan``. Of ``search`` it gets the seed, and is ended after ``budget_s``: 60 s
+            without one; there is no limit in other threads than the main one.
         stop: stopping criterion.
         watch: called with the progress of the search for a walk; a second walk begins anew.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or

@@ -19,6 +19,7 @@ from fasaco_edge.drawing.trail import draw_trail
 from fasaco_edge.host.outputs import whole
 from fasaco_edge.judge.floor import FloorFigures, JudgedFloor, share_words
 from fasaco_edge.offline.figures import (
+    above_bound,
     curve_document,
     curve_words,
     floor_document,
@@ -32,6 +33,7 @@ from fasaco_edge.offline.settings import CELLS, Search
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.living_trail import Tau, branching
+from fasaco_edge.planners.own.problem import GridProblem, posed
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.text import duration
@@ -45,12 +47,19 @@ class Drive(NamedTuple):
 
     Attributes:
         gap: how far the time is above the least of any line, as a share of it; None if unknown.
+        counts_turns: whether turns take any of the time: not with ``quarter_turn_s=0``.
     """
 
     metres: float
     turns: float
     seconds: float
     gap: float | None
+    counts_turns: bool
+
+    @property
+    def time(self) -> str:
+        """The time in words."""
+        return duration(self.seconds) + ("" if self.counts_turns else " without turns")
 
 
 @dataclass(frozen=True, repr=False)
@@ -88,14 +97,14 @@ class Plan:
 
     def __repr__(self) -> str:
         """Return the plan in one line."""
-        metres, turns, seconds, gap = self.drive
-        words = [f"{self.problem.cells} cells", duration(seconds), f"{metres:,.1f} m"]
+        drive = self.drive
+        words = [f"{self.problem.cells} cells", drive.time, f"{drive.metres:,.1f} m"]
         floor = self.floor
         if floor is not None and floor.swept_share is not None:
             words[0] = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
-        words.append(f"{turns:,.0f} quarter-turns")
-        if gap is not None:
-            words.append(f"at most {100 * gap:.0f} % above the shortest time")
+        words.append(f"{drive.turns:,.0f} quarter-turns")
+        if drive.gap is not None:
+            words.append(f"at most {100 * drive.gap:.0f} % above the shortest time")
         return f"<Plan {self.map.name}, {self.path.planner}: {', '.join(words)}>"
 
     def _repr_png_(self) -> bytes:
@@ -104,13 +113,20 @@ class Plan:
 
     @property
     def drive(self) -> Drive:
-        """What driving the line takes; of a grid the walk."""
+        """What driving the line takes; of a coverage grid, the walk."""
+        counts_turns = self.robot.cost().quarter_turn_s > 0.0
         if self.judged is not None:
             judged = self.judged.figures
-            return Drive(judged.length_m, judged.quarter_turns, judged.seconds, judged.gap)
+            took = judged.length_m, judged.quarter_turns, judged.seconds, judged.gap
+            return Drive(*took, counts_turns)
         turns = count_turns(self.cells)
         metres = self.steps * self.problem.lattice.cell_m
-        return Drive(metres, turns.quarter + 2 * turns.half, self.cost_s, self.gap)
+        return Drive(metres, turns.quarter + 2 * turns.half, self.cost_s, self.gap, counts_turns)
+
+    @property
+    def grid_problem(self) -> GridProblem:
+        """The problem as a planner of your own gets it."""
+        return posed(self.problem, self.search.seed)
 
     @property
     def cells(self) -> NDArray[np.int32]:
@@ -124,12 +140,12 @@ class Plan:
 
     @property
     def cost_s(self) -> float:
-        """Time to drive and turn along the cells [s]."""
+        """Time to drive and turn along the walk's cells [s]; of the line: ``drive.seconds``."""
         return self.path.cost_s
 
     @property
     def gap(self) -> float | None:
-        """Optimality gap of ``cost_s``, as a share; None if unknown."""
+        """Optimality gap of ``cost_s``, as a share; None if unknown. Of the line: ``drive.gap``."""
         return self.path.gap
 
     @cached_property
@@ -247,10 +263,11 @@ def picture_of(plan: Plan, of: str = "", *, rooms: bool = False) -> Image.Image:
     walk = walk_figures(ground.lattice, path.cells)
     deg = round(ground.lattice_deg, 3)
     askew = f" at {deg:g} degrees" if deg else ""
+    drive = plan.drive
     lines = [
-        f"{plan.map.name}: {plan.problem.cells} cells of {ground.lattice.cell_m:g} m{askew}, "
-        f"{walk.steps} steps, {walk.revisits} revisits, {walk.turns_90} quarter-turns; "
-        f"at most {100 * (path.gap or 0.0):.1f} % above the walk's lower bound",
+        f"{plan.map.name}: {plan.problem.cells} cells of {ground.lattice.cell_m:g} m{askew}; "
+        f"walk: {walk.steps} steps, {walk.revisits} revisits{above_bound(path)}",
+        f"line: {drive.metres:,.1f} m, {drive.turns:,.0f} quarter-turns, {drive.time}",
     ]
     if judged is not None:
         lines.append(f"reachable floor: {floor_words(judged.figures)}")

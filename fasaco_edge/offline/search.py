@@ -21,6 +21,7 @@ from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.line import LineSearch
 from fasaco_edge.planners.own.loading import UserCode
 from fasaco_edge.planners.own.planner import OwnPlanner
+from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     ColonySnapshot,
@@ -213,7 +214,7 @@ class Planning:
         """Search for a walk; a planner without a lower bound is given one for its path."""
         search, bound = self._search, self._ending.bound
         planner: CoveragePlanner = (
-            OwnPlanner(self._own, seed, search.most_s)
+            OwnPlanner(self._own, seed, OWN_BUDGET_S if search.most_s is None else search.most_s)
             if self._own
             else planner_of(search.planner, replace(search.colony(), seed=seed), search.threads)
         )

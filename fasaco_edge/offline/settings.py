@@ -43,7 +43,7 @@ class Search:
         threads: number of threads of the ants; the walk is the same for any number.
         budget_s: time limit of the search for walks and the line along one [s]; with local search a
             first walk and line are always completed; None for 2 s, or without local search for no
-            limit.
+            limit. A planner of your own is ended after it; None for 60 s.
         swept: share of the reachable floor that a line is to sweep, in the least time, for which
             three stages are completed whatever the budget; None for as much as its seconds are
             worth.

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fasaco_edge.judge.floor import FloorFigures, share_words
-from fasaco_edge.offline.figures import patches_left
+from fasaco_edge.offline.figures import above_bound, patches_left
 from fasaco_edge.offline.settings import CELLS
-from fasaco_edge.text import duration
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.passes import PassPlans
@@ -18,27 +17,26 @@ Rows = list[tuple[str, str]]
 
 def rows_of(plan: Plan) -> Rows:
     """Return the figures that matter, as names and words."""
-    metres, turns, seconds, gap = plan.drive
-    path, floor = plan.path, plan.floor
+    drive, path, floor = plan.drive, plan.path, plan.floor
     rows = [("map", f"{plan.map.name}, {plan.problem.cells} cells of {_metres(plan)}")]
     if floor is not None:
         rows.append(("swept", _swept(floor)))
-    time = duration(seconds)
+    time = drive.time
     if floor is not None and floor.seconds_per_m2 is not None:
         time += f", {floor.seconds_per_m2:.1f} s a square metre"
     rows.append(("time", time))
-    if gap is not None:
-        rows.append(("gap", f"at most {100 * gap:.1f} % above the shortest possible time"))
+    if drive.gap is not None:
+        rows.append(("gap", f"at most {100 * drive.gap:.1f} % above the shortest possible time"))
     line = "through the centres of cells" if plan.line == CELLS else f"{plan.line}, over the floor"
-    rows.append(("line", f"{metres:,.1f} m, {turns:,.0f} quarter-turns, {line}"))
+    rows.append(("line", f"{drive.metres:,.1f} m, {drive.turns:,.0f} quarter-turns, {line}"))
     if plan.curve_words:
         rows.append(("curve", plan.curve_words))
     if floor is not None and floor.illegal_share:
         rows.append(
             ("caution", f"{100 * floor.illegal_share:.1f} % of the line is too close to obstacles")
         )
-    above = "" if path.gap is None else f", at most {100 * path.gap:.1f} % above its bound"
-    rows.append(("walk", f"{path.steps} steps by {path.planner}, seed {path.seed}{above}"))
+    walk = f"{path.steps} steps by {path.planner}, seed {path.seed}"
+    rows.append(("walk", walk + above_bound(path)))
     if count := int(plan.problem.unreachable.sum()):
         rows.append(("not reached", f"{count} cells that no walk from the start leads to"))
     rows.append(("search", f"{plan.wall_s:.1f} s, ended by {plan.ended_by}"))
@@ -47,14 +45,19 @@ def rows_of(plan: Plan) -> Rows:
 
 def rows_of_passes(plans: PassPlans) -> Rows:
     """Return the same of several passes together."""
-    first, floor = plans.plans[0], plans.floor
-    metres = sum(plan.drive.metres for plan in plans.plans)
+    first, floor, drive = plans.plans[0], plans.floor, plans.drive
     rows = [("map", f"{first.map.name}, {first.problem.cells} cells in the first pass")]
     if floor is not None:
         rows.append(("swept", _swept(floor)))
-    rows.append(("time", duration(sum(plan.drive.seconds for plan in plans.plans))))
-    rows.append(("line", f"{metres:,.1f} m in {len(plans.plans)} passes"))
+    rows.append(("time", drive.time))
+    rows.append(("line", f"{drive.metres:,.1f} m in {len(plans.plans)} passes"))
     return rows
+
+
+def pass_words(plan: Plan) -> str:
+    """Return one of several passes in words."""
+    drive = plan.drive
+    return f"{plan.problem.cells} cells, {plan.steps} steps, {drive.metres:,.1f} m, {drive.time}"
 
 
 def _metres(plan: Plan) -> str:

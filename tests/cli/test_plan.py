@@ -525,4 +525,4 @@ def test_what_matters_fits_on_one_screen(words, names, tmp_path):
 def test_without_a_picture_it_is_said_how_to_have_one(grid_file):
     ended = fasaco_edge("plan", grid_file, "--ants", 8)
     assert ended.out.endswith("more: --long; a picture: --png FILE\n")
-    assert re.search(r"^time +1 min 20 s *$", ended.out, re.MULTILINE)
+    assert re.search(r"^time +1 min 20 s without turns *$", ended.out, re.MULTILINE)

@@ -216,7 +216,7 @@ def test_a_line_that_leaves_the_map_touches_what_is_not_known() -> None:
 @pytest.mark.parametrize(
     ("swept_m2", "reachable_m2", "said"),
     [
-        (34.54, 49.42, "34.5 of 49.4 m2 (69.8 %)"),
+        (34.54, 49.42, "34.5 of 49.4 m2 (69.9 %)"),
         (1999.9, 2000.0, "1,999.9 of 2,000.0 m2 (99.9 %)"),
         (2.0, 2.0, "2.0 of 2.0 m2 (100.0 %)"),
         (0.0, 0.0, "0.0 of 0.0 m2"),

@@ -14,6 +14,9 @@ import pytest
 import fasaco_edge as fe
 from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration, IllegalWalk, PlannerFailed
+from fasaco_edge.offline import search
+from fasaco_edge.planners.own.loading import CALLED_WITH, user_code
+from fasaco_edge.planners.own.problem import walked
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from tests.offline.test_plan import OWN_PLAN, OWN_PLANNER
 from tests.support.processes import ENVIRONMENT
@@ -121,7 +124,7 @@ def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
     assert main(["bench", "planners", *own, *words]) == 0
     (grid,) = json.loads(capsys.readouterr().out)["grids"]
     rows = {row["planner"]: row for row in grid["rows"]}
-    assert list(rows) == [*places, *PLANNER_NAMES]
+    assert list(rows) == [*PLANNER_NAMES, *places]
     # There and back along a tree over 20 cells; row by row, and one walk over them.
     assert [rows[place]["steps"]["median"] for place in places] == [38, 19]
     assert rows["colony-search"]["steps"]["median"] == grid["bound_steps"] == 19
@@ -137,7 +140,7 @@ def test_bench_goes_on_where_one_planner_fails(mine, capsys):
     told = capsys.readouterr()
     assert told.err.count("its walk leaves 19 of 20 cells") == 1
     (grid,) = json.loads(told.out)["grids"]
-    failed, *others = grid["rows"]
+    *others, failed = grid["rows"]
     assert (failed["runs"], failed["failed"], failed["code"]) == (0, 2, "illegal_walk")
     assert [row["planner"] for row in others] == list(PLANNER_NAMES)
     assert all(row["runs"] == 2 and "failed" not in row for row in others)
@@ -176,15 +179,32 @@ def test_an_own_planner_gets_a_read_only_and_correct_problem():
         ([(1, 0), (0, 0.5)], r"cell 1 of its walk must be \(row, col\), got \(0, 0.5\)"),
         ([(1, 0), 3], r"cell 1 of its walk must be \(row, col\), got 3"),
         ([(1, 0), (0, 0)] * 10_000, "its walk does not end"),
-        (None, "NoneType"),
+        (None, "it must return cells, got None"),
+        (np.array(3), "it must return cells, got array"),
         ([Rude((1, 0))], "RuntimeError: not to be looked at"),
         ([Rude((1, 0)).show], r"cell 0 of its walk must be \(row, col\), got <"),
         (["x" * 10_000_000], r"must be \(row, col\), got 'x{90,100}\.\.\."),
     ],
 )
 def test_a_wrong_walk_is_told_where_it_is_wrong(walk, said):
-    with pytest.raises((IllegalWalk, PlannerFailed), match=said):
+    with pytest.raises((IllegalWalk, PlannerFailed), match=said) as caught:
         plan(lambda problem: walk)
+    assert ("return cells" in caught.value.hint) == (caught.type is IllegalWalk)
+
+
+@pytest.mark.parametrize("planner", [lambda: WALK, type("Needy", (), {"plan": lambda self: WALK})])
+def test_a_planner_that_cannot_be_called_is_not_told_of_lines_of_its_own(planner):
+    with pytest.raises(PlannerFailed, match="TypeError") as caught:
+        plan(planner)
+    assert caught.value.hint == CALLED_WITH
+
+
+def test_a_planner_s_problem_is_at_hand():
+    known = plan(lambda problem: WALK)
+    assert walked(user_code(lambda problem: WALK), known.grid_problem).tolist() == list(
+        map(list, WALK)
+    )
+    assert known.grid_problem.start == WALK[0]
 
 
 def test_a_walk_ends_where_it_was_asked_to():
@@ -255,6 +275,37 @@ def test_a_budget_ends_a_planner_that_does_not_end(mine, name, line, capsys):
     # Nothing is left of the limit.
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
     assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
+
+
+def test_without_a_budget_a_planner_ends_too(monkeypatch):
+    def forever(problem):
+        while True:
+            pass
+
+    monkeypatch.setattr(search, "OWN_BUDGET_S", 0.1)
+    for settings in (None, fe.Search(seed=1)):
+        with pytest.raises(PlannerFailed, match=r"no walk after 0\.1 s, its budget"):
+            plan(forever, search=settings)
+
+
+def test_bench_goes_on_where_one_planner_does_not_end(mine, capsys):
+    mine.write_text(ENDLESS)
+    np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
+    words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "2", "--budget", "0.1"]
+    assert main(["bench", "planners", "--planner", f"{mine}:loops", *words]) == 1
+    told = capsys.readouterr()
+    assert re.search(r"zigzag.*mine\.py:loops +no walk +- .*\n +after 0\.1 s ", told.out, re.S)
+    assert told.err.count("no walk after 0.1 s, its budget") == 1
+
+
+def test_an_interrupted_bench_says_where_and_keeps_the_others(mine, capsys):
+    mine.write_text("def interrupted(problem):\n    raise KeyboardInterrupt\n")
+    np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
+    words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "1", "--budget", "0.1"]
+    assert main(["bench", "planners", "--planner", f"{mine}:interrupted", *words]) == 130
+    told = capsys.readouterr().out
+    assert "interrupted in room: mine.py:interrupted, seed 0; these are" in told
+    assert all(name in told for name in PLANNER_NAMES)
 
 
 def test_a_program_s_own_timer_is_left_alone():

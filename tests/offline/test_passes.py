@@ -58,8 +58,13 @@ def test_each_pass_begins_where_the_one_before_ends_and_the_last_ends_at_home(fl
 def test_figures_are_sums_and_those_of_each_pass(flat, tmp_path):
     told = json.loads(json.dumps(flat.figures))
     assert [each["pass"] for each in told["passes"]] == ["edge", "auto", "cross"]
-    for name in ("steps", "cost_s"):
+    for name in ("steps", "cost_s", "length_m"):
         assert told[name] == pytest.approx(sum(each[name] for each in told["passes"]))
+    seconds = sum(each["floor"]["seconds"] for each in told["passes"])
+    assert told["floor"]["seconds"] == pytest.approx(seconds, abs=0.2)
+    assert repr(flat).endswith(f" {told['floor']['seconds_per_m2']:.1f} s/m2, {flat.drive.time}>")
+    swept_m2 = told["floor"]["swept_share"] * told["floor"]["reachable_m2"]
+    assert told["floor"]["seconds_per_m2"] == pytest.approx(seconds / swept_m2, rel=1e-3)
     for plan in flat.plans:
         # Seconds alone, without the price of a step across.
         assert plan.cost_s == plan.problem.cost.seconds.of_walk(plan.cells)
@@ -90,6 +95,12 @@ def test_a_slow_pass_takes_longer():
     usual, slow = planned(fe.load_map(np.ones((6, 6), bool)), "auto", Pass(speed_m_s=0.1)).plans
     assert slow.robot.speed_m_s == 0.1
     assert slow.cost_s > 1.5 * usual.cost_s
+
+
+def test_the_time_of_all_is_by_the_speed_of_each():
+    plans = planned(fe.load_map("office"), Pass(speed_m_s=0.1), "auto", line="quick")
+    seconds = sum(plan.floor.seconds for plan in plans.plans)
+    assert plans.floor.seconds == plans.drive.seconds == pytest.approx(seconds)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,8 @@ from PIL import Image
 import fasaco_edge as fe
 from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration, MapFileError, StartBlocked, StartOutsideMap
+from fasaco_edge.offline import result
+from fasaco_edge.offline.summary import rows_of
 from tests.benchmarks.judge import check_walk
 from tests.support.processes import ENVIRONMENT
 
@@ -158,6 +160,39 @@ def test_a_picture_that_cannot_be_written_is_named_in_the_error(tmp_path):
     planned = fe.plan(fe.load_map(np.ones((3, 3), bool)), search=fe.Search(budget_s=0.05))
     with pytest.raises(FileNotFoundError, match=r"nowhere/walk\.png"):
         planned.plot(tmp_path / "nowhere" / "walk.png")
+
+
+def test_a_robot_is_shown_as_it_can_be_typed():
+    robot = fe.Robot(tool_width_m=0.36, turn_deg_s=90.0)
+    assert eval(repr(robot), {"Robot": fe.Robot}) == robot
+    assert "tool_width_m=0.36, speed_m_s=0.25, " in repr(robot)
+
+
+def test_a_time_says_whether_turns_count(capsys):
+    map, paper = fe.load_map("office"), fe.Robot(quarter_turn_s=0.0)
+    for robot, said in ((fe.Robot(), " s,"), (paper, " s without turns,")):
+        planned = fe.plan(map, robot, line="cells", search=COLONY)
+        assert planned.drive.time + "," in repr(planned)
+        assert said in repr(planned)
+    assert main(["plan", "office", "--planner", "fasaco", "--ants", "64"]) == 0
+    assert " s without turns, " in capsys.readouterr().out
+    assert main(["plan", "office", "--planner", "fasaco", "--ants", "64", "--turn-s", "1.5"]) == 0
+    assert "without turns" not in capsys.readouterr().out
+
+
+def test_a_picture_says_what_is_said_of_the_line_elsewhere(monkeypatch):
+    told = []
+    draw = result.draw_walk
+    monkeypatch.setattr(
+        result,
+        "draw_walk",
+        lambda *given, lines, **more: told.extend(lines) or draw(*given, lines=lines, **more),
+    )
+    planned = fe.plan(fe.load_map("office"), search=QUICK)
+    planned.plot()
+    (turns,) = re.findall(r"[\d,]+ quarter-turns", "\n".join(told))
+    assert turns in repr(planned)
+    assert turns in dict(rows_of(planned))["line"]
 
 
 def test_a_plan_is_one_line_of_text_and_a_picture():

@@ -72,7 +72,7 @@ def test_three_orders_have_three_verdicts():
 def test_a_complete_mission_says_how_much_floor_it_swept():
     """Cells alone read as if all the floor were swept."""
     document = ReviewDocument(complete=True, swept_m2=47.7, reachable_m2=49.4)
-    words = "complete: every cell covered; 47.7 of 49.4 m2 (96.5 %) of floor swept"
+    words = "complete: every cell covered; 47.7 of 49.4 m2 (96.6 %) of floor swept"
     assert verdicts(document) == [(True, words)]
 
 

@@ -20,6 +20,7 @@ from fasaco_edge.offline.settings import (
     Search,
 )
 from fasaco_edge.planners.own.loading import SHAPE, is_place
+from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S
 from fasaco_edge.planners.passes import MOST_ANGLE_DEG
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
 
@@ -45,16 +46,18 @@ figures:
   revisits         steps + 1 - distinct cells
   recovered_cells  distinct cells visited twice or more
   n_r_paper        revisits including the way home, to compare with the paper's Table I
-  cost_s           seconds the robot drives and turns
+  length_m, cost_s length of the walk, and seconds the robot drives and turns along its cells;
+                   turns take none if turn_s is 0; seconds of the line: see floor
   lattice_deg      angle of the cells' rows to the x axis of the map frame; cells
                    (row, col) of a line over the floor are counted along these rows
   gap              cost_s / lower_bound_cost_s - 1, steps and turns together
   floor            (YAML maps) measured on the map's pixels, with a tool as wide as --cell:
                    reachable_m2, all that the tool touches wherever the robot's disc can
-                   be; the share of it that the line sweeps; seconds_per_m2 swept; gap, to
-                   the time of driving that area once at the tool's width; patches larger
-                   than 4 dm2 not swept, the largest; illegal_share, the part of
-                   the line where the robot would touch what is not known to be free
+                   be; the share of it that the line sweeps; seconds that the line takes,
+                   seconds_per_m2 swept; gap, to the time of driving that area once at the
+                   tool's width; patches larger than 4 dm2 not swept, the largest;
+                   illegal_share, the part of the line where the robot would touch what is
+                   not known to be free
   curve            (--turn-radius) length_m, seconds and backward_m of the curve;
                    reversals, from forward to backward or back; spot_turns, which do not
                    fit and stay on the spot, of all bends judged on the curve's points
@@ -266,8 +269,8 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         type=float,
         metavar="S",
         help="time for the search of walks and of the line along one [s]; a first walk and line "
-        f"are always finished, a planner of your own is ended (default: {BUDGET_S:g}; none by "
-        "planners other than colony-search)",
+        f"are always finished, a planner of your own is ended (default: {BUDGET_S:g}; "
+        f"{OWN_BUDGET_S:g} for a planner of your own; none by others than colony-search)",
     )
     group.add_argument(
         "--swept",

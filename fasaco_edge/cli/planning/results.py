@@ -101,7 +101,7 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
     """Print the figures as JSON, those that matter in some lines, or all as a table."""
     from fasaco_edge.offline.figures import floor_words
     from fasaco_edge.offline.passes import PassPlans
-    from fasaco_edge.offline.summary import rows_of, rows_of_passes
+    from fasaco_edge.offline.summary import pass_words, rows_of, rows_of_passes
 
     figures: dict[str, Any] = planned.figures | {"map": str(args.map)}
     rooms = None if isinstance(planned, PassPlans) or not args.rooms else planned.rooms
@@ -110,7 +110,8 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
     if args.json:
         print_json(figures)
         return
-    console, floor, passes = terminal.out(), planned.floor, figures.pop("passes", [])
+    console, floor = terminal.out(), planned.floor
+    figures.pop("passes", None)
     if args.long:
         figures["floor"] = "not known of a coverage grid" if floor is None else floor_words(floor)
         if not isinstance(planned, PassPlans):
@@ -121,13 +122,9 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
         console.print(terminal.summary(rows_of_passes(planned)))
     else:
         console.print(terminal.summary(rows_of(planned)))
-    for number, each in enumerate(passes, 1):
-        gap = each["gap"]
-        words = "" if gap is None else f", at most {gap:.1%} above the bound"
-        console.print(
-            f"pass {number}, {each['pass']}: {each['cells']} cells, {each['steps']} steps, "
-            f"{each['cost_s']:.1f} s{words}"
-        )
+    if isinstance(planned, PassPlans):
+        for number, (name, plan) in enumerate(zip(planned.names, planned.plans, strict=True), 1):
+            console.print(f"pass {number}, {name}: {pass_words(plan)}")
     if rooms is not None:
         console.print(_table(rooms))
     say_written(args)

@@ -215,9 +215,10 @@ def _summary(figures: dict[str, Any], robots: int) -> list[tuple[str, str]]:
         if figures["gap"] is None
         else f", at most {100 * figures['gap']:.1f} % above the lower bound"
     )
+    turns = "" if figures["turn_s"] else " without turns"
     rows = [
         ("map", f"{figures['map']}, {figures['cells']} cells of {figures['cell_m']:g} m"),
-        ("time", f"{duration(figures['makespan_s'])}, of the robot that takes longest"),
+        ("time", f"{duration(figures['makespan_s'])}{turns}, of the robot that takes longest"),
         ("longest", f"{figures['makespan_steps']} of {figures['steps']} steps{gap}"),
         ("passed", f"{figures['swept_twice']} cells by two or more of {robots} robots"),
     ]

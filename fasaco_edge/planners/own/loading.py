@@ -22,6 +22,7 @@ from fasaco_edge.text import shown
 
 # Exceptions of the user's code: ``sys.exit()`` there must not look as if a plan had been made.
 RAISED = (Exception, SystemExit, GeneratorExit)
+CALLED_WITH = "a planner is called with the problem alone, a class without arguments"
 SHAPE = "FILE.py:NAME or MODULE:NAME"
 
 
@@ -179,14 +180,16 @@ def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
         said = getattr(error, "msg", None) or str(error)
     except Exception:  # the user's exception class may itself fail
         said = "says nothing"
-    return PlannerFailed(f"planner {name}: {kind}: {said}{lines}")
+    return PlannerFailed(
+        f"planner {name}: {kind}: {said}{lines}", hint=None if lines else CALLED_WITH
+    )
 
 
 def too_long(error: BaseException, name: str, file: str, most_s: float | None) -> PlannerFailed:
     """Return as text for the user that a planner took longer than ``most_s`` [s], and where."""
     return PlannerFailed(
         f"planner {name}: no walk after {most_s:g} s, its budget{_lines_in(file, error)}",
-        hint="let it end; or give it a larger --budget, or none, which waits until it has ended",
+        hint="let it end, or give it a larger budget: --budget, or budget_s of Search",
     )
 
 

@@ -85,9 +85,14 @@ def walked(code: UserCode, problem: GridProblem, most_s: float | None = None) ->
     try:
         # The user's code runs up to here, also inside the returned iterable.
         with no_longer_than(most_s):
-            walk = _in_bounds(code.walk(problem), MOST_STEPS_PER_CELL * problem.to_cover.size)
+            given = code.walk(problem)
+            if not isinstance(given, Iterable) or getattr(given, "shape", None) == ():
+                raise IllegalWalk(f"planner {code.name}: it must return cells, got {shown(given)}")
+            walk = _in_bounds(given, MOST_STEPS_PER_CELL * problem.to_cover.size)
     except TookTooLongError as error:
         raise too_long(error, code.name, code.file, most_s) from error
+    except IllegalWalk:
+        raise
     except RAISED as error:
         raise failure(error, code.name, code.file) from error
     return _checked(problem, walk, code.name)

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+# Time of a planner of the user's own if none is requested [s].
+OWN_BUDGET_S = 60.0
 # Code that catches everything is interrupted again after this time [s].
 AGAIN_S = 0.1
 

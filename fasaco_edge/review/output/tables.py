@@ -162,7 +162,7 @@ def _mission(review: Review) -> Iterator[Table]:
     columns = (
         AT,
         Column("name", "text", "", "of the plot, with its unit where it has one"),
-        Column("value", "float", "", "what was plotted"),
+        Column("value", "float", "", "what was plotted: it lasts until the next row of that name"),
     )
     plots = (
         (round(at, 6), name, value)
@@ -219,8 +219,8 @@ def _pheromone(review: Review) -> Table:
             "level",
             "int",
             "",
-            f"1 to 255 on a log scale, from the least ({entities.PHEROMONE_RANGE}/min of plots) "
-            "to the most (/max) of that time",
+            "1 to 255 on a log scale: pheromone = min * (max / min) ** ((level - 1) / 254), by the "
+            f"last values of {entities.PHEROMONE_RANGE}/min and /max in plots until at_s",
         ),
     )
     about = "pheromone of a cell at one of up to 65 times, spread over the recording"
