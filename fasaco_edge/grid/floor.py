@@ -162,7 +162,8 @@ class StandLattice:
                     stands[..., axis] += by
                     bends[..., axis] += np.float32(by)
         choose_stands(blocked, places, placement, stale, window.row0, window.col0, clear, stands)
-        link_stands(blocked, places, placement, stale, stands, steps, bends)
+        blockers = np.zeros((2, 2), np.int64)
+        link_stands(blocked, places, placement, stale, stands, steps, bends, blockers)
         states = states_of(stands, unknown)
         return cls(CoverageLattice(window, cell_m, states, steps), stands, bends)
 

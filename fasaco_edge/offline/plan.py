@@ -80,7 +80,7 @@ def plan(
             otherwise the start is in the largest area, near the map frame's origin.
         end: "anywhere", "home", or a cell.
         line: "cells": through their centres, as the paper's planners do; "quick" or "thorough":
-            over the floor, with 45 or 200 s as the value of a square metre. None for "thorough",
+            over the floor, with 60 or 180 s as the value of a square metre. None for "thorough",
             and for "cells" on a coverage grid or by a planner other than colony-search.
         align: what the rows of cells are parallel to, with a line over the floor: "walls", "axes"
             or an angle [deg]; None for walls.

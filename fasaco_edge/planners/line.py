@@ -1,4 +1,4 @@
-"""Driven line: a walk over stands, annealed for swept floor.
+"""Driven line: a walk over stands, polished for swept floor.
 
 The objective is driving time plus a price for each reachable square metre that stays unswept.
 Distances are timed at the robot's speed, turns by their angle.
@@ -6,6 +6,7 @@ Distances are timed at the robot's speed, turns by their angle.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -15,6 +16,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.floor import Floor, StandLattice, straightened
 from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
+from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
+from fasaco_edge.kernels.floor.polish import polish
+from fasaco_edge.kernels.floor.reorder import reorder
 from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
@@ -26,15 +30,24 @@ from fasaco_edge.kernels.floor.sweeps import (
 )
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 
+# Floor farther from an edge than this causes no detour of that edge [m].
+FARTHEST_M = 1.0
+# Least connected unswept area that counts as a patch [m2].
+PATCH_M2 = 0.04
+# Shares of all moves: descent comes first, with long moves that gain much; patches have moves of
+# their own.
+DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 # Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000
-# Temperature at the beginning of the first stage, and of each later one: a line that was cooled
-# once keeps its overall shape. Stages that double give the same results as one of their length.
-HOT, REHEATED = 1.0, 0.7
+# Temperatures of the first stage, and of each later one: a line that was cooled once keeps its
+# overall shape. Stages that double give the same results as one stage of their total length.
+COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
 # Factors of the price of floor, if a share of it is asked for: after a line that sweeps too little,
 # after one that sweeps enough, and the limit of their product. There are few stages, as each takes
 # twice as long as the one before.
 RAISED, LOWERED, MOST_RAISED = 4.0, 0.7, 100.0
+# Moves per point of the line after which its parts are reordered once.
+MOVES_A_POINT = 48
 # Limit on the moves between two pauses: about a quarter of a second.
 MOVES_AT_ONCE = 1 << 17
 # Clearance is given up for a strip of floor that is wider than this share of the tool's width. In a
@@ -52,13 +65,14 @@ _ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=
 
 @dataclass(frozen=True, slots=True)
 class LineConfig:
-    """Parameters of annealing a line.
+    """Parameters of polishing a line.
 
     Attributes:
-        price_s_m2: value of sweeping a square metre [s/m2]; 0 for the walk's own line.
+        price_s_m2: value of sweeping a square metre [s/m2]; 0 for no polish.
         speed_m_s: speed of the robot [m/s].
         turning: durations of turns on the spot.
         moves_m2: limit on the moves tried per reachable square metre.
+        patch_s: at the end, patches are swept that take no longer than this [s].
         swept: share of the reachable floor to sweep in the least time, whatever its price; None for
             as much as pays by ``price_s_m2``.
     """
@@ -66,7 +80,8 @@ class LineConfig:
     price_s_m2: float = 200.0
     speed_m_s: float = 0.25
     turning: Turning = TURNING
-    moves_m2: int = 6000
+    moves_m2: int = 5000
+    patch_s: float = 20.0
     swept: float | None = None
 
     def prices(self, unit_m: float, tool_m: float) -> kernel.Price:
@@ -85,7 +100,7 @@ class LineConfig:
         return float(chain_s(points, 0, count - 1, count, drive_s, self.turning)) if count else 0.0
 
 
-LINES = {"quick": LineConfig(price_s_m2=45.0), "thorough": LineConfig()}
+LINES = {"quick": LineConfig(price_s_m2=45.0, patch_s=0.0), "thorough": LineConfig()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +162,8 @@ class LineSearch:
         edges = np.concatenate([points[:-1], points[1:]], axis=1)
         tool = tool_m / 2 / unit
         sweep_edges(self._sweeps, edges, tool, 1, self._memory.capsules)
-        self._line = linked(points, is_end_fixed=is_end_fixed)
+        blocks = self._sweeps.left.shape
+        self._line = linked(points, blocks, is_end_fixed=is_end_fixed)
         self._price = self._least_price = config.prices(unit, tool_m)
         radius, clear = floor.discs.radius_m / unit, floor.discs.clear_m / unit
         self._on = kernel.Floor(floor.blocked, floor.places, self._sweeps, radius, tool, clear)
@@ -161,22 +177,38 @@ class LineSearch:
             yield
             return
         moves = self._moves
-        yield from self._stage(HOT, moves)
+        farthest = FARTHEST_M / self._floor.geometry.resolution
+        line, on, memory = self._line, self._on, self._memory
+        polish(line, on, self._price, memory, farthest, int(DESCENT_SHARE * moves))
+        yield from self._stage(COOLED, moves - int(line.state[kernel.TRIED]))
         while True:
             self._adapt_price()
             yield from self._stage(REHEATED, moves)
             moves *= 2
 
-    def _stage(self, heat: float, moves: int) -> Iterator[None]:
-        """Anneal the line, and keep the result if it is better."""
-        line, begun = self._line, int(self._line.state[kernel.TRIED])
-        pieces = max(moves // MOVES_AT_ONCE, 1)
+    def _stage(self, heat: tuple[float, float], moves: int) -> Iterator[None]:
+        """Anneal the line, sweep the patches that are left, and keep the result if it is better."""
+        line, on, memory = self._line, self._on, self._memory
+        first, last = heat
+        begun = reordered = int(line.state[kernel.TRIED])
+        per_pass = MOVES_A_POINT * len(numbers_along(line))
+        pieces = max(moves // min(per_pass, MOVES_AT_ONCE), 1)
         for piece in range(pieces):
             if piece:
                 yield
-            between = heat - heat * piece / pieces, heat - heat * (piece + 1) / pieces
+            per_piece = (last - first) / pieces
+            between = first + per_piece * piece, first + per_piece * (piece + 1)
             until = begun + moves * (piece + 1) // pieces
-            anneal(line, self._on, self._price, self._memory, self._random, 0, between, until)
+            anneal(line, on, self._price, memory, self._random, 0, between, until)
+            if until - reordered >= per_pass or piece == pieces - 1:
+                reorder(line, on, self._price, memory, self._random)
+                reordered = until
+        unit = self._floor.geometry.resolution
+        patch = self._price._replace(left_s=self._config.patch_s / PATCH_M2 * unit * unit)
+        if patch.left_s > self._price.left_s:
+            most = int(line.state[kernel.TRIED]) + int(PATCH_SHARE * self._moves)
+            patches = find_patches(self._sweeps, math.ceil(PATCH_M2 / (unit * unit)))
+            sweep_patches(line, on, patch, memory, FARTHEST_M / unit, patches, most)
         self._keep()
         self.stages += 1
         yield
@@ -269,8 +301,10 @@ def left_in_blocks(counts: NDArray[np.int16]) -> NDArray[np.int32]:
     return left
 
 
-def linked(points: NDArray[np.float64], *, is_end_fixed: bool) -> kernel.Line:
-    """Return points, float64 (n, 2), as a kernel line."""
+def linked(
+    points: NDArray[np.float64], blocks: tuple[int, ...], *, is_end_fixed: bool
+) -> kernel.Line:
+    """Return points, float64 (n, 2), as a kernel line, with blocks (rows, cols)."""
     count = len(points)
     capacity = 3 * count + 4096
     room = np.zeros((capacity, 2))
@@ -278,8 +312,10 @@ def linked(points: NDArray[np.float64], *, is_end_fixed: bool) -> kernel.Line:
     following, previous = (np.full(capacity, kernel.NONE, np.int32) for _ in range(2))
     following[: count - 1] = np.arange(1, count)
     previous[1:count] = np.arange(count - 1)
-    state = np.array([count, 0, kernel.NONE], np.int64)
-    return kernel.Line(room, following, previous, state, is_end_fixed)
+    seen = np.zeros(capacity, np.int64)
+    state = np.array([count, 0, 0, kernel.NONE], np.int64)
+    changed = np.zeros(blocks, np.int64)
+    return kernel.Line(room, following, previous, seen, changed, state, is_end_fixed)
 
 
 def numbers_along(line: kernel.Line) -> list[int]:
@@ -303,5 +339,7 @@ def memory_for_moves() -> kernel.Memory:
         before=points(kernel.MOST_CHAIN),
         after=points(kernel.MOST_CHAIN),
         new=points(kernel.MOST_NEW),
+        best=points(kernel.MOST_NEW),
+        place=np.zeros(2),
         capsules=Scratch(np.zeros((kernel.MOST_CAPSULES, len(COLUMNS))), stretches(), stretches()),
     )

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.floor.bits import any_between, is_marked, packed, spread, unpacked
-from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.kernels.floor.capsule import is_clear, is_clear_but, is_near
 from fasaco_edge.kernels.floor.line import MOST_CAPSULES
 from fasaco_edge.kernels.floor.places import connected, disc_rows, places_of, within
 from fasaco_edge.kernels.floor.seconds import turn_between
@@ -67,7 +67,12 @@ def test_a_way_is_clear_of_a_pixel_that_is_a_radius_away(a, b, i, j, radius):
     blocked[i, j] = True
     away = square_distance(a, b, i, j)
     if abs(away - radius) > 0.02:
-        assert is_clear(bits_of(blocked), *map(float, (*a, *b)), radius) == (away > radius)
+        way = *map(float, (*a, *b)), radius
+        blocker, is_far = np.full(2, -99), away > radius
+        assert is_clear(bits_of(blocked), *way) == is_far
+        assert is_clear_but(bits_of(blocked), *way, blocker) == is_far
+        assert blocker.tolist() == ([-99, -99] if is_far else [i, j])
+        assert not (is_far and is_near(float(i), float(j), *way))
 
 
 def test_a_wall_as_far_as_the_radius_is_not_touched():

@@ -29,6 +29,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
+from fasaco_edge.mission.line.polisher import AHEAD_M
 from fasaco_edge.mission.line.polyline import POLISHED
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.unswept import OUT_OF_REACH, Unswept
@@ -174,8 +175,7 @@ def test_a_room_is_swept_to_its_rim():
     assert robot.mission.covered.floor.swept_m2 <= judged.swept.sum() * 0.025**2 * 1.005
     told = floor_report(robot.mission)
     assert told.reachable_m2 == pytest.approx(judged.figures.reachable_m2, rel=0.01)
-    # Between poses, 8 cm apart, the robot may turn at a corner that the mission does not see.
-    assert told.reached_m2 == pytest.approx(judged.figures.swept_m2, rel=0.02)
+    assert told.reached_m2 == pytest.approx(judged.figures.swept_m2, rel=0.01)
     assert {left.reason for left in told.left} == {
         PASSED_BY,
         "beside the path, and not worth the way",
@@ -673,14 +673,17 @@ def test_a_line_on_a_growing_map_never_becomes_worse():
     robot.tell(MapReceived(grid))
     assert robot.mission.orders.cells.is_exploring
     ahead, line = robot.mission.line._ahead, CONFIG.sweeping.line
-    while ahead.line.first_below(POLISHED) < len(ahead.line):
+    while (first := ahead.line.first_below(POLISHED)) < len(ahead.line) and (
+        ahead.lengths()[first] <= AHEAD_M
+    ):
         robot.tell()
+    # What descends is done; the rest is moves at random.
     costs = [cost_s(ahead, line)]
     for _ in range(50):
         robot.tell()
         costs.append(cost_s(ahead, line))
     assert np.all(np.diff(costs) <= 1e-6)
-    assert costs[-1] < costs[0]
+    assert costs[-1] < costs[0] - 1.0
 
 
 def test_the_robot_is_told_of_another_line_when_it_comes_near_it():

@@ -61,7 +61,7 @@ def seconds_and_left(grid, line: DrivenLine, price: float) -> float:
 def test_a_polished_line_is_better_by_the_judge(planned, price):
     grid, floor, stands, walk = planned
     plain = line_over(walk, stands, floor, LineConfig(price_s_m2=0.0), is_end_fixed=False)
-    config = LineConfig(price_s_m2=price)
+    config = LineConfig(price_s_m2=price, patch_s=0.0)
     line = line_over(walk, stands, floor, config, is_end_fixed=False)
     before, after = (seconds_and_left(grid, one, price) for one in (plain, line))
     assert after < 0.93 * before
@@ -88,7 +88,8 @@ def test_the_same_work_gives_the_same_line(planned):
     config = LineConfig(moves_m2=500)
     lines = [line_over(walk, stands, floor, config, is_end_fixed=False) for _ in range(2)]
     assert lines[0].xy.tobytes() == lines[1].xy.tobytes()
-    assert lines[0].tried == lines[1].tried <= 500 * floor.reachable_m2
+    # Patches come after the budget.
+    assert lines[0].tried == lines[1].tried <= 600 * floor.reachable_m2
 
 
 def test_a_longer_search_is_never_worse(planned):

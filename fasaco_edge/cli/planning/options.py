@@ -217,7 +217,7 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
         choices=(CELLS, "quick", THOROUGH),
         help="cells: through the centres of the cells, as the paper's planners do; quick, "
         "thorough: off the centres where walls require it, and optimised for the floor that it "
-        "sweeps, a square metre being worth 45 or 200 s; needs a YAML map (default: thorough; "
+        "sweeps, a square metre being worth 60 or 180 s; needs a YAML map (default: thorough; "
         "cells for .npy grids, several robots, and planners other than colony-search)",
     )
     group.add_argument(

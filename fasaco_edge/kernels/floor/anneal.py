@@ -1,9 +1,9 @@
 """Annealing of the driven line: random moves, some of which may lose a little at first.
 
-At each point of the line in turn one move is drawn: remove the next point, move it, shift the edge
-after it, cut the corner at it, or lead the edge before it over unswept floor nearby. Lengths of a
-move are drawn over several octaves. A move that loses less than a temperature times a random number
-is accepted, too (Metropolis); the temperature falls to 0.
+At each point of the line in turn one move is drawn: remove the next one or two points, move the
+next point, shift the edge after it, cut the corner at it, or reroute the edge before it over
+unswept floor nearby. Lengths of a move are drawn over several octaves. A move that loses less than
+a temperature times a random number is accepted, too (Metropolis); the temperature falls to 0.
 
 Source: S. Kirkpatrick, C. D. Gelatt, M. P. Vecchi, Optimization by Simulated Annealing, 1983.
 No libm function is called, so results are equal on all machines.
@@ -12,7 +12,7 @@ No libm function is called, so results are equal on all machines.
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.bits import is_marked
+from fasaco_edge.kernels.floor.detour import middle_left, nearest_place
 from fasaco_edge.kernels.floor.line import (
     NONE,
     TRIED,
@@ -20,9 +20,11 @@ from fasaco_edge.kernels.floor.line import (
     Line,
     Memory,
     Price,
+    gain_above,
     has_room,
     replace_points,
 )
+from fasaco_edge.kernels.floor.polish import slide
 from fasaco_edge.kernels.floor.sweeps import BLOCK
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 from fasaco_edge.kernels.random import draw, draw_share
@@ -31,7 +33,7 @@ from fasaco_edge.kernels.random import draw, draw_share
 HOTTEST = 0.16
 # Largest length of a move, in radii of the tool, and the number of its octaves.
 FARTHEST, OCTAVES = 2.5, 5
-# Number of moves of each kind in sixteen; the rest lead over unswept floor.
+# Number of moves of each kind in sixteen; the rest are detours over unswept floor.
 LEFT_OUT, MOVED, SHIFTED, CUT = 2, 4, 3, 3
 # A cut leaves at least this much of an edge.
 MOST_CUT = 0.95
@@ -72,16 +74,40 @@ def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, fa
 
 @lean_kernel
 def _shift(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
-    """Shift the edge after ``begin``'s next point."""
+    """Shift the edge after ``begin``'s next point; its ends may slide along the edges beside it."""
+    points, new = line.points, memory.new
+    a = line.next[begin]
+    b = line.next[a]
+    end = line.next[b]
+    dy, dx = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    size = _length(random, far) / np.sqrt(dy * dy + dx * dx)
+    ay, ax = points[a, 0] - size * dx, points[a, 1] + size * dy
+    by, bx = points[b, 0] - size * dx, points[b, 1] + size * dy
+    new[0, 0], new[0, 1], new[1, 0], new[1, 1] = ay, ax, by, bx
+    if draw(random) >> 30 & 1:
+        slide(new[0], points[begin], points[a], memory, ay, ax, by, bx)
+        if end != NONE:
+            slide(new[1], points[b], points[end], memory, ay, ax, by, bx)
+    return 2
+
+
+@lean_kernel
+def _shift_lanes(
+    line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float
+) -> tuple[int, int]:
+    """Shift three edges behind ``begin``'s next point together, as two lanes side by side."""
     points, new = line.points, memory.new
     a = line.next[begin]
     b = line.next[a]
     dy, dx = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     size = _length(random, far) / np.sqrt(dy * dy + dx * dx)
-    for number in range(2):
-        at = a if number == 0 else b
-        new[number, 0], new[number, 1] = points[at, 0] - size * dx, points[at, 1] + size * dy
-    return 2
+    end = a
+    for number in range(4):
+        if end == NONE:
+            return NO_MOVE, end
+        new[number, 0], new[number, 1] = points[end, 0] - size * dx, points[end, 1] + size * dy
+        end = line.next[end]
+    return 4, end
 
 
 @lean_kernel
@@ -99,48 +125,38 @@ def _cut(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far
 
 
 @lean_kernel
-def _nearest_place(places: NDArray[np.uint64], place: NDArray[np.float64], reach: int) -> bool:
-    """Move a point to the nearest place within reach; False if there is none."""
-    rows, cols = places.shape[0], places.shape[1] << 6
-    i, j = int(place[0] + 0.5), int(place[1] + 0.5)
-    best = (reach + 1) * (reach + 1)
-    found = False
-    for y in range(max(i - reach, 0), min(i + reach + 1, rows)):
-        for x in range(max(j - reach, 0), min(j + reach + 1, cols)):
-            square = (y - i) * (y - i) + (x - j) * (x - j)
-            if square < best and is_marked(places, y, x):
-                best = square
-                place[0], place[1] = y, x
-                found = True
-    return found
-
-
-@lean_kernel
-def _lead_over_left(
+def _round_left(
     line: Line, floor: Floor, memory: Memory, random: NDArray[np.uint64], begin: int, far: float
 ) -> int:
-    """Lead the edge after ``begin`` to sweep the unswept floor of a block nearby.
-
-    It leads over the place nearest to the middle of that floor, which lies by a wall mostly.
-    """
-    points, counts, left = line.points, floor.sweeps.counts, floor.sweeps.left
+    """Reroute the edge after ``begin`` over the unswept floor of a block nearby."""
+    points, left, new, place = line.points, floor.sweeps.left, memory.new, memory.place
     end = line.next[begin]
     ay, ax = points[begin, 0], points[begin, 1]
+    dy, dx = points[end, 0] - ay, points[end, 1] - ax
     share = draw_share(random)
-    y = ay + share * (points[end, 0] - ay) + far * (2.0 * draw_share(random) - 1.0)
-    x = ax + share * (points[end, 1] - ax) + far * (2.0 * draw_share(random) - 1.0)
+    y = ay + share * dy + far * (2.0 * draw_share(random) - 1.0)
+    x = ax + share * dx + far * (2.0 * draw_share(random) - 1.0)
     i, j = int(y) >> BLOCK, int(x) >> BLOCK
-    if not (0 <= i < left.shape[0] and 0 <= j < left.shape[1]) or left[i, j] == 0:
+    if not (0 <= i < left.shape[0] and 0 <= j < left.shape[1]) or left[i, j] < 2:
         return NO_MOVE
-    total_row = total_col = 0
-    for row in range(i << BLOCK, min((i + 1) << BLOCK, counts.shape[0])):
-        for col in range(j << BLOCK, min((j + 1) << BLOCK, counts.shape[1])):
-            if counts[row, col] == 0:
-                total_row += row
-                total_col += col
-    place = memory.new[0]
-    place[0], place[1] = total_row / left[i, j], total_col / left[i, j]
-    return 1 if _nearest_place(floor.places, place, int(floor.tool) + 2) else NO_MOVE
+    if not middle_left(floor.sweeps, i, j, place):
+        return NO_MOVE
+    if not nearest_place(floor.places, place, int(floor.tool) + 2):
+        return NO_MOVE
+    length = np.sqrt(dy * dy + dx * dx)
+    dy, dx = dy / length, dx / length
+    along = (place[0] - ay) * dy + (place[1] - ax) * dx
+    spread = 0.0
+    if draw(random) >> 30 & 3:
+        spread = 0.3 * floor.tool + 0.7 * far * draw_share(random)
+    # A corner, or a bulge; the narrowest bulge goes there and back.
+    if draw(random) >> 30 & 1 or along - spread < 1.0 or along + spread > length - 1.0:
+        new[0, 0], new[0, 1] = place[0], place[1]
+        return 1
+    new[0, 0], new[0, 1] = ay + (along - spread) * dy, ax + (along - spread) * dx
+    new[1, 0], new[1, 1] = place[0], place[1]
+    new[2, 0], new[2, 1] = ay + (along + spread) * dy, ax + (along + spread) * dx
+    return 3
 
 
 @lean_kernel
@@ -159,15 +175,22 @@ def _draw_move(
     count = NO_MOVE
     if kind < LEFT_OUT:
         count = 0
+        if end != NONE and draw(random) >> 30 & 1:
+            end = line.next[end]
     elif kind < LEFT_OUT + MOVED:
         count = _move(line, memory, random, begin, far)
     elif kind >= LEFT_OUT + MOVED + SHIFTED + CUT:
-        count = _lead_over_left(line, floor, memory, random, begin, far)
+        count = _round_left(line, floor, memory, random, begin, far)
         end = middle
-    elif end != NONE and kind < LEFT_OUT + MOVED + SHIFTED:
-        count = _shift(line, memory, random, begin, far)
-        end = line.next[end]
-    elif end != NONE:
+    elif end == NONE:
+        count = NO_MOVE
+    elif kind < LEFT_OUT + MOVED + SHIFTED:
+        if draw(random) >> 30 & 1:
+            count = _shift(line, memory, random, begin, far)
+            end = line.next[end]
+        else:
+            count, end = _shift_lanes(line, memory, random, begin, far)
+    else:
         count = _cut(line, memory, random, begin, far)
     return count, end
 
@@ -187,15 +210,15 @@ def anneal(
 
     Args:
         line: counted into ``floor.sweeps``; of two points or more.
-        floor, price, memory: see ``line``.
+        floor, price, memory: as for ``polish``.
         random: uint64 (1,), not 0.
         margin: 1 if the first and the last edge only define the turns after and before them, as
             for a piece of a longer line; else 0.
         heat: first and last temperature, as shares of the initial one.
         most_tried: limit on the moves tried, including those tried before.
 
-    Returns:
-        The total gain [s]; it may be negative.
+        Returns:
+            The total gain [s]; it may be negative.
     """
     following = line.next
     hottest_s = HOTTEST * 2.0 * floor.tool * price.drive_s
@@ -206,13 +229,16 @@ def anneal(
         rest = (most_tried - line.state[TRIED]) / (most_tried - tried_before)
         share = heat[1] + (heat[0] - heat[1]) * rest
         most_s = hottest_s * share * share * EXPONENTIAL[draw(random) & 4095]
-        line.state[TRIED] += 1
+        tried = line.state[TRIED]
         count, end = _draw_move(line, floor, memory, random, begin)
         gain = -np.inf
-        is_beyond = margin and (end == NONE or following[end] == NONE)
-        if count != NO_MOVE and not is_beyond:
-            gain = replace_points(line, floor, price, memory, begin, end, count, -most_s)
+        if margin and count != NO_MOVE and (end == NONE or following[end] == NONE):
+            count = NO_MOVE
+        if count != NO_MOVE:
+            gain = gain_above(line, floor, price, memory, begin, end, count, -most_s)
+        line.state[TRIED] = tried + 1
         if gain > -np.inf:
+            replace_points(line, floor, memory, begin, end, count)
             gained += gain
         else:
             begin = following[begin]

@@ -8,11 +8,13 @@ ends and the two straight sides between them.
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.bits import any_between
+from fasaco_edge.kernels.floor.bits import any_between, is_marked
 from fasaco_edge.kernels.jit import inlined, lean_kernel
 
 # Tolerance of contact: a robot exactly as wide as a door fits.
 TOUCH = 1e-3
+# In place of a row: no row blocks the segment; the segment leads out of the raster.
+CLEAR, BEYOND = -1, -2
 # A line that rises by less counts as level.
 LEVEL = 1e-9
 
@@ -61,6 +63,57 @@ def right_side(
 
 
 @inlined
+def _blocked_row(
+    blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
+) -> tuple[int, int, int]:
+    """Return the first row with a blocked pixel nearer than ``radius`` to the segment a to b.
+
+    Also return the first and the last column in which that pixel may be; ``CLEAR`` or ``BEYOND`` in
+    place of the row if there is none.
+
+    A pixel is a square: the stretch of a row whose pixels touch the capsule is widest at the height
+    in the row that is nearest to the capsule's outermost point.
+
+    Args:
+        blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
+        ay, ax, by, bx: the way [pixels].
+        radius: of the robot [pixels].
+    """
+    rows, cols = blocked.shape[0], blocked.shape[1] << 6
+    radius -= TOUCH
+    if ay > by:
+        ay, ax, by, bx = by, bx, ay, ax
+    side_y, side_x, slope = right_side(ay, ax, by, bx, radius)
+    square = radius * radius
+    low, high = ay - radius, by + radius
+    first, last = int(np.floor(low + 0.5)), int(np.ceil(high - 0.5))
+    if first < 0 or last >= rows:
+        return BEYOND, 0, 0
+    right_y = ay if ax > bx else by
+    left_y = ay if ax < bx else by
+    for i in range(first, last + 1):
+        y0, y1 = max(i - 0.5, low), min(i + 0.5, high)
+        if y0 > y1:
+            continue
+        if ax == bx:
+            # All points between the two ends are outermost.
+            y = min(max(min(max(y0, ay), by), y0), y1)
+            right = right_of(y, ay, ax, by, bx, side_y, side_x, slope, square)
+            left = 2.0 * ax - right
+        else:
+            y = min(max(right_y, y0), y1)
+            right = right_of(y, ay, ax, by, bx, side_y, side_x, slope, square)
+            y = min(max(left_y, y0), y1)
+            left = -right_of(y, ay, -ax, by, -bx, -side_y, side_x, -slope, square)
+        from_col, to_col = int(np.floor(left + 0.5)), int(np.ceil(right - 0.5))
+        if from_col < 0 or to_col >= cols:
+            return BEYOND, 0, 0
+        if from_col <= to_col and any_between(blocked[i], from_col, to_col):
+            return i, from_col, to_col
+    return CLEAR, 0, 0
+
+
+@inlined
 def _is_box_clear(
     blocked: NDArray[np.uint64], ay: float, ax: float, by: float, bx: float, radius: float
 ) -> bool:
@@ -84,45 +137,46 @@ def is_clear(
 ) -> bool:
     """Return whether no blocked pixel is nearer than ``radius`` to the segment a to b.
 
-    A pixel is a square: the stretch of a row whose pixels touch the capsule is widest at the height
-    in the row that is nearest to the capsule's outermost point.
-
     Args:
         blocked: uint64 (rows, words), see ``bits``. What lies outside is blocked, too.
         ay, ax, by, bx: the way [pixels].
         radius: of the robot [pixels].
     """
-    rows, cols = blocked.shape[0], blocked.shape[1] << 6
-    radius -= TOUCH
-    if _is_box_clear(blocked, ay, ax, by, bx, radius):
+    if _is_box_clear(blocked, ay, ax, by, bx, radius - TOUCH):
         return True
-    if ay > by:
-        ay, ax, by, bx = by, bx, ay, ax
-    side_y, side_x, slope = right_side(ay, ax, by, bx, radius)
-    square = radius * radius
-    low, high = ay - radius, by + radius
-    first, last = int(np.floor(low + 0.5)), int(np.ceil(high - 0.5))
-    if first < 0 or last >= rows:
-        return False
-    right_y = ay if ax > bx else by
-    left_y = ay if ax < bx else by
-    for i in range(first, last + 1):
-        y0, y1 = max(i - 0.5, low), min(i + 0.5, high)
-        if y0 > y1:
-            continue
-        if ax == bx:
-            # All points between the two ends are outermost.
-            y = min(max(min(max(y0, ay), by), y0), y1)
-            right = right_of(y, ay, ax, by, bx, side_y, side_x, slope, square)
-            left = 2.0 * ax - right
-        else:
-            y = min(max(right_y, y0), y1)
-            right = right_of(y, ay, ax, by, bx, side_y, side_x, slope, square)
-            y = min(max(left_y, y0), y1)
-            left = -right_of(y, ay, -ax, by, -bx, -side_y, side_x, -slope, square)
-        from_col, to_col = int(np.floor(left + 0.5)), int(np.ceil(right - 0.5))
-        if from_col < 0 or to_col >= cols:
-            return False
-        if from_col <= to_col and any_between(blocked[i], from_col, to_col):
-            return False
-    return True
+    row, _, _ = _blocked_row(blocked, ay, ax, by, bx, radius)
+    return row == CLEAR
+
+
+@lean_kernel
+def is_clear_but(
+    blocked: NDArray[np.uint64],
+    ay: float,
+    ax: float,
+    by: float,
+    bx: float,
+    radius: float,
+    blocker: NDArray[np.int64],
+) -> bool:
+    """Return as ``is_clear``; write a pixel in the way into ``blocker``, int64 (2,): row, col."""
+    row, first, last = _blocked_row(blocked, ay, ax, by, bx, radius)
+    if row < 0:
+        return row == CLEAR
+    # The pixel nearest to the middle also blocks most neighbouring segments.
+    middle = (first + last) >> 1
+    for away in range(last - first + 1):
+        for col in (middle - away, middle + away):
+            if first <= col <= last and is_marked(blocked, row, col):
+                blocker[0], blocker[1] = row, col
+                return False
+    return False
+
+
+@inlined
+def is_near(y: float, x: float, ay: float, ax: float, by: float, bx: float, radius: float) -> bool:
+    """Return whether a point is certainly nearer than ``radius`` to the segment a to b."""
+    dy, dx = by - ay, bx - ax
+    length2 = max(dy * dy + dx * dx, 1e-18)
+    along = min(max(((y - ay) * dy + (x - ax) * dx) / length2, 0.0), 1.0)
+    off_y, off_x = ay + along * dy - y, ax + along * dx - x
+    return off_y * off_y + off_x * off_x < (radius - 2 * TOUCH) * (radius - 2 * TOUCH)

@@ -1,7 +1,8 @@
-"""The driven line as a list of points: a change, if its gain is enough.
+"""The driven line as a list of points: gain of a change, and its execution.
 
 A change replaces the points between two others. Its gain is exact: seconds of the chains before
-and after, with the turns at either end, and the difference in swept pixels.
+and after, with the turns at either end, and the difference in swept pixels. Each block of pixels
+stores the time of the line's last change there.
 """
 
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.capsule import is_clear
+from fasaco_edge.kernels.floor.nearness import near_px
 from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
@@ -17,44 +19,49 @@ from fasaco_edge.kernels.floor.sweeps import (
     Sweeps,
     exchange,
     prepare,
+    sweep,
     swept_more,
 )
 from fasaco_edge.kernels.floor.turning import Turning
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 
+# Least gain of a move [s]: rounding of sums must not cause cycles.
+LEAST_GAIN_S = 1e-3
 # No edge is shorter than this [pixels].
 LEAST_EDGE = 0.3
-# Limits on the points that a move removes and inserts.
-MOST_NEW = 2
+# Limit on the points that a move inserts.
+MOST_NEW = 4
 # Limit on the points of a chain: those replaced, and two on either side.
 MOST_CHAIN = MOST_NEW + 4
 # Limit on the capsules compared: edges of the chains before and after.
 MOST_CAPSULES = 2 * (MOST_CHAIN - 1)
-# Whether edges keep the robot's clearance is checked in pieces of at most this length [pixels].
-PIECE = 4.0
 NONE = -1
 
 
 class Line(NamedTuple):
-    """The driven line as a list of points.
+    """The driven line as a list of points, with times of changes and of trials.
 
     Attributes:
         points: float64 (capacity, 2): y, x [pixels]; the line begins with the first.
         next, previous: int32 (capacity,): the number of the next point, and of the one before;
             NONE at the ends.
-        state: int64 (3,): points used, moves tried, and the head of the free list of point numbers,
-            linked by ``next``; or NONE.
+        seen: int64 (capacity,): when all moves at a point were last tried.
+        changed: int64, by block: when the line was last changed there.
+        state: int64 (4,): points used, the time, moves tried, and the head of the free list of
+            point numbers, linked by ``next``; or NONE.
         is_end_fixed: whether the line's last point is fixed.
     """
 
     points: NDArray[np.float64]
     next: NDArray[np.int32]
     previous: NDArray[np.int32]
+    seen: NDArray[np.int64]
+    changed: NDArray[np.int64]
     state: NDArray[np.int64]
     is_end_fixed: bool
 
 
-USED, TRIED, FREE = range(3)
+USED, TIME, TRIED, FREE = range(4)
 
 
 class Floor(NamedTuple):
@@ -87,12 +94,14 @@ class Price(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Memory for a move: points before and after, float64 (MOST_CHAIN, 2), and the points to
-    insert, float64 (MOST_NEW, 2)."""
+    """Memory for a move: points before and after, float64 (MOST_CHAIN, 2); the points to insert,
+    those of the best move so far, and a place, float64 (MOST_NEW, 2)."""
 
     before: NDArray[np.float64]
     after: NDArray[np.float64]
     new: NDArray[np.float64]
+    best: NDArray[np.float64]
+    place: NDArray[np.float64]
     capsules: Scratch
 
 
@@ -103,7 +112,7 @@ def copy_point(source: NDArray[np.float64], at: int, target: NDArray[np.float64]
 
 
 @lean_kernel
-def _left_around(
+def left_around(
     left: NDArray[np.int32], points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
     """Return an upper bound on the unswept pixels under the edges from ``first`` to ``last``."""
@@ -124,16 +133,24 @@ def _left_around(
     return found
 
 
-@lean_kernel
-def _chains(
-    line: Line, memory: Memory, begin: int, end: int, count: int
-) -> tuple[int, int, int, int, int]:
-    """Copy the points replaced, before and after, with up to two on either side, to the memory.
+class Chains(NamedTuple):
+    """The points in ``Memory.before`` and ``after``: those replaced, and up to two on either side.
 
-    Returns:
-        Number of the first point whose edge changes, as the one before it defines a turn; numbers
-        of points before and after; numbers of the last point whose edge changes, before and after.
+    Attributes:
+        lead: number of the first point whose edge changes; the one before it defines a turn.
+        olds, news: points before and after; 0 where they are too many.
+        last_old, last_new: the last point whose edge changes.
     """
+
+    lead: int
+    olds: int
+    news: int
+    last_old: int
+    last_new: int
+
+
+@lean_kernel
+def _chains(line: Line, memory: Memory, begin: int, end: int, count: int) -> Chains:
     points, following, preceding = line.points, line.next, line.previous
     old, new = memory.before, memory.after
     lead = 0
@@ -144,6 +161,8 @@ def _chains(
     olds, news = lead, lead + 1
     number = begin
     while number != end:
+        if olds == MOST_CHAIN - 2:
+            return Chains(0, 0, 0, 0, 0)
         copy_point(points, number, old, olds)
         olds += 1
         number = following[number]
@@ -160,11 +179,11 @@ def _chains(
         tail += 1
         number = following[number]
     behind = max(tail - 1, 0)
-    return lead, olds, news, olds - 1 - behind, news - 1 - behind
+    return Chains(lead, olds, news, olds - 1 - behind, news - 1 - behind)
 
 
 @lean_kernel
-def _is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> bool:
+def is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> bool:
     """Return whether the edges between two points of a chain are clear, and none is too short."""
     for number in range(first, last):
         ay, ax = points[number, 0], points[number, 1]
@@ -177,33 +196,7 @@ def _is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) ->
 
 
 @lean_kernel
-def _near_px(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> float:
-    """Return the length of a chain's edges without clearance [pixels], to a piece.
-
-    A piece with more than half of the clearance counts half.
-    """
-    half = 0.5 * (floor.robot + floor.clear)
-    length = 0.0
-    for number in range(first, last):
-        ay, ax = points[number, 0], points[number, 1]
-        by, bx = points[number + 1, 0], points[number + 1, 1]
-        if is_clear(floor.blocked, ay, ax, by, bx, floor.clear):
-            continue
-        edge = np.sqrt((by - ay) * (by - ay) + (bx - ax) * (bx - ax))
-        parts = max(int(np.ceil(edge / PIECE)), 1)
-        dy, dx = (by - ay) / parts, (bx - ax) / parts
-        near = 0
-        for part in range(parts):
-            y, x = ay + part * dy, ax + part * dx
-            if not is_clear(floor.blocked, y, x, y + dy, x + dx, floor.clear):
-                near += 1
-                near += not is_clear(floor.blocked, y, x, y + dy, x + dx, half)
-        length += 0.5 * near * edge / parts
-    return length
-
-
-@lean_kernel
-def _prepare_edges(
+def prepare_edges(
     scratch: Scratch, at: int, points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
     """Prepare the capsules of a chain's edges, from number ``at`` on; return how many."""
@@ -214,39 +207,8 @@ def _prepare_edges(
     return max(last - first, 0)
 
 
-@inlined
-def has_room(line: Line) -> bool:
-    """Return whether there are free numbers for the points of a move."""
-    return bool(line.state[USED] <= len(line.points) - MOST_NEW)
-
-
 @lean_kernel
-def _relink(line: Line, memory: Memory, begin: int, end: int, count: int) -> None:
-    """Replace the points between two others by ``memory.new[:count]``; use their numbers again."""
-    following, preceding, state = line.next, line.previous, line.state
-    gone = following[begin]
-    while gone != end:
-        behind = following[gone]
-        following[gone], state[FREE] = state[FREE], gone
-        gone = behind
-    last = begin
-    for number in range(count):
-        place = state[FREE]
-        if place == NONE:
-            place = state[USED]
-            state[USED] += 1
-        else:
-            state[FREE] = following[place]
-        copy_point(memory.new, number, line.points, place)
-        following[last], preceding[place] = place, last
-        last = place
-    following[last] = end
-    if end != NONE:
-        preceding[end] = last
-
-
-@lean_kernel
-def replace_points(
+def gain_above(
     line: Line,
     floor: Floor,
     price: Price,
@@ -256,39 +218,143 @@ def replace_points(
     count: int,
     least_s: float,
 ) -> float:
-    """Replace the points between two others by ``memory.new[:count]``, if that gains enough.
+    """Return the gain if ``memory.new[:count]`` replace the points between two others [s].
+
+    -inf if it is less than ``least_s``, which may be below 0, or if the new edges are blocked.
 
     Args:
         line, floor, price, memory: see above.
         begin: number of the point before.
         end: number of the point after; NONE if the line ends with the new points.
         count: number of new points.
-        least_s: the least gain, which may be below 0 [s].
-
-    Returns:
-        The gain [s]; -inf if it is less, or if the new edges are blocked.
+        least_s: see above.
     """
+    line.state[TRIED] += 1
     if end == NONE and line.is_end_fixed:
         return -np.inf
     lead, olds, news, last_old, last_new = _chains(line, memory, begin, end, count)
+    if not olds:
+        return -np.inf
     old, new, tool = memory.before, memory.after, floor.tool
     longer_s = chain_s(new, lead, last_new, news, price.drive_s, price.turning)
     longer_s -= chain_s(old, lead, last_old, olds, price.drive_s, price.turning)
     if floor.clear > floor.robot:
-        nearer = _near_px(floor, new, lead, last_new) - _near_px(floor, old, lead, last_old)
+        nearer = near_px(floor.blocked, new, lead, last_new, floor.robot, floor.clear)
+        nearer -= near_px(floor.blocked, old, lead, last_old, floor.robot, floor.clear)
         longer_s += price.near_s * nearer
     least_more = (longer_s + least_s) / price.left_s
-    most_more = _left_around(floor.sweeps.left, new, lead, last_new, tool)
-    if most_more < least_more or not _is_way(floor, new, lead, last_new):
+    most_more = left_around(floor.sweeps.left, new, lead, last_new, tool)
+    if most_more < least_more or not is_way(floor, new, lead, last_new):
         return -np.inf
     scratch = memory.capsules
-    taken = _prepare_edges(scratch, 0, old, lead, last_old, tool)
-    given = _prepare_edges(scratch, taken, new, lead, last_new, tool)
+    taken = prepare_edges(scratch, 0, old, lead, last_old, tool)
+    given = prepare_edges(scratch, taken, new, lead, last_new, tool)
     most_lost = most_more - least_more
     more = swept_more(floor.sweeps.counts, scratch, taken, given, tool, most_lost)
     gain = price.left_s * more - longer_s
-    if gain < least_s:
-        return -np.inf
-    exchange(floor.sweeps, scratch, taken, given, tool)
-    _relink(line, memory, begin, end, count)
-    return gain
+    return gain if gain >= least_s else -np.inf
+
+
+@lean_kernel
+def gain_of(
+    line: Line, floor: Floor, price: Price, memory: Memory, begin: int, end: int, count: int
+) -> float:
+    """Return the gain of ``gain_above`` [s]; 0.0 if it is less than LEAST_GAIN_S."""
+    return max(gain_above(line, floor, price, memory, begin, end, count, LEAST_GAIN_S), 0.0)
+
+
+@lean_kernel
+def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int:
+    """Return when the line was last changed around some points, beginning with the point before
+    ``begin``; with ``now`` above 0 note a change there."""
+    points = line.points
+    number = line.previous[begin] if line.previous[begin] != NONE else begin
+    low_y, low_x = points[number, 0], points[number, 1]
+    high_y, high_x = low_y, low_x
+    for _ in range(hops):
+        if number == NONE:
+            break
+        y, x = points[number, 0], points[number, 1]
+        low_y, high_y = min(low_y, y), max(high_y, y)
+        low_x, high_x = min(low_x, x), max(high_x, x)
+        number = line.next[number]
+    newest = 0
+    rows, cols = line.changed.shape
+    for i in range(
+        max(int(low_y - tool) >> BLOCK, 0), min((int(high_y + tool) >> BLOCK) + 1, rows)
+    ):
+        for j in range(
+            max(int(low_x - tool) >> BLOCK, 0), min((int(high_x + tool) >> BLOCK) + 1, cols)
+        ):
+            if now > 0:
+                line.changed[i, j] = now
+            newest = max(newest, line.changed[i, j])
+    return newest
+
+
+# Number of points before and after a point whose moves depend on it.
+HOPS = 6
+
+
+@inlined
+def has_room(line: Line) -> bool:
+    """Return whether there are free numbers for the points of a move."""
+    return bool(line.state[USED] <= len(line.points) - MOST_NEW)
+
+
+@lean_kernel
+def _sweep_between(
+    line: Line, floor: Floor, memory: Memory, begin: int, end: int, times: int
+) -> None:
+    """Count the edges between two points in (``times`` 1) or out again (-1)."""
+    points, following = line.points, line.next
+    number = begin
+    while number != end and following[number] != NONE:
+        a, b = points[number], points[following[number]]
+        sweep(floor.sweeps, a[0], a[1], b[0], b[1], floor.tool, times, memory.capsules)
+        number = following[number]
+
+
+@lean_kernel
+def replace_points(
+    line: Line, floor: Floor, memory: Memory, begin: int, end: int, count: int
+) -> None:
+    """Replace the points between two others by ``memory.new[:count]``."""
+    points, following, preceding, tool = line.points, line.next, line.previous, floor.tool
+    line.state[TIME] += 1
+    note_change(line, begin, tool, HOPS, line.state[TIME])
+    lead, olds, _, last_old, last_new = _chains(line, memory, begin, end, count)
+    if olds:
+        scratch = memory.capsules
+        taken = prepare_edges(scratch, 0, memory.before, lead, last_old, tool)
+        given = prepare_edges(scratch, taken, memory.after, lead, last_new, tool)
+        exchange(floor.sweeps, scratch, taken, given, tool)
+    else:
+        _sweep_between(line, floor, memory, begin, end, as_value(-1))
+    # New points reuse the numbers of the replaced ones. Free numbers are taken only after these: a
+    # caller that holds a number sees the same or a new point.
+    free, last = following[begin], begin
+    for number in range(count):
+        if free != end and free != NONE:  # noqa: PLR1714 - numba has no `in` for tuples
+            place, free = free, following[free]
+        elif line.state[FREE] != NONE and line.state[USED] >= len(points) - 2 * MOST_NEW:
+            place = np.int32(line.state[FREE])
+            line.state[FREE] = following[place]
+        else:
+            place = np.int32(line.state[USED])
+            line.state[USED] += 1
+        copy_point(memory.new, number, points, place)
+        line.seen[place] = 0
+        following[last], preceding[place] = place, last
+        last = place
+    while free != end and free != NONE:  # noqa: PLR1714
+        gone, free = free, following[free]
+        following[gone] = line.state[FREE]
+        line.state[FREE] = gone
+    following[last] = end
+    if end != NONE:
+        preceding[end] = last
+    if not olds:
+        _sweep_between(line, floor, memory, begin, end, as_value(1))
+    line.state[TIME] += 1
+    note_change(line, begin, tool, HOPS, line.state[TIME])

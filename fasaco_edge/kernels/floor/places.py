@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.floor.bits import NONE, ONE, WORD, Bits, is_marked, spread
-from fasaco_edge.kernels.floor.capsule import TOUCH, is_clear
+from fasaco_edge.kernels.floor.capsule import TOUCH, is_clear, is_clear_but, is_near
 from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
 from fasaco_edge.kernels.lattice.footprint import Box, Placement
 
@@ -18,6 +18,8 @@ from fasaco_edge.kernels.lattice.footprint import Box, Placement
 BEND_STEP = 2
 # Longest path round a corner, in edges of a cell.
 LONGEST_BEND = 3.0
+# Row of a missing blocker.
+FAR = -1_000_000
 # Tolerance for points on the border of cells or pixels, and for distances: results must not depend
 # on where the raster begins.
 TIE = 1e-6
@@ -254,8 +256,14 @@ def _bend(
     longest: float,
     radius: float,
     bend: NDArray[np.float32],
+    blockers: NDArray[np.int64],
 ) -> bool:
-    """Find the place over which the path from a to b is shortest; False if there is none."""
+    """Find the place over which the path from a to b is shortest; False if there is none.
+
+    ``blockers``, int64 (2, 2), is a cache: the pixels, row and col, that last blocked the segments
+    from a and to b. Mostly they block again, and that test is fast.
+    """
+    blockers[:] = FAR
     rows, cols = places.shape[0], places.shape[1] << 6
     best = longest
     for i in range(
@@ -275,8 +283,10 @@ def _bend(
             y, x = float(i), float(j)
             if (
                 length < best - TIE
-                and is_clear(blocked, a[0], a[1], y, x, radius)
-                and is_clear(blocked, y, x, b[0], b[1], radius)
+                and not is_near(blockers[0, 0], blockers[0, 1], a[0], a[1], y, x, radius)
+                and not is_near(blockers[1, 0], blockers[1, 1], y, x, b[0], b[1], radius)
+                and is_clear_but(blocked, a[0], a[1], y, x, radius, blockers[0])
+                and is_clear_but(blocked, y, x, b[0], b[1], radius, blockers[1])
             ):
                 best = length
                 bend[0], bend[1] = y, x
@@ -292,6 +302,7 @@ def link_stands(
     stands: NDArray[np.float64],
     steps: NDArray[np.uint8],
     bends: NDArray[np.float32],
+    blockers: NDArray[np.int64],
 ) -> None:
     """Find the steps of stale cells to the neighbours in the east and in the north.
 
@@ -303,6 +314,7 @@ def link_stands(
         steps: uint8 (rows, cols), changed: bit ``1 << direction`` for each legal step.
         bends: float32 (rows, cols, 2, 2), changed: where the step east, and the step north, has
             a bend, y, x [pixels]; NaN for a straight one.
+        blockers: int64 (2, 2), memory.
     """
     rows, cols = steps.shape
     radius = placement.radius
@@ -330,7 +342,7 @@ def link_stands(
                 continue
             if not is_clear(blocked, a[0], a[1], b[0], b[1], radius):
                 longest = LONGEST_BEND * cell
-                if not _bend(blocked, places, a, b, int(cell), longest, radius, bend):
+                if not _bend(blocked, places, a, b, int(cell), longest, radius, bend, blockers):
                     continue
             steps[row, col] |= 1 << there
             steps[far_row, far_col] |= 1 << back

@@ -41,6 +41,21 @@ def turn_between(uy: float, ux: float, vy: float, vx: float) -> float:
     return angle
 
 
+@inlined
+def edge_s(points: NDArray[np.float64], a: int, b: int, drive_s: float) -> float:
+    """Return the seconds of the edge between two points."""
+    dy, dx = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    return float(drive_s * np.sqrt(dy * dy + dx * dx))
+
+
+@inlined
+def turn_s(points: NDArray[np.float64], a: int, b: int, c: int, turning: Turning) -> float:
+    """Return the seconds of the turn at the second of three points."""
+    uy, ux = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    vy, vx = points[c, 0] - points[b, 0], points[c, 1] - points[b, 1]
+    return _turn_s(turning, turn_between(uy, ux, vy, vx))
+
+
 @lean_kernel
 def chain_s(
     points: NDArray[np.float64],
@@ -61,17 +76,7 @@ def chain_s(
     """
     seconds = 0.0
     for number in range(first, last):
-        dy = points[number + 1, 0] - points[number, 0]
-        dx = points[number + 1, 1] - points[number, 1]
-        seconds += drive_s * np.sqrt(dy * dy + dx * dx)
+        seconds += edge_s(points, number, number + 1, drive_s)
     for number in range(1, count - 1):
-        uy, ux = (
-            points[number, 0] - points[number - 1, 0],
-            points[number, 1] - points[number - 1, 1],
-        )
-        vy, vx = (
-            points[number + 1, 0] - points[number, 0],
-            points[number + 1, 1] - points[number, 1],
-        )
-        seconds += _turn_s(turning, turn_between(uy, ux, vy, vx))
+        seconds += turn_s(points, number - 1, number, number + 1, turning)
     return seconds

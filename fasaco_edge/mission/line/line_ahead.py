@@ -53,8 +53,6 @@ from fasaco_edge.mission.line.way import (
 
 # Number of nearest cells tried for one that the robot can drive to straight.
 TRIED = 8
-# How far a polished line may lead from its walk [widths of the tool].
-ASTRAY = 3.0
 
 
 class LineAhead:
@@ -317,26 +315,17 @@ class LineAhead:
             points[0] = self._place.on(points)
         return points
 
-    def put(self, first: int, end: int, points: Points) -> bool:
-        """Replace the points from ``first`` to ``end`` by polished ones, which are counted already.
+    def put(self, first: int, end: int, points: Points) -> None:
+        """Replace the points from ``first`` to ``end`` by polished ones, and update the counts.
 
-        The first and the last one stay, and keep their cells. Points farther than ``ASTRAY`` tools
-        from their cells are not taken, and counted out again: the next plan begins at the robot's
-        cell. Return whether they are taken.
+        The first and the last one stay, and keep their cells.
         """
         line = self.line
         begin, last = int(line.cells[first]), int(line.cells[end - 1])
-        stands = self._stands(begin, last + 1)
-        cells = aligned(points, stands)
-        away = np.hypot(*(points - stands[cells])[1:-1].T)
-        if (away > 2.0 * ASTRAY * self._tool).any():
-            self.tally.exchange(edges_between(points), edges_between(line.points[first:end]))
-            return False
-        cells += begin
+        cells = begin + aligned(points, self._stands(begin, last + 1))
         state = line.state[first:end].min(initial=POLISHED)
         part = Line(points, cells, np.full(len(points), state, np.uint8))
         self.line = line.part(0, first).joined(part, line.part(end))
-        return True
 
     def put_curve(self, first: int, end: int, xy: Points) -> None:
         """Replace the points from ``first`` to ``end`` by a curve, float64 (n, 2): x, y [m].
@@ -372,9 +361,9 @@ class LineAhead:
         """Return the stands of the walk's cells from ``begin`` to ``end``, at least one."""
         return self._floor.stands.stands_of(self._walk[begin : max(end, begin + 1)])
 
-    def note_polished(self, first: int, end: int) -> None:
-        """Mark points as POLISHED."""
-        self.line = self.line.polished(first, end)
+    def note(self, first: int, end: int, state: int) -> None:
+        """Mark points as MOVED or POLISHED."""
+        self.line = self.line.marked(first, end, state)
 
     def lengths(self, within_m: float = math.inf) -> NDArray[np.float64]:
         """Return the distance along the line to each point, float64 (n,) [m]; the first is 0.

@@ -14,8 +14,8 @@ Edges = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Walk = NDArray[np.int32]
 
-# States of points: at a stand; polished; on a curve.
-RAW, POLISHED, CURVED = range(3)
+# States of points: at a stand; moved; polished with all moves; on a curve.
+RAW, MOVED, POLISHED, CURVED = range(4)
 NO_EDGES = np.empty((0, 4))
 # Lengths are computed for this many points first, then for twice as many until they suffice.
 FIRST_POINTS = 128
@@ -28,7 +28,7 @@ class Line:
     Attributes:
         points: float64 (n, 2): y, x [pixels of the fine raster].
         cells: int64 (n,), ascending: index in the walk of each point's cell.
-        state: uint8 (n,): RAW, POLISHED or CURVED.
+        state: uint8 (n,): RAW, MOVED, POLISHED or CURVED.
     """
 
     points: Points = field(default_factory=lambda: np.empty((0, 2)))
@@ -72,16 +72,21 @@ class Line:
         """Return this line with its points at other places, float64 (n, 2)."""
         return Line(points, self.cells, self.state)
 
-    def polished(self, first: int, end: int) -> Line:
-        """Return this line with points marked as POLISHED."""
+    def marked(self, first: int, end: int, state: int) -> Line:
+        """Return this line with points marked as MOVED or POLISHED."""
         states = self.state.copy()
-        states[first:end] = np.maximum(states[first:end], POLISHED)
+        states[first:end] = np.maximum(states[first:end], state)
         return Line(self.points, self.cells, states)
 
     def first_below(self, state: int) -> int:
         """Return the index of the first point with a lower state; the count if there is none."""
         below = self.state < state
         return int(np.argmax(below)) if below.any() else len(below)
+
+    def raw_until(self, first: int) -> int:
+        """Return the index of the first moved point from ``first`` on; the count if none."""
+        moved = self.state[first:] >= MOVED
+        return first + int(np.argmax(moved)) if moved.any() else len(self)
 
     def before(self, cell: int) -> int:
         """Return the number of points of cells before ``cell``."""
