@@ -236,7 +236,7 @@ def test_floor_that_is_carried_over_lies_where_it_was():
         snapshot_of(ledger).swept_on(geometry)
         for ledger, geometry in ((before, place), (after, there))
     )
-    assert np.count_nonzero(was != now) < 0.06 * np.count_nonzero(was)
+    assert np.count_nonzero(was != now) < 0.07 * np.count_nonzero(was)
     # A cell counts where the floor at its centre is swept.
     rows, cols = np.nonzero(after.visits(Window(-20, -20, 60, 60)))
     assert len(rows)

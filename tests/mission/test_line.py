@@ -391,13 +391,14 @@ def assert_clear(robot, grid, most_m=2.4):
     geometry = grid.geometry
     points = np.array([robot.at, *robot.line])
     for a, b in pairwise(points):
-        count = max(int(math.dist(a, b) / 0.02), 1)
-        for share in np.linspace(0.0, 1.0, count):
+        length_m = math.dist(a, b)
+        most = min(most_m / max(length_m, 1e-9), 1.0)
+        for share in np.linspace(0.0, most, max(int(most * length_m / 0.02), 1)):
             col, row = geometry.to_pixels(*(a + share * (b - a)))
             off = np.abs(blocked - (row, col)) - 0.5
             nearest = np.hypot(*np.clip(off, 0.0, None).T).min() * geometry.resolution
             assert nearest > RADIUS_M - 1e-3
-        most_m -= math.dist(a, b)
+        most_m -= length_m
         if most_m <= 0.0:
             return
 
