@@ -32,6 +32,7 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.rooms import Rooms
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
@@ -161,6 +162,13 @@ def show_mission(reply: Reply) -> None:
         console.print(_unreached(mission.unreached))
 
 
+def show_troubles(reply: Reply) -> None:
+    """Print the troubles in a status, with what to do about each."""
+    found = phrases.troubles(decode_tolerant(reply.payload, Status))
+    if found:
+        out().print(figures([("trouble", f"{what}: {to_do}") for what, to_do in found]))
+
+
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     mission = answer.mission
     rows = [("robot", answer.robot), ("state", answer.state), ("reason", plain(answer.reason))]
@@ -210,6 +218,7 @@ def show(name: str, reply: Reply) -> None:
         out().print(figures(known(_figures(reply))))
     elif name in ("status", "mission"):
         show_mission(reply)
+        show_troubles(reply)
     elif name == "rooms":
         show_rooms(decode_tolerant(reply.payload, Rooms))
     else:

@@ -24,7 +24,8 @@ def show_rooms(rooms: Rooms) -> None:
     for room in rooms.rooms:
         beside = ", ".join(map(str, room.neighbours)) or "-"
         swept = "-" if room.swept is None else percent(room.swept)
-        to_go = "-" if room.to_go_s is None else duration(room.to_go_s)
+        # 0 in a room that the path does not lead to, too.
+        to_go = duration(room.to_go_s) if room.to_go_s else "-"
         row = f"{room.area_m2:.1f}", swept, to_go, beside, _settings(room)
         table.add_row(str(room.id), room.name or "-", *row)
     out().print(table)

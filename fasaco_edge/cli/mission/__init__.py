@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
+from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission, show_troubles
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
@@ -200,6 +200,8 @@ def run(args: argparse.Namespace) -> int:
         show_keep_outs(answer)
     else:
         show_mission(reply)
+        if command == "status":
+            show_troubles(ask(args, "status"))
         if command == "cancel" and answer.coverage and answer.coverage.covered > 1:
             err().print(KEPT)
     return Exit.OK
