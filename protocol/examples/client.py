@@ -27,7 +27,9 @@ def show(sample: zenoh.Sample) -> None:
 
 
 sys.stdout.reconfigure(line_buffering=True)  # each topic has a thread: whole lines only
-link = {"mode": "client", "connect": {"endpoints": sys.argv[1:] or ["tcp/127.0.0.1:7447"]}}
+# Waits for a daemon that starts later.
+connect = {"endpoints": sys.argv[1:] or ["tcp/127.0.0.1:7447"], "timeout_ms": -1}
+link = {"mode": "client", "connect": connect}
 # A latched publisher sends its samples with timestamps, which are off in Zenoh's defaults.
 link["timestamping"] = {"enabled": True}
 with zenoh.open(zenoh.Config.from_json5(json.dumps(link))) as session:
