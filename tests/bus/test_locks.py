@@ -26,7 +26,7 @@ def come_and_go():
         other.withdraw(other.token("token/1"))
 
 def ask():
-    roll = bus.roll("token/*")
+    roll = bus.token_list("token/*")
     while True:
         roll.ask(0.0)
         time.sleep(0.001)

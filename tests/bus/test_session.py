@@ -348,14 +348,14 @@ with open_bus(BusSettings("peer", (), ({endpoint!r},))) as bus:
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
 
 
-def test_a_roll_of_tokens_is_kept_up_to_date(bus, endpoint):
+def test_a_token_list_is_kept_up_to_date(bus, endpoint):
     def told():
         roll.ask(0.0)
         return roll.there()
 
     with open_bus(BusSettings("client", (endpoint,))) as other:
         before = other.token(f"{KEY}/a")
-        roll = bus.roll(f"{KEY}/*")
+        roll = bus.token_list(f"{KEY}/*")
         until(lambda: told() == {f"{KEY}/a"})
         other.token(f"{KEY}/b")
         until(lambda: told() == {f"{KEY}/a", f"{KEY}/b"})
@@ -364,11 +364,11 @@ def test_a_roll_of_tokens_is_kept_up_to_date(bus, endpoint):
     until(lambda: told() == set())
 
 
-def test_a_roll_never_misses_who_is_there(bus, endpoint):
+def test_a_token_list_never_misses_who_is_there(bus, endpoint):
     """Whatever else is asked and comes and goes at the same time."""
     with open_bus(BusSettings("client", (endpoint,))) as other:
         bus.token(f"{KEY}/here")
-        roll = other.roll(f"{KEY}/*")
+        roll = other.token_list(f"{KEY}/*")
         until(lambda: roll.ask(0.0) or roll.version)
         for number in range(200):
             passing = other.token(f"{KEY}/{number}")
@@ -378,9 +378,9 @@ def test_a_roll_never_misses_who_is_there(bus, endpoint):
             other.withdraw(passing)
 
 
-def test_a_roll_asks_again_where_no_answer_comes(bus, monkeypatch):
+def test_a_token_list_asks_again_where_no_answer_comes(bus, monkeypatch):
     bus.token(f"{KEY}/here")
-    roll = bus.roll(f"{KEY}/*")
+    roll = bus.token_list(f"{KEY}/*")
     ask = roll_module.ask_for_tokens
     for is_asked in (False, True):
         monkeypatch.setattr(roll_module, "ask_for_tokens", lambda *_, said=is_asked: said)
@@ -392,9 +392,9 @@ def test_a_roll_asks_again_where_no_answer_comes(bus, monkeypatch):
     assert roll.there() == {f"{KEY}/here"}
 
 
-def test_a_roll_believes_whom_an_answer_in_part_names(bus, monkeypatch):
+def test_a_token_list_believes_whom_an_answer_in_part_names(bus, monkeypatch):
     token = bus.token(f"{KEY}/here")
-    roll = bus.roll(f"{KEY}/*")
+    roll = bus.token_list(f"{KEY}/*")
     until(lambda: roll.ask(0.0) or roll.version)
     with monkeypatch.context() as patched:
         patched.setattr(
@@ -406,9 +406,9 @@ def test_a_roll_believes_whom_an_answer_in_part_names(bus, monkeypatch):
     bus.withdraw(token)
 
 
-def test_a_roll_has_a_bound(bus, endpoint, monkeypatch):
+def test_a_token_list_has_a_bound(bus, endpoint, monkeypatch):
     monkeypatch.setattr(roll_module, "MOST_TOKENS", 100)
-    roll = bus.roll(f"{KEY}/*")
+    roll = bus.token_list(f"{KEY}/*")
     with open_bus(BusSettings("client", (endpoint,))) as flood:
         for number in range(300):
             flood.token(f"{KEY}/flood-{number}")

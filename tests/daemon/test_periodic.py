@@ -45,7 +45,7 @@ def test_an_unchanged_floor_is_published_again_after_a_while():
     floor, sent = SweptFloor(0.3), Sent()
     floor.record(Pose2D(1.0, 1.0))
     mission = SimpleNamespace(
-        floor=floor,
+        covered=SimpleNamespace(floor=floor),
         grid=SimpleNamespace(frame="map", stamp_ns=1),
         rotation=SimpleNamespace(geometry=lambda geometry: geometry),
     )
