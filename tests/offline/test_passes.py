@@ -36,7 +36,7 @@ def test_a_cross_pass_runs_across_the_lanes_before(flat):
         along = along_share(plan.xy, angle_deg)
         # Furniture and narrow rooms leave no longer lanes; without a direction it is 0.45.
         assert along > 0.55
-        assert along > 2.5 * along_share(plan.xy, angle_deg + 90.0)
+        assert along > 2.2 * along_share(plan.xy, angle_deg + 90.0)
 
 
 def test_an_edge_pass_keeps_to_the_walls(flat):
