@@ -30,7 +30,7 @@ LOG = logging.getLogger(__name__)
 # Timeout of a client that does not identify itself, does not read, or sends no token [s].
 HELLO_S, SEND_S, REFUSED_S = 5.0, 10.0, 1.0
 ANSWER_S = 8.0
-# Without news a viewer is told this often that the server is there [s]: the page takes one that is
+# Without news the server says this often that it is there [s]: the page takes one that is
 # silent for three times as long for gone, which no browser notices by itself.
 ALIVE_S = 5.0
 # Close codes of a connection, from the range for applications.
