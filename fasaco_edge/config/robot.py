@@ -72,7 +72,8 @@ class RobotConfig(Section, frozen=True):
     minimises steps, whatever the turns. Where ``turn_deg_s`` is given, the robot's limits count in
     its place: the rate of turning [deg/s], its acceleration [deg/s2], that of driving [m/s2], and
     the largest bend that is steered while driving [deg]. ``overlap`` is the share of the tool's
-    width by which lanes of a line over the floor overlap (``planner.line``).
+    width by which cells overlap under a line over the floor (``planner.line``); the line then
+    leaves out what is swept already. Passes of an order may ask for lanes that overlap more.
     ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
     ``clearance_m`` is a distance that lines keep from walls and furniture in addition to the
     radius; they give up half of it, or all, where only that reaches floor that is worth it.

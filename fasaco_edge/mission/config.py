@@ -175,3 +175,8 @@ class MissionConfig:
     lattice_deg: float | None = 0.0
     given: MissionPolicy | None = None
     speed_m_s: float = 0.0
+
+    @property
+    def tool_m(self) -> float:
+        """Width of the tool [m]."""
+        return self.sweeping.tool_m if self.sweeping else self.footprint.cell_m

@@ -144,7 +144,8 @@ def plan_passes(
         map, robot, start, start_xy, line, align, search, stop, watch: see ``plan``; the budget is
             that of each pass.
         passes: what each covers, and the direction of its lanes: "edge", "rest", "auto", "cross",
-            an angle as "30deg", "rest:cross", "cross@0.15" with a speed [m/s]; or a ``Pass``.
+            an angle as "30deg", "rest:cross", "cross%30@0.15" with an overlap [percent] and a
+            speed [m/s]; or a ``Pass``.
         end: where the last pass ends: "anywhere", "home", or a cell.
 
     Raises:
@@ -168,7 +169,7 @@ def plan_passes(
             start, start_xy = None, (x, y)
         planned = plan(
             map,
-            _at_speed(robot, each.speed_m_s),
+            _robot_in(each, robot),
             start=start,
             start_xy=start_xy,
             end=_end(end, plans) if is_last else ANYWHERE,
@@ -180,24 +181,34 @@ def plan_passes(
             stop=stop,
             watch=watch,
         )
+        if planned.line == CELLS and each.overlap is not None:
+            raise BadConfiguration(
+                f"pass {index + 1} is a walk from cell to cell, which has no overlap",
+                hint="leave its overlap out, or plan a line over the floor of a map with its scale",
+            )
         plans.append(planned)
         line = planned.line
     return PassPlans(asked, tuple(plans))
 
 
-def _at_speed(robot: RobotConfig, speed_m_s: float | None) -> RobotConfig:
-    """Return a robot that drives at a speed [m/s].
+def _robot_in(each: Pass, robot: RobotConfig) -> RobotConfig:
+    """Return the robot with the speed and the overlap of a pass.
 
     Raises:
         BadConfiguration: the speed exceeds the robot's.
     """
-    if speed_m_s is None:
-        return robot
-    if speed_m_s > robot.speed_m_s:
+    if each.speed_m_s is not None and each.speed_m_s > robot.speed_m_s:
         raise BadConfiguration(
-            f"a pass at {speed_m_s:g} m/s is faster than the robot, {robot.speed_m_s:g} m/s"
+            f"a pass at {each.speed_m_s:g} m/s is faster than the robot, {robot.speed_m_s:g} m/s"
         )
-    return msgspec.structs.replace(robot, speed_m_s=speed_m_s)
+    if each.speed_m_s is not None:
+        robot = msgspec.structs.replace(robot, speed_m_s=each.speed_m_s)
+    if each.overlap is None:
+        return robot
+    # As in a mission: of a line's lanes those of a narrower tool overlap more.
+    cell_m = robot.tool_width_m * (1.0 - each.overlap)
+    tool_m = robot.tool_width_m * min((1.0 - each.overlap) / (1.0 - robot.overlap), 1.0)
+    return msgspec.structs.replace(robot, tool_width_m=tool_m, overlap=1.0 - cell_m / tool_m)
 
 
 def _end(end: str | Cell, plans: Sequence[Plan]) -> str | Cell:

@@ -24,6 +24,7 @@ Covers = Literal["all", "edge", "rest"]
 Direction = Literal["auto", "cross"]
 MOST_PASSES = 100
 MOST_ANGLE_DEG = 360
+MOST_OVERLAP = 0.5
 # Steps in all directions.
 _OPEN = 1 << EAST | 1 << NORTH | 1 << WEST | 1 << SOUTH
 
@@ -36,6 +37,7 @@ class Pass:
         covers: which cells: all, those along edges, or the rest, once edges are covered.
         lanes: their direction: auto or cross.
         angle_deg: their angle to the x axis of the map frame in place of ``lanes`` [deg].
+        overlap: share of the tool's width by which its lanes overlap; None for the robot's.
         speed_m_s: speed of the robot [m/s]; None for its usual one.
     """
 
@@ -43,6 +45,7 @@ class Pass:
     lanes: Direction = "auto"
     angle_deg: float | None = None
     speed_m_s: float | None = None
+    overlap: float | None = None
 
     @property
     def name(self) -> str:
@@ -51,7 +54,8 @@ class Pass:
         if self.angle_deg is not None:
             angle = f"{self.angle_deg:g} degrees"
         covers = "" if self.covers == "all" else self.covers
-        return " ".join(filter(None, (covers, angle)))
+        overlap = "" if self.overlap is None else f"{self.overlap:.0%} overlap"
+        return " ".join(filter(None, (covers, angle, overlap)))
 
 
 class Laid(NamedTuple):
@@ -62,11 +66,13 @@ class Laid(NamedTuple):
         lanes: direction of its lanes on the lattice.
         angle_deg: angle of the lattice's rows to the x axis of the map frame [deg]; None for the
             usual one.
+        overlap: as ``Pass.overlap``.
     """
 
     covers: Covers = "all"
     lanes: Lanes = ANY_LANES
     angle_deg: float | None = None
+    overlap: float | None = None
 
 
 def laid(passes: Sequence[Pass]) -> list[Laid]:
@@ -89,7 +95,7 @@ def laid(passes: Sequence[Pass]) -> list[Laid]:
         else:
             is_laned = each.angle_deg is not None or _is_crossed(passes[index + 1 :])
             lanes, angle_deg = (ROWS if is_laned else ANY_LANES), each.angle_deg
-        before = Laid(each.covers, lanes, angle_deg)
+        before = Laid(each.covers, lanes, angle_deg, each.overlap)
         found.append(before)
     return found
 
@@ -119,18 +125,21 @@ def check_passes(passes: Sequence[Pass], name: str = "passes") -> None:
             raise BadConfiguration(f"{where}: cross is an angle, got another one beside it")
         if each.covers == "edge" and (each.lanes == "cross" or each.angle_deg is not None):
             raise BadConfiguration(f"{where}: edge follows the walls, and has no lanes")
+        if each.covers == "edge" and each.overlap is not None:
+            raise BadConfiguration(f"{where}: edge has no lanes that could overlap")
         crossed = crossed or each.covers != "edge"
     if not crossed:
         raise BadConfiguration(f"{name}: edge alone leaves most of the floor; add auto or rest")
 
 
 def read_pass(text: str) -> Pass:
-    """Return the pass in a text as edge, rest, auto, cross, 30deg, rest:cross or cross@0.15.
+    """Return the pass in a text as edge, rest, auto, cross, 30deg, rest:cross, cross%30@0.15.
 
     Raises:
         BadConfiguration: it is none.
     """
     what, at, speed = text.partition("@")
+    what, percent, overlap_text = what.partition("%")
     has_cells = what.partition(":")[0] in get_args(Covers)
     covers, _, lanes = (what if has_cells else f"all:{what}").partition(":")
     lanes = "auto" if what == covers else lanes
@@ -138,13 +147,16 @@ def read_pass(text: str) -> Pass:
     speed_m_s = _number(speed) if at else None
     is_angle = angle_deg is None or (lanes.endswith("deg") and abs(angle_deg) <= MOST_ANGLE_DEG)
     is_speed = speed_m_s is None or 0.0 < speed_m_s <= 10.0
-    if not (is_angle and is_speed):
+    overlap = _number(overlap_text) / 100.0 if percent else None
+    is_overlap = overlap is None or 0.0 <= overlap <= MOST_OVERLAP
+    if not (is_angle and is_speed and is_overlap):
         raise BadConfiguration(
             f"a pass is edge, rest, auto, cross, an angle as 30deg up to {MOST_ANGLE_DEG:g}, "
-            f"rest:cross, or cross@0.15 with a speed up to 10 m/s, got {text!r}"
+            f"rest:cross; with %30 for an overlap up to {100 * MOST_OVERLAP:g} percent, and @0.15 "
+            f"for a speed up to 10 m/s behind it; got {text!r}"
         )
     direction: Direction = "cross" if lanes == "cross" else "auto"
-    return Pass(covers, direction, angle_deg, speed_m_s)  # type: ignore[arg-type]
+    return Pass(covers, direction, angle_deg, speed_m_s, overlap)  # type: ignore[arg-type]
 
 
 def read_passes(text: str) -> tuple[Pass, ...]:

@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ import pytest
 from fasaco_edge.daemon.ledger.codec import MOST_BYTES, decode_ledger, encode_ledger
 from fasaco_edge.daemon.ledger.file import KEPT_ASIDE, LedgerFile
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
 from tests.daemon.test_ledger_codec import enveloped
 from tests.support.ledgers import (
     CELL_M,
@@ -163,7 +165,10 @@ def test_nothing_kept_aside_overwrites_another(written):
 @pytest.mark.parametrize(
     ("newest", "said"),
     [
-        (encode_ledger(driven((0, 0), cell_m=0.5)), r"are 0\.5 m wide, the configuration's 0\.3"),
+        (
+            encode_ledger(replace(driven((0, 0), cell_m=0.5), floor=NO_FLOOR)),
+            r"are 0\.5 m wide, the configuration's 0\.3",
+        ),
         (None, "version 7"),
     ],
 )

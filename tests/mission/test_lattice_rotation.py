@@ -22,7 +22,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.lattice_angle import WallWatch
 from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
+from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
@@ -226,7 +226,7 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     robot.drive(60)
     robot.mission.covered.break_track()
     before = robot.mission.snapshot()
-    after = rotated_ledger(before, DEG)
+    after = relaid_ledger(before, DEG, CELL_M)
     assert after.lattice_deg == DEG
     assert after.floor.pixels == pytest.approx(before.floor.pixels, rel=0.01)
     # Pixels of the map frame, looked up in both.
@@ -244,7 +244,22 @@ def test_floor_that_is_carried_over_lies_where_it_was():
         x, y = rotated_point((col + 0.5) * CELL_M, (row + 0.5) * CELL_M, DEG)
         pixel = Window(int(y / 0.025), int(x / 0.025), int(y / 0.025) + 1, int(x / 0.025) + 1)
         assert before.floor.swept_in(pixel).all()
-    assert rotated_ledger(before, 0.0) is before
+    assert relaid_ledger(before, 0.0, CELL_M) is before
+
+
+def test_cells_of_another_size_count_by_the_floor_at_their_centres():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(3.0, 2.4)))
+    robot.drive(60)
+    before = robot.mission.snapshot()
+    after = relaid_ledger(before, 0.0, 0.5 * CELL_M)
+    assert after.floor.tiles == before.floor.tiles
+    assert (after.cell_m, after.total) == (0.5 * CELL_M, pytest.approx(4 * before.total, rel=0.25))
+    rows, cols = np.nonzero(after.visits(Window(-20, -20, 60, 60)))
+    assert len(rows) == after.total
+    for row, col in zip((rows - 20).tolist(), (cols - 20).tolist(), strict=True):
+        y, x = ((at + 0.5) * after.cell_m // 0.025 for at in (row, col))
+        assert before.floor.swept_in(Window(int(y), int(x), int(y) + 1, int(x) + 1)).all()
 
 
 def snapshot_of(ledger):

@@ -112,6 +112,7 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
         ({"passes": [{"lanes": "x"}]}, "passes[0].lanes: expected auto, cross, got 'x'"),
         ({"passes": [{"covers": 1}]}, "passes[0].covers: expected str, got 1"),
         ({"passes": [{"angle_deg": 361}]}, "passes[0].angle_deg: expected float <= 360.0, got 361"),
+        ({"passes": [{"overlap": 0.6}]}, "passes[0].overlap: expected float <= 0.5, got 0.6"),
         ({"passes": [{"speed_m_s": 0}]}, "passes[0].speed_m_s: expected float > 0.0, got 0"),
         ({"passes": ["edge"]}, "passes: edge alone leaves most of the floor"),
         (

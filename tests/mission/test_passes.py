@@ -12,6 +12,7 @@ from fasaco_edge.mission.core.lattice_angle import LatticeAngle
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.cost import SearchWork
+from fasaco_edge.planners.passes import Laid
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
@@ -123,7 +124,7 @@ def test_passes_survive_a_restart():
     assert OrderState.from_json(state.to_json()).order == state.order
 
 
-def test_robots_of_a_fleet_have_no_angle_of_their_own():
+def test_robots_of_a_fleet_have_no_cells_of_their_own():
     drive = Drive(
         (0, 0),
         MapReceived(building(*HALL)),
@@ -131,9 +132,10 @@ def test_robots_of_a_fleet_have_no_angle_of_their_own():
         order_state=OrderState.idle("no order yet"),
         kind=FleetKind("r1"),
     )
-    drive.command("start", {"passes": [{"angle_deg": 20.0}]})
-    assert isinstance(drive.refused, OrderError)
-    assert "angle_deg is for a robot alone" in str(drive.refused)
+    for name, value in {"angle_deg": 20.0, "overlap": 0.3}.items():
+        drive.command("start", {"passes": [{name: value}]})
+        assert isinstance(drive.refused, OrderError)
+        assert f"{name} is for a robot alone" in str(drive.refused)
     drive.command("start", {"passes": ["edge", "auto", "cross"]})
     assert drive.refused is None
 
@@ -205,18 +207,52 @@ def test_cells_lie_at_the_angle_of_a_pass_and_back():
     assert along(usual, 0.0) + along(usual, 90.0) > 0.6
 
 
-def test_an_angle_that_no_map_fits_at_is_given_up():
-    grid = room(3.0, 2.4)
+def test_lanes_of_a_pass_overlap_as_it_says():
+    robot, grid = robot_in_room()
+    order(robot, {"overlap": 0.4}, {"lanes": "cross", "overlap": 0.0}, "auto")
+    tool_m, usual_m = line_robot.CONFIG.tool_m, line_robot.CONFIG.footprint.cell_m
+    robot.step()
+    assert robot.mission.lattice.cell_m == pytest.approx(0.6 * tool_m)
+    # A daemon that starts again goes on with the swept floor, in the cells of the pass.
+    for _ in range(60):
+        robot.step()
+    swept = robot.mission.covered.floor.snapshot().pixels
+    robot.restart(grid.cells)
+    robot.step()
+    assert robot.mission.lattice.cell_m == pytest.approx(0.6 * tool_m)
+    assert robot.mission.covered.floor.snapshot().pixels >= swept
+    narrow, wide, usual, *_ = tracks(robot).values()
+    assert robot.mission.lattice.cell_m == usual_m
+    # As many metres as there are lanes.
+    lengths = [np.hypot(*np.diff(track, axis=0).T).sum() for track in (narrow, wide, usual)]
+    assert lengths[0] > 1.25 * max(lengths[1:])
+
+
+def test_cells_that_no_map_fits_on_are_given_up():
+    grid, usual_m = room(3.0, 2.4), CONFIG.footprint.cell_m
     angle = LatticeAngle(CONFIG)
-    assert angle.rotates_to_pass(30.0, grid)
-    assert angle.deg == 30.0
-    assert not angle.rotates_to_pass(30.0, grid)
-    assert angle.rotates_to_pass(None, grid)
-    assert angle.deg == 0.0
+    for lay, deg, cell_m in (
+        (Laid(angle_deg=30.0), 30.0, usual_m),
+        (Laid(angle_deg=30.0, overlap=0.5), 30.0, usual_m / 2),
+        (Laid(), 0.0, usual_m),
+    ):
+        assert angle.changes_for_pass(lay, grid)
+        assert (angle.deg, angle.cell_m) == (deg, cell_m)
+        assert not angle.changes_for_pass(lay, grid)
     angle._most_cells = 100
-    assert not angle.rotates_to_pass(45.0, grid)
-    assert not angle.rotates_to_pass(45.0, grid)
-    assert angle.deg == 0.0
+    for lay in (Laid(angle_deg=45.0), Laid(overlap=0.4)):
+        assert not angle.changes_for_pass(lay, grid)
+        assert not angle.changes_for_pass(lay, grid)
+        assert (angle.deg, angle.cell_m) == (0.0, usual_m)
+
+
+def test_a_map_that_outgrows_the_cells_of_a_pass_gets_the_usual_ones():
+    angle = LatticeAngle(CONFIG)
+    assert angle.changes_for_pass(Laid(overlap=0.5), room(3.0, 2.4))
+    angle._most_cells = 500
+    assert angle.rotates_back_for([room(4.0, 3.0)])
+    assert angle.cell_m == CONFIG.footprint.cell_m
+    assert not angle.rotates_back_for([room(4.0, 3.0)])
 
 
 def test_a_slow_pass_is_sent_with_its_speed_and_driven_to_its_end():

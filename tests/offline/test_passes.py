@@ -81,6 +81,13 @@ def test_lanes_run_at_an_angle_of_the_map_frame_and_across_it():
         assert along_share(plan.xy, angle_deg) > 0.5
 
 
+def test_lanes_overlap_as_a_pass_says():
+    wide, narrow = planned(fe.load_map("office"), "auto%0", "auto%40", line="quick").plans
+    assert narrow.problem.cells > 2 * wide.problem.cells
+    with pytest.raises(BadConfiguration, match="pass 1 is a walk from cell to cell"):
+        planned(fe.load_map(np.ones((6, 6), bool)), "auto%40")
+
+
 def test_a_line_through_cells_has_passes_too():
     free = np.ones((12, 12), bool)
     plans = planned(fe.load_map(free), "edge", "rest", "cross", end="home").plans

@@ -21,6 +21,7 @@ from fasaco_edge.planners.passes import Laid, Pass, edge_cells, laid, read_pass,
         ("-30deg", Pass(angle_deg=-30.0), "-30 degrees"),
         ("rest:22.5deg@0.2", Pass("rest", "auto", 22.5, 0.2), "rest 22.5 degrees"),
         ("edge@0.1", Pass("edge", speed_m_s=0.1), "edge"),
+        ("cross%30@0.2", Pass("all", "cross", None, 0.2, 0.3), "cross 30% overlap"),
     ],
 )
 def test_a_text_is_a_pass(text, read, name):
@@ -36,6 +37,8 @@ def test_a_text_is_a_pass(text, read, name):
         ":cross",
         "30",
         "361deg",
+        "auto%51",
+        "auto%",
         "nandeg",
         "deg",
         "cross@0",
@@ -58,6 +61,7 @@ def test_other_texts_are_refused_by_name(text):
         ("edge,rest,cross", [Laid("edge"), Laid("rest", ROWS), Laid("all", COLUMNS)]),
         ("auto,edge,cross", [Laid("all", ROWS), Laid("edge"), Laid("all", COLUMNS)]),
         ("auto,cross,cross", [Laid("all", ROWS), Laid("all", COLUMNS), Laid("all", ROWS)]),
+        ("auto%20,cross", [Laid("all", ROWS, None, 0.2), Laid("all", COLUMNS)]),
         ("30deg,cross,auto", [Laid("all", ROWS, 30.0), Laid("all", COLUMNS, 30.0), Laid()]),
     ],
 )
@@ -78,6 +82,7 @@ def test_a_cross_pass_lies_across_the_last_lanes(passes, lie):
         ([Pass(), Pass("all", "cross", 9.0)], r"passes\[1\]: cross is an angle"),
         ([Pass("edge")], "edge alone leaves most of the floor"),
         ([Pass(), Pass("edge", angle_deg=30.0)], r"passes\[1\]: edge follows the walls"),
+        ([Pass(), Pass("edge", overlap=0.3)], r"passes\[1\]: edge has no lanes that could overlap"),
     ],
 )
 def test_passes_that_do_not_go_together_are_refused(passes, said):

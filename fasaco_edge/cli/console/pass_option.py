@@ -11,7 +11,8 @@ WORDS = (
     "auto (lanes as they are cheapest, or along the cells' rows if a cross follows), cross (lanes "
     "across those of the pass before), 30deg (lanes at an angle to the map's x axis, "
     "counter-clockwise), edge (only the cells along walls and furniture), rest (the others, after "
-    "an edge) or rest:cross; with @0.15 at that speed, at most the robot's [m/s]"
+    "an edge) or rest:cross; with %%30 lanes overlap by 30 percent of the tool's width, in place "
+    "of the robot's; with @0.15 behind it at that speed, at most the robot's [m/s]"
 )
 
 

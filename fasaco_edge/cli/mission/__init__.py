@@ -60,7 +60,7 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
   keep_out:                   # the robot must not touch these, nor mission.keep_out
     - [[1, 1], [2, 1], [2, 2], [1, 2]]
   passes: 1                   # of zones without passes, and of everything; or one item a pass:
-                              # [edge, auto, cross, {angle_deg: 30, speed_m_s: 0.15}]
+                              # [edge, auto, {lanes: cross, overlap: 0.3, speed_m_s: 0.15}]
   return_home: true           # at the end: mission.home, mission.dock, or where the mission began
   keep_covered: false         # true: skip what is already covered in the first pass
   unknown: refuse             # wait: for a room of a zone's name, if there is none yet

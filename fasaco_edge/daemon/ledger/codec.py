@@ -119,11 +119,16 @@ def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
 
 
 def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
-    """Return the ledger in a file's bytes; ``cell_m``: required edge of its cells, or None.
+    """Return the ledger in a file's bytes.
+
+    Args:
+        payload: the bytes.
+        cell_m: edge of the cells of the configuration [m]. A ledger of other cells can be continued
+            by its swept floor. None to take any.
 
     Raises:
         LedgerFileError: the bytes are damaged.
-        LedgerMismatchError: it is of another version, or its cells are not ``cell_m`` wide.
+        LedgerMismatchError: it is of another version, or has cells of another edge and no floor.
     """
     if len(payload) < _ENVELOPE.size:
         raise LedgerFileError(f"torn: {len(payload)} bytes")
@@ -144,7 +149,8 @@ def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
         snapshot = _decode_body(_inflated(body), version)
     except (zlib.error, struct.error, ValueError) as error:
         raise LedgerFileError(f"malformed: {error}") from error
-    if cell_m is not None and snapshot.cell_m != cell_m:
+    is_bare = bool(snapshot.tiles) and not snapshot.floor.tiles
+    if cell_m is not None and snapshot.cell_m != cell_m and is_bare:
         raise LedgerMismatchError(
             f"the ledger's cells are {snapshot.cell_m} m wide, the configuration's {cell_m} m",
             hint=f"to continue with it, set robot.tool_width_m to {snapshot.cell_m} (and "

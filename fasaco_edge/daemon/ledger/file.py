@@ -89,7 +89,7 @@ class LedgerFile:
         """Return the newest complete ledger, and finish an interrupted write.
 
         Args:
-            cell_m: required edge of its cells [m].
+            cell_m: edge of the cells of the configuration [m].
         """
         broken: dict[Path, str] = {}
         for path in self._generations:

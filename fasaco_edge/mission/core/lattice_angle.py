@@ -1,8 +1,9 @@
-"""Lattice angle: the angle of the cells' rows to the map frame, and when it changes.
+"""Lattice angle: angle of the cells' rows to the map frame, edge of a cell, and their changes.
 
 Without a configured angle, rows are parallel to the axes of the map frame at first, and to the
 walls once their direction is certain; to the axes again if a map does not fit otherwise. For a
-pass whose lanes have an angle they are at that angle, until another pass begins.
+pass whose lanes have an angle they are at that angle, until another pass begins; for one with an
+overlap of its own the cells are narrower or wider.
 
 The wall direction is estimated once and then fixes the lattice's rotation. The map frame's axes
 come from the robot's initial heading, so walls are rotated against them. In six buildings rotated
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 from fasaco_edge.errors import FasacoError, LedgerMismatchError, MapTooFar, MapTooLarge
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
@@ -22,6 +24,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.grid.walls import WallDirection, wall_direction
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.planners.passes import Laid
 
 # Evidence required: length of parallel walls [m], and their share of all walls.
 LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
@@ -99,10 +102,11 @@ def _agree(before: WallDirection | None, seen: WallDirection) -> bool:
 
 
 class LatticeAngle:
-    """Decides the angle of the cells' rows [deg].
+    """Decides the angle of the cells' rows, and the edge of a cell.
 
     Attributes:
-        deg: the present angle.
+        deg: the present angle [deg].
+        cell_m: the present edge [m].
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -110,10 +114,26 @@ class LatticeAngle:
         # That of a ledger from before a restart.
         self._resumed_deg: float | None = None
         self._is_given = config.lattice_deg is not None
-        self._cell_m, self._most_cells = config.footprint.cell_m, config.max_lattice_cells
+        self.cell_m = self._usual_cell_m = config.footprint.cell_m
+        self._tool_m, self._most_cells = config.tool_m, config.max_lattice_cells
         self._walls = WallWatch()
         if self._is_given:
             self._walls.end()
+
+    def sized(self, config: MissionConfig) -> MissionConfig:
+        """Return a mission's configuration with cells of the present edge.
+
+        Where they are narrower than usual, so is the tool: a line over the floor leaves out what
+        is swept already, and its lanes would overlap as usual.
+        """
+        scale, sweeping = self.cell_m / self._usual_cell_m, config.sweeping
+        if scale == 1.0:
+            return config
+        if sweeping is not None:
+            sweeping = replace(sweeping, tool_m=sweeping.tool_m * min(scale, 1.0))
+        footprint = replace(config.footprint, cell_m=self.cell_m)
+        cost = replace(config.cost, step_s=config.cost.step_s * scale)
+        return replace(config, footprint=footprint, cost=cost, sweeping=sweeping)
 
     def resume(self, deg: float) -> bool:
         """Keep the angle of a ledger from before a restart; return whether that changes it."""
@@ -123,23 +143,23 @@ class LatticeAngle:
         self._walls.end()
         return True
 
-    def rotates_to_pass(self, deg: float | None, grid: OccupancyGrid) -> bool:
-        """Return whether the angle changes to that of the lanes of a pass; None for the usual one.
-
-        Args:
-            deg: angle of the pass [deg].
-            grid: the newest map.
-        """
+    def changes_for_pass(self, lay: Laid, grid: OccupancyGrid) -> bool:
+        """Return whether angle or edge change to those of the lanes of a pass on the newest map."""
+        deg = lay.angle_deg
         if self._resumed_deg is not None and self._resumed_deg == deg:
             # It was that of the pass: the usual one is not known.
             self._usual_deg = 0.0
             self._walls.begin()
         self._resumed_deg = None
         wanted = self._usual_deg if deg is None else deg
-        # As for walls: the map may grow.
-        if wanted == self.deg or not self._fits(grid, wanted, share=0.5):
+        overlap = lay.overlap
+        cell_m = self._usual_cell_m if overlap is None else self._tool_m * (1.0 - overlap)
+        if (wanted, cell_m) == (self.deg, self.cell_m):
             return False
-        self.deg = wanted
+        # As for walls: the map may grow.
+        if not self._fits(grid, wanted, cell_m, share=0.5):
+            return False
+        self.deg, self.cell_m = wanted, cell_m
         return True
 
     def note_faults(self, faults: Iterable[FasacoError]) -> None:
@@ -157,28 +177,32 @@ class LatticeAngle:
         """Evaluate the walls of the newest map; return whether the angle has changed."""
         deg = self._walls.look(grid, pose.pose)
         # A rotated lattice spans up to twice as many cells, and the map may grow.
-        if deg is None or deg == self.deg or not self._fits(grid, deg, share=0.5):
+        if deg is None or deg == self.deg or not self._fits(grid, deg, self.cell_m, share=0.5):
             return False
         self.deg = self._usual_deg = deg
         return True
 
     def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> bool:
-        """Return whether the angle changes to 0, because one of the maps does not fit otherwise."""
-        is_usual = self.deg == self._usual_deg
-        if (self._is_given and is_usual) or not self.deg:
+        """Return whether the angle changes to 0, or the edge to the usual one, because one of the
+        maps does not fit otherwise."""
+        is_usual = (self.deg, self.cell_m) == (self._usual_deg, self._usual_cell_m)
+        if is_usual and (self._is_given or not self.deg):
             return False
-        if all(self._fits(grid, self.deg) or not self._fits(grid, 0.0) for grid in maps):
+        if all(
+            self._fits(grid, self.deg, self.cell_m) or not self._fits(grid, 0.0, self._usual_cell_m)
+            for grid in maps
+        ):
             return False
         if is_usual:
             self._usual_deg = 0.0
-        self.deg = self._usual_deg
+        self.deg, self.cell_m = self._usual_deg, self._usual_cell_m
         return True
 
-    def _fits(self, grid: OccupancyGrid, deg: float, share: float = 1.0) -> bool:
+    def _fits(self, grid: OccupancyGrid, deg: float, cell_m: float, share: float = 1.0) -> bool:
         """Return whether a lattice at an angle [deg] takes at most a share of the cell limit."""
         geometry = rotated_geometry(grid.geometry, -deg)
         try:
-            lattice_window(geometry, self._cell_m, int(share * self._most_cells))
+            lattice_window(geometry, cell_m, int(share * self._most_cells))
         except (MapTooLarge, MapTooFar):
             return False
         return True

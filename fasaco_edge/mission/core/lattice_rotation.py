@@ -85,21 +85,23 @@ class LatticeRotation:
                 return replace(event, x=x, y=y, points=points)
         return event
 
-    def order(self, state: OrderState, rotated_by_deg: float) -> OrderState:
+    def order(self, state: OrderState, rotated_by_deg: float, scale: float) -> OrderState:
         """Return an order in the mission's frame.
 
         Args:
             state: the order; its polygons may be rotated already.
             rotated_by_deg: rotation of the lattice since home was noted [deg].
+            scale: present edge of a cell, as a multiple of that when home was noted.
         """
         order = None if state.order is None else rotated_order(state.order, -self.deg)
-        home = state.home
-        if home is not None and rotated_by_deg:
+        home, reached = state.home, state.reached
+        if not rotated_by_deg and scale == 1.0:
+            return replace(state, order=order)
+        if home is not None:
             x, y = rotated_point(home[1] + 0.5, home[0] + 0.5, -rotated_by_deg)
-            home = math.floor(y), math.floor(x)
-        reached = state.reached
-        if reached is not None and rotated_by_deg:
-            reached = _rotated_reached(reached, -rotated_by_deg)
+            home = math.floor(y / scale), math.floor(x / scale)
+        if reached is not None:
+            reached = _relaid_reached(reached, -rotated_by_deg, scale)
         return replace(state, order=order, home=home, reached=reached)
 
     def path(self, update: PathUpdate, lattice: CoverageLattice | None) -> PathUpdate:
@@ -145,9 +147,9 @@ def _rotated_grid(grid: OccupancyGrid, by_deg: float) -> OccupancyGrid:
     return replace(grid, geometry=rotated_geometry(grid.geometry, by_deg))
 
 
-def _rotated_reached(reached: ReachedCells, by_deg: float) -> ReachedCells | None:
+def _relaid_reached(reached: ReachedCells, by_deg: float, scale: float) -> ReachedCells | None:
     turn = Motion(Pose2D(0.0, 0.0), Pose2D(0.0, 0.0, math.radians(by_deg)))
-    moved = moved_mask(reached.window, reached.mask, turn, 1.0)
+    moved = moved_mask(reached.window, reached.mask, turn, 1.0, scale)
     found = None if moved is None else ReachedCells.of(moved[1], moved[0])
     return None if found is None else msgspec.structs.replace(found, have_moved=True)
 

@@ -43,7 +43,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.progress import (
     Coverage,
 )
-from fasaco_edge.mission.coverage.rotated_ledger import rotated_ledger
+from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.idle_places import IdlePlaces
@@ -89,17 +89,18 @@ class Mission:
         self.restore_order(order or OrderState.autostart())
 
     def _lay_cells(self) -> None:
-        """Start a mission on a lattice at the decided angle."""
+        """Start a mission on a lattice at the decided angle, with cells of the decided edge."""
         self._rotation = LatticeRotation(self._angle.deg)
-        # Rotation of the lattice against that of the restored ledger [deg].
-        self._rotated_by_deg = 0.0
+        # Rotation of the lattice against that of the restored ledger [deg], and edge of its cells
+        # as a multiple of the ledger's.
+        self._rotated_by_deg, self._scaled_by = 0.0, 1.0
         # The newest map in the lattice's frame, and the same in the map frame.
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
-        config = self._rotation.config(self._config)
+        config = self._rotation.config(self._angle.sized(self._config))
         self.map = MapState(config)
-        cell_m, sweeping = config.footprint.cell_m, config.sweeping
-        tool_m, ahead_m = (sweeping.tool_m, sweeping.ahead_m) if sweeping else (cell_m, 0.0)
+        cell_m, tool_m, sweeping = config.footprint.cell_m, config.tool_m, config.sweeping
+        ahead_m = sweeping.ahead_m if sweeping else 0.0
         footprint, sight, map_state = config.footprint, None, self.map
         if sweeping and tool_m > 2.0 * (radius_m := footprint.robot_radius_m):
             sight = ToolSight(tool_m, radius_m, footprint.free_at_most, lambda: map_state.grid)
@@ -144,7 +145,9 @@ class Mission:
 
     def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         self._rotated_by_deg = self._rotation.deg - before.lattice_deg
-        before = rotated_ledger(before, self._rotation.deg)
+        deg, cell_m = self._rotation.deg, self._angle.cell_m
+        self._scaled_by = cell_m / before.cell_m
+        before = relaid_ledger(before, deg, cell_m)
         self.covered.resume(before, is_confirmed=is_confirmed)
         self._trail.resume(before.trail)
         self.map.frames.activate(before.frame)
@@ -155,7 +158,7 @@ class Mission:
         self.map.places.resume(order.places)
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
-        self._changes.begin(self._rotation.order(order, self._rotated_by_deg))
+        self._changes.begin(self._rotation.order(order, self._rotated_by_deg, self._scaled_by))
         self.state, self.reason = self._executive.status()
 
     def restore_rooms(self, book: RoomBook) -> None:
@@ -169,8 +172,7 @@ class Mission:
         To be called before the first step, which gets the events of its ``held``.
         """
         self._executive.succeed(before._executive)
-        cell_m, was = self._config.footprint.cell_m, before._config.footprint.cell_m
-        if before.rotation != self.rotation or cell_m != was:
+        if before.rotation != self.rotation or before._angle.cell_m != self._angle.cell_m:
             return
         self.orders.succeed(before.orders)
         self._executive.way_out.succeed(before._executive.way_out)
@@ -234,8 +236,8 @@ class Mission:
         return self._handler.handle(map(self._rotation.event, events), now)
 
     def _align(self, happened: Decision, now: float) -> Decision:
-        """Rotate the lattice to a pass's lanes, or to the walls once these are certain; return the
-        combined decision."""
+        """Lay the lattice for a pass's lanes, or along the walls once these are certain; return
+        the combined decision."""
         state, angle, grid, pose = self.order_state, self._angle, self.grid, self.pose
         angle.note_faults(happened.faults)
         # A path kept for an errand is given in present cells; a building in doubt may soon be
@@ -243,14 +245,14 @@ class Mission:
         if state.errand or self.is_in_doubt or grid is None or pose is None:
             return happened
         sweeps = state.current_zone is not None
-        if sweeps and angle.rotates_to_pass(state.current_pass.angle_deg, grid):
-            along = "along the lanes of the pass,"
+        if sweeps and angle.changes_for_pass(state.current_pass, grid):
+            along = f"along the lanes of the pass, {angle.cell_m:.3g} m wide,"
         elif not angle.is_settled and angle.rotates_to_walls(grid, pose):
             along = "along the walls from now on,"
         else:
             return happened
         why = f"cells lie {along} at {angle.deg:.1f} degrees to the map frame"
-        stop = self._rotate_lattice(why, now)
+        stop = self._lay_anew(why, now)
         return replace(happened, path=stop or happened.path)
 
     def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
@@ -258,10 +260,10 @@ class Mission:
         maps = (event.grid for event in events if isinstance(event, MapReceived))
         if not self._angle.rotates_back_for(maps):
             return None
-        return self._rotate_lattice("the map is too large for cells along the walls", now)
+        return self._lay_anew("the map is too large for other cells than the usual ones", now)
 
-    def _rotate_lattice(self, why: str, now: float) -> PathUpdate | None:
-        """Continue on a lattice at the new angle; return the path that stops the robot, if any."""
+    def _lay_anew(self, why: str, now: float) -> PathUpdate | None:
+        """Continue on another lattice; return the path that stops the robot, if any."""
         before, route = self.snapshot(), self.route
         order = replace(self.order_state, reached=self.orders.reached)
         is_confirmed = self.covered.is_confirmed and not self.map.building.is_foreign

@@ -105,7 +105,7 @@ class OrderChanges:
         return Answer(event.number, plan=plan), after
 
     def _check_passes(self, order: MissionOrder) -> None:
-        """Raise OrderError if passes of a fleet have angles, or one is faster than the robot."""
+        """Raise OrderError if passes of a fleet need cells of their own, or are too fast."""
         kinds = [kind for zone in order.zones for kind in zone.kinds]
         fastest = max((kind.speed_m_s or 0.0 for kind in kinds), default=0.0)
         usual = self.config.speed_m_s
@@ -113,11 +113,12 @@ class OrderChanges:
             raise OrderError(
                 f"passes: speed_m_s: expected at most robot.speed_m_s, {usual:g}, got {fastest:g}"
             )
-        if not self.is_alone and any(kind.angle_deg is not None for kind in kinds):
-            raise OrderError(
-                "passes: angle_deg is for a robot alone; robots of a fleet share cells",
-                hint="leave angle_deg out: auto and cross run along the cells",
-            )
+        for name in () if self.is_alone else ("angle_deg", "overlap"):
+            if any(getattr(kind, name) is not None for kind in kinds):
+                raise OrderError(
+                    f"passes: {name} is for a robot alone; robots of a fleet share cells",
+                    hint=f"leave {name} out: auto and cross run along the cells",
+                )
 
     def change_to(self, after: OrderState, now: float) -> PathUpdate | None:
         """Change to the state that follows a command at ``now`` [s]; return the path, if any."""

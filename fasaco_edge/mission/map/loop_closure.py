@@ -138,22 +138,23 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
 
 
 def moved_mask(
-    window: Window, mask: NDArray[np.bool_], motion: Motion, cell_m: float
+    window: Window, mask: NDArray[np.bool_], motion: Motion, cell_m: float, scale: float = 1.0
 ) -> tuple[Window, NDArray[np.bool_]] | None:
     """Return which cells have their centre on a marked cell after a motion, with their window.
 
-    None if the window is too large. ``mask``: bool (rows, cols) of a window before.
+    None if the window is too large. ``mask``: bool (rows, cols) of a window before, of cells of
+    ``cell_m``; those after it are ``scale`` times as wide.
     """
-    rows, cols = (window.row0, window.row1), (window.col0, window.col1)
+    rows, cols, new_m = (window.row0, window.row1), (window.col0, window.col1), cell_m * scale
     y, x = np.array(list(product(rows, cols))).T * cell_m
     x, y = motion.forward(x, y)
     row0, col0, row1, col1 = (
-        int(edge // cell_m) for edge in (y.min(), x.min(), y.max() + cell_m, x.max() + cell_m)
+        int(edge // new_m) for edge in (y.min(), x.min(), y.max() + new_m, x.max() + new_m)
     )
     whole = Window(row0, col0, row1, col1)
     if whole.rows * whole.cols > MAX_LATTICE_CELLS:
         return None
-    y, x = (np.mgrid[row0:row1, col0:col1].reshape(2, -1) + 0.5) * cell_m
+    y, x = (np.mgrid[row0:row1, col0:col1].reshape(2, -1) + 0.5) * new_m
     x, y = motion.back(1.0, x, y)
     were = np.floor(np.stack((y, x), axis=1) / cell_m).astype(np.int32)
     moved = window.values_at(mask, were, 0).reshape(whole.rows, whole.cols)

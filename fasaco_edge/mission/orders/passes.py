@@ -10,6 +10,7 @@ from msgspec import Meta
 from fasaco_edge.errors import BadConfiguration, OrderError
 from fasaco_edge.planners.passes import (
     MOST_ANGLE_DEG,
+    MOST_OVERLAP,
     MOST_PASSES,
     Covers,
     Direction,
@@ -30,6 +31,7 @@ class PassDocument(
         lanes: direction of the lanes: `auto`, as they are cheapest, along the cells' rows if the
             next pass crosses them; `cross`, across those of the pass before.
         angle_deg: angle of the lanes to the x axis of the map frame, in place of `lanes` [deg].
+        overlap: share of the tool's width by which the lanes overlap, in place of the robot's.
         speed_m_s: speed of the robot, if less than its usual one [m/s].
     """
 
@@ -37,6 +39,7 @@ class PassDocument(
     lanes: Direction = "auto"
     angle_deg: Annotated[float, Meta(ge=-MOST_ANGLE_DEG, le=MOST_ANGLE_DEG)] | None = None
     speed_m_s: Annotated[float, Meta(gt=0, le=10)] | None = None
+    overlap: Annotated[float, Meta(ge=0, le=MOST_OVERLAP)] | None = None
 
 
 PassWord = Literal["auto", "cross", "edge", "rest"]
@@ -86,7 +89,7 @@ def _item(each: Pass) -> object:
         for name in PassDocument.__struct_fields__
         if (value := getattr(each, name)) != getattr(_USUAL, name)
     }
-    if len(members) > 1 or members.keys() & {"angle_deg", "speed_m_s"}:
+    if len(members) > 1 or members.keys() & {"angle_deg", "overlap", "speed_m_s"}:
         return members
     return next(iter(members.values()), "auto")
 

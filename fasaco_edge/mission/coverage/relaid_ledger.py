@@ -1,4 +1,4 @@
-"""Rotated ledger: conversion of a ledger to cells at another angle.
+"""Relaid ledger: conversion of a ledger to cells at another angle, or of another size.
 
 Coverage is rebuilt from swept floor alone: a cell counts as covered if the floor at its centre is
 swept. The trail, stored per step between cells, starts again; other robots resend theirs.
@@ -27,26 +27,26 @@ from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.planners.living_trail import NO_TRAIL
 
 
-def rotated_ledger(before: LedgerSnapshot, lattice_deg: float) -> LedgerSnapshot:
-    """Return a ledger converted to cells at ``lattice_deg`` [deg] to the map frame."""
-    by_deg = before.lattice_deg - lattice_deg
-    if not by_deg:
+def relaid_ledger(before: LedgerSnapshot, lattice_deg: float, cell_m: float) -> LedgerSnapshot:
+    """Return a ledger converted to cells of ``cell_m`` [m] at ``lattice_deg`` [deg] to the map
+    frame."""
+    by_deg, floor = before.lattice_deg - lattice_deg, before.floor
+    if not by_deg and before.cell_m == cell_m:
         return before
-    floor = before.floor
-    tiles = {
-        place: np.packbits(swept, axis=1)
-        for place, swept in _rotated(floor, by_deg, FLOOR_TILE, PIXEL_M)
-    }
+    tiles = floor.tiles
+    if by_deg:
+        rotated = _rotated(floor, by_deg, FLOOR_TILE, PIXEL_M)
+        tiles = MappingProxyType({place: np.packbits(swept, axis=1) for place, swept in rotated})
     visits = {
-        place: swept.astype(np.uint16)
-        for place, swept in _rotated(floor, by_deg, TILE, before.cell_m)
+        place: swept.astype(np.uint16) for place, swept in _rotated(floor, by_deg, TILE, cell_m)
     }
     return replace(
         before,
+        cell_m=cell_m,
         total=sum(int(np.count_nonzero(tile)) for tile in visits.values()),
         tiles=MappingProxyType(visits),
         under_tool=frozenset(),
-        floor=FloorSnapshot(MappingProxyType(tiles), floor.changes),
+        floor=FloorSnapshot(tiles, floor.changes),
         trail=NO_TRAIL,
         fleet=b"",
         lattice_deg=lattice_deg,
