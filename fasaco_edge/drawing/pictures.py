@@ -33,6 +33,13 @@ def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
     return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
 
 
+def draw_by_others(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
+    """Paint floor that other robots swept; return the meaning of the colour."""
+    plot.paint(swept, palette.BY_OTHERS)
+    label = f"swept by other robots of its fleet ({swept.area_m2:,.1f} m2)"
+    return [KeyEntry("tile", palette.BY_OTHERS, label)]
+
+
 def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
     """Outline the zones and keep-out zones of an order; return the meaning of the colours."""
     key = []
@@ -309,6 +316,7 @@ def draw_mission(
     driven: NDArray[np.bool_] | None = None,
     swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
+    by_others: MapLayer | None = None,
     zones: Sequence[Polygon] = (),
     keep_out: Sequence[Polygon] = (),
     rooms: Sequence[tuple[str, Polygon]] = (),
@@ -326,6 +334,7 @@ def draw_mission(
         driven: bool (n - 1,), which places are joined to the next; None for all.
         swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
+        by_others: floor that other robots swept; None without them.
         zones, keep_out: polygons of the order [m].
         rooms: names and outlines [m].
     """
@@ -339,6 +348,8 @@ def draw_mission(
         key = draw_swept(plot, swept, "reachable floor swept")
     if unswept is not None:
         key += draw_unswept(plot, unswept)
+    if by_others is not None:
+        key += draw_by_others(plot, by_others)
     for _, outline in rooms:
         plot.line(np.array((*outline, outline[0])), palette.FAINT_INK, ROOM_PX)
     key += draw_order(plot, zones, keep_out)

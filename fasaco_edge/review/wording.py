@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 NOT_KNOWN = "not known"
+SWEPT_BY_OTHERS = "swept by others"
 
 
 def clock(seconds: float) -> str:

@@ -111,6 +111,16 @@ def review(parts):
     return read_review(parts)
 
 
+def test_floor_that_was_not_ordered_is_not_left(review):
+    """The standing zone ends at y = 2.3 m, the room at 3 m."""
+    free = (0.4, 2.6)
+    assert review.all_floor.geometry.values_at(review.all_floor.unswept, np.array([free]))[0]
+    assert not review.floor.geometry.values_at(review.floor.unswept, np.array([free]))[0]
+    assert (
+        " of a, by recorded poses" in dict(screen_rows(review, document_of(review)))["floor swept"]
+    )
+
+
 def turned_s(review):
     """Return when the robot stood half turned [s]."""
     yaws = [yaw for _, _, yaw in review.data.poses]
@@ -200,7 +210,8 @@ def test_floor_of_a_time_without_poses_is_not_called_missed(review):
     data = review.data
     kept = [i for i, (x, *_) in enumerate(data.poses) if not 0.5 < x < 1.3]
     some = replace(data, poses=[data.poses[i] for i in kept], pose_s=[data.pose_s[i] for i in kept])
-    lost = replace(review, data=some, floor=swept_floor(some, review.lattice))
+    floor = swept_floor(some, review.lattice)
+    lost = replace(review, data=some, floor=floor, all_floor=floor)
     (spot,) = explain(lost, [(0.9, Y)])
     assert (spot.why, spot.swept) == ("poses missing", None)
     first, end = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,11 @@ from fasaco_edge.review.document import explanations
 if TYPE_CHECKING:
     from PIL import Image
 
+    from fasaco_edge.bus.arrival import Arrival
+    from fasaco_edge.grid.geometry import GridGeometry
+    from fasaco_edge.judge.pixels import Mask
     from fasaco_edge.review.review import Review
+    from fasaco_edge.wire.documents.settings import FleetSettings
 
 DESCRIPTION = """\
 Report what happened in a recorded mission, on one screen; with --long all figures, orders,
@@ -228,7 +232,15 @@ def _read(paths: Sequence[Path], name: str) -> Review:
         def tell(what: str, done: int, total: int) -> None:
             bar.update(task, description=f"{name}: {what}", completed=done, total=total)
 
-        return read_review(paths, tell)
+        return read_review(paths, tell, _by_others)
+
+
+def _by_others(
+    turns: Iterable[Arrival], fleet: FleetSettings, geometry: GridGeometry
+) -> Mask | None:
+    from fasaco_edge.cli.fleet_wing import swept_by_others
+
+    return swept_by_others(turns, fleet, geometry)
 
 
 def _epilog() -> str:
