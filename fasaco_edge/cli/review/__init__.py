@@ -35,8 +35,8 @@ Report what happened in a recorded mission, on one screen; with --long all figur
 commands, replans, floor left and why, and faults. With --at and --point it answers a
 question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
 balance, floor swept again or only driven through, waiting and messages; such a recording takes
---json and --png only. Parts of one run are read together. Files are only read; of files that a
-crash cut short, the whole part is used.
+--json and --png only. Parts of one run are read together; of several runs the newest. Files are
+only read; of files that a crash cut short, the whole part is used.
 """
 
 
@@ -77,7 +77,11 @@ def _time(text: str) -> float:
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "recordings", nargs="+", type=Path, metavar="FILE.rrd", help="the parts of one run"
+        "recordings",
+        nargs="+",
+        type=Path,
+        metavar="FILE.rrd",
+        help="the parts of one run; of several runs of a robot it takes the newest",
     )
     parser.add_argument(
         "--against",
@@ -136,7 +140,12 @@ def run(args: argparse.Namespace) -> int:
     for file in recordings:
         with open_part(file):  # reports a file that is no recording before loading the rest
             pass
+    from fasaco_edge.cli.console.recordings import files_of_a_run
     from fasaco_edge.recording.read.frames import is_fleet_recording
+
+    args.recordings = files_of_a_run(args.recordings)
+    if args.against:
+        args.against = files_of_a_run(args.against)
 
     if is_fleet_recording(args.recordings[0]):
         from fasaco_edge.cli.fleet_wing import print_fleet
