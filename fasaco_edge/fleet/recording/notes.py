@@ -255,6 +255,15 @@ def read_notes(paths: Sequence[Path]) -> list[NoteBatch]:
     return sorted(batches, key=lambda batch: batch.notes[0].at_ms if batch.notes else 0)
 
 
+def numbers_of(paths: Sequence[Path]) -> dict[str, int]:
+    """Return the number of each robot in a recording, which is that of its colour; as above."""
+    return {
+        robot.name: number
+        for batch in read_notes(paths)
+        for number, robot in enumerate(batch.robots)
+    }
+
+
 def _batches(path: Path) -> Iterator[NoteBatch]:
     with open_part(path) as (recording, scan):
         for chunk in chunks(recording, scan):
