@@ -31,10 +31,11 @@ from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLine, drawings
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.review.drive import nearest_points, swept_floor
 from fasaco_edge.review.run_data import maps_of
-from fasaco_edge.review.wording import SWEPT_BY_OTHERS, clock
+from fasaco_edge.review.wording import SWEPT_BY_OTHERS
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.reasons import plain
 

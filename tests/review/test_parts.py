@@ -19,6 +19,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording.read.frames import recording_id
 from fasaco_edge.review.comparison import side_by_side
 from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -174,7 +175,10 @@ def test_troubles_and_faults_are_told(parts):
     review = read_review(parts)
     told = document(review)
     # On a slow computer the planner is heard late, too.
+    row = dict(screen_rows(read_review(parts), document_of(read_review(parts))))["troubles"]
+    assert "degraded" not in row
     troubles = [one for one in told["troubles"] if one["state"] != "silent"]
+    assert troubles[0]["reason"] in row
     assert [(one["state"], one["reason"]) for one in troubles] == [
         ("degraded", "no pose for 3 s"),
         ("paused", "the dock gives no current"),

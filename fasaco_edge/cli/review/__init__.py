@@ -190,11 +190,11 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
     """Answer questions about a moment, and about spots."""
     import msgspec
 
+    from fasaco_edge.recording.read.robot_clock import clock
     from fasaco_edge.review.instant import scene_at
     from fasaco_edge.review.output import answer_rows
     from fasaco_edge.review.output.pictures import draw_scene, draw_spots
     from fasaco_edge.review.spot import explain
-    from fasaco_edge.review.wording import clock
 
     if args.at is not None and args.at > review.duration_s:
         raise BadConfiguration(

@@ -12,6 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.cli.console import terminal
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import (
     compared_rows,
     reason_counts,
@@ -21,7 +22,6 @@ from fasaco_edge.review.comparison import (
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
 from fasaco_edge.review.spot import spots_left
-from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:

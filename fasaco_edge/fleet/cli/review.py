@@ -13,7 +13,7 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.fleet.review.report import FleetFigures, review_fleet
-from fasaco_edge.review.wording import clock
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.text import one_line
 
 ONE_ROBOT = ("long", "at", "point", "against", "export")

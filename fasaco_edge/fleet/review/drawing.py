@@ -22,7 +22,7 @@ from fasaco_edge.fleet.review.report import FleetReview
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.wording import clock
+from fasaco_edge.recording.read.robot_clock import clock
 
 # Opacity of the colour of a robot's cells; cells that two robots pass have none.
 TINT = 0.35

@@ -18,7 +18,14 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.frames import Chunk, chunks, column, is_fleet_recording, wall_ns
+from fasaco_edge.recording.read.frames import (
+    Chunk,
+    chunks,
+    column,
+    is_fleet_recording,
+    recording_id,
+    wall_ns,
+)
 from fasaco_edge.recording.read.repair import HINT, open_part
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.samples import Place, SampleDecoder, place_of
@@ -213,6 +220,16 @@ def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRe
     for path in sorted(set(paths)):
         reader.read(path)
     return reader.record()
+
+
+def read_clock(paths: Sequence[Path]) -> RobotClock:
+    """Return the clock of the parts of a run, as that of its ``RunRecord``; raises as above.
+
+    Of several runs it is that of the first.
+    """
+    ids = {path: recording_id(path) for path in paths}
+    first = min(filter(None, ids.values()), default="")
+    return read_run_record([path for path in paths if ids[path] == first], lambda: None).clock
 
 
 @dataclass(slots=True)

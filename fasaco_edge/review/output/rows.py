@@ -9,12 +9,13 @@ from msgspec.structs import astuple
 
 from fasaco_edge.client.phrases import percent, scale_words
 from fasaco_edge.judge.floor import swept_words
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import figures, floor_words
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.orders import order_words, ordered_words
 from fasaco_edge.review.rooms import room_at
-from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
+from fasaco_edge.review.wording import NOT_KNOWN, amount, count
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
 
@@ -126,7 +127,8 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         for area in order.unreached
     ]
     troubles = [
-        f"{t.state} {clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s" for t in document.troubles
+        f"{clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s: {plain(t.reason) or t.state}"
+        for t in document.troubles
     ]
     commands = [" ".join(row) for row in command_rows(document)]
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
