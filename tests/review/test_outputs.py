@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -15,8 +17,11 @@ from PIL import Image
 pytest.importorskip("rerun")
 
 from pyarrow import parquet
+from rich.console import Console
+from rich.text import Text
 
 from fasaco_edge.cli import main
+from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.review.screen import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
@@ -88,6 +93,23 @@ def test_floor_that_others_of_its_fleet_swept_is_not_left(review):
     unknown = review_of(review.record, fleet, 0)
     assert document_of(unknown).not_recorded["swept_by_others_m2"]
     assert "counts as left" in dict(screen_rows(unknown, document_of(unknown)))["by others"]
+
+
+@pytest.mark.parametrize(("height", "fits"), [(60, True), (20, False)])
+def test_on_a_low_terminal_it_says_how_many_rows_are_left_out(review, monkeypatch, height, fits):
+    shown = io.StringIO()
+    console = Console(file=shown, force_terminal=True, width=80, height=height)
+    monkeypatch.setattr(terminal, "out", lambda: console)
+    print_review(review, document_of(review), full=False)
+    lines = shown.getvalue().splitlines()
+    # The prompt takes the last line.
+    assert len(lines) < height
+    found = re.match(r"(\d+) more rows?: --long", Text.from_ansi(lines[-1]).plain)
+    assert (found is None) == fits
+    names = [name for name, _ in screen_rows(review, document_of(review))]
+    told = [Text.from_ansi(line).plain.split("  ")[0] for line in lines]
+    missing = [name for name in names if name not in told]
+    assert missing == names[len(names) - (int(found[1]) if found else 0) :]
 
 
 def test_without_a_map_there_is_no_picture(review):

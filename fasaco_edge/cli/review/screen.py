@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -47,11 +47,16 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
         console.print(f"and {len(verdicts) - MOST_VERDICTS} more orders")
     _print_curve(console, review, PLOT_HEIGHT if full else SCREEN_PLOT_HEIGHT)
     found = rows.screen_rows(review, document)
-    console.print(terminal.summary([*found, *rows.card_rows(document)] if full else found))
     if not full:
-        hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a browser: serve FILE"
-        console.print(hint)
+        shown = _fitting(console, found, [text for _, text in verdicts[:MOST_VERDICTS]])
+        console.print(terminal.summary(shown))
+        left_out = len(found) - len(shown)
+        more = f"{left_out} more row{'s' * (left_out != 1)}" if left_out else "more"
+        console.print(
+            f"{more}: --long; a moment: --at MM:SS; a spot: --point X,Y; page: serve FILE"
+        )
         return
+    console.print(terminal.summary([*found, *rows.card_rows(document)]))
     console.print(terminal.figures(rows.figure_rows(document)))
     _print_table(console, "Orders", rows.ORDERS, rows.order_rows(document))
     _print_table(console, "Rooms", rows.ROOMS, rows.room_rows(document, review))
@@ -67,6 +72,22 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     _print_table(console, "Charges", rows.CHARGES, rows.charge_rows(document))
     _print_table(console, "Refused messages", ("code", "messages"), rows.fault_rows(document))
     _print_remarks(console, document)
+
+
+def _fitting(
+    console: Console, found: list[tuple[str, str]], verdicts: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Return the first rows, which matter most: as many as a terminal shows with all the rest."""
+
+    def height(shown: RenderableType) -> int:
+        return len(console.render_lines(shown))
+
+    # Title and times of the curve; the last line, and that of the prompt.
+    room = console.height - sum(map(height, verdicts)) - (2 + SCREEN_PLOT_HEIGHT) - 2
+    shown = list(found)
+    while console.is_terminal and len(shown) > 1 and height(terminal.summary(shown)) > room:
+        shown.pop()
+    return shown
 
 
 def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:

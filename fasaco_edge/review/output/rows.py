@@ -144,16 +144,16 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
         ("not reached", _some(unreached)),
-        ("driven", amount(document.driven_m, "m")),
-        ("replans", replans),
-        ("processor", _processor(document)),
+        ("troubles", _some(troubles)),
+        ("poses", _lost_way(review)),
         ("commands", _some(commands)),
         ("rooms", _shares(document)),
         ("charges", _some(charges)),
-        ("poses", _lost_way(review)),
+        ("driven", amount(document.driven_m, "m")),
         ("stood", _stood(document)),
-        ("troubles", _some(troubles)),
+        ("replans", replans),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
+        ("processor", _processor(document)),
     ]
     return [(name, text) for name, text in found if text]
 
