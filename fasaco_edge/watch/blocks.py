@@ -36,8 +36,7 @@ class Blocks:
         lines = self._console.render_lines(shown, options, pad=True)
         if len(lines) > height > 1:
             more = Text(f"{len(lines) - height + 1} more rows: a taller terminal", FAINT)
-            more = self._console.render_lines(more, options, pad=True)[:1]
-            lines = [*lines[: height - 1], *more]
+            lines[height - 1 :] = self._console.render_lines(more, options, pad=True)
         lines = lines[:height]
         drawn = [self.glyphs.drawn(line) for line in lines]
         return drawn + [" " * width] * (height - len(drawn))

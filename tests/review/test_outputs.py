@@ -95,7 +95,7 @@ def test_floor_that_others_of_its_fleet_swept_is_not_left(review):
     assert "counts as left" in dict(screen_rows(unknown, document_of(unknown)))["by others"]
 
 
-@pytest.mark.parametrize(("height", "fits"), [(60, True), (20, False)])
+@pytest.mark.parametrize(("height", "fits"), [(60, True), (14, False)])
 def test_on_a_low_terminal_it_says_how_many_rows_are_left_out(review, monkeypatch, height, fits):
     shown = io.StringIO()
     console = Console(file=shown, force_terminal=True, width=80, height=height)

@@ -52,9 +52,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
         console.print(terminal.summary(shown))
         left_out = len(found) - len(shown)
         more = f"{left_out} more row{'s' * (left_out != 1)}" if left_out else "more"
-        console.print(
-            f"{more}: --long; a moment: --at MM:SS; a spot: --point X,Y; page: serve FILE"
-        )
+        console.print(f"{more}: --long; a moment: --at MM:SS; a spot: --point X,Y; page: serve")
         return
     console.print(terminal.summary([*found, *rows.card_rows(document)]))
     console.print(terminal.figures(rows.figure_rows(document)))
