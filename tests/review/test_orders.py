@@ -16,7 +16,7 @@ from fasaco_edge.review.comparison import (
 from fasaco_edge.review.document import MapSize, ReviewDocument
 from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import OrderChapter, chapters, order_words
-from fasaco_edge.review.output.rows import verdicts
+from fasaco_edge.review.output.verdicts import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import CoverageReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.status import Status

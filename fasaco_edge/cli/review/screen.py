@@ -21,6 +21,7 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
+from fasaco_edge.review.output.verdicts import verdicts
 from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import one_line
 
@@ -36,19 +37,20 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     """Print a review and its document: in ``full``, or as much as fits on a screen."""
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
-    verdicts = rows.verdicts(document)
-    for complete, text in verdicts if full else verdicts[:MOST_VERDICTS]:
+    every = verdicts(document)
+    shown_verdicts = every if full else every[:MOST_VERDICTS]
+    for complete, text in shown_verdicts:
         verdict = Text(one_line(text), colours[complete])
         if full:
             console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
         else:
             console.print(verdict)
-    if not full and len(verdicts) > MOST_VERDICTS:
-        console.print(f"and {len(verdicts) - MOST_VERDICTS} more orders")
+    if len(every) > len(shown_verdicts):
+        console.print(f"and {len(every) - MOST_VERDICTS} more orders")
     _print_curve(console, review, PLOT_HEIGHT if full else SCREEN_PLOT_HEIGHT)
     found = rows.screen_rows(review, document)
     if not full:
-        shown = _fitting(console, found, [text for _, text in verdicts[:MOST_VERDICTS]])
+        shown = _fitting(console, found, [text for _, text in shown_verdicts])
         console.print(terminal.summary(shown))
         left_out = len(found) - len(shown)
         more = f"{left_out} more row{'s' * (left_out != 1)}" if left_out else "more"
@@ -73,7 +75,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
 
 
 def _fitting(
-    console: Console, found: list[tuple[str, str]], verdicts: Sequence[str]
+    console: Console, found: list[tuple[str, str]], above: Sequence[str]
 ) -> list[tuple[str, str]]:
     """Return the first rows, which matter most: as many as a terminal shows with all the rest."""
 
@@ -81,7 +83,7 @@ def _fitting(
         return len(console.render_lines(shown))
 
     # Title and times of the curve; the last line, and that of the prompt.
-    room = console.height - sum(map(height, verdicts)) - (2 + SCREEN_PLOT_HEIGHT) - 2
+    room = console.height - sum(map(height, above)) - (2 + SCREEN_PLOT_HEIGHT) - 2
     shown = list(found)
     while console.is_terminal and len(shown) > 1 and height(terminal.summary(shown)) > room:
         shown.pop()

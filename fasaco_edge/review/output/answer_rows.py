@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
+from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen
+from fasaco_edge.review.turn import direction
 from fasaco_edge.review.wording import SWEPT_BY_OTHERS
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
