@@ -18,7 +18,7 @@ from fasaco_edge.text import one_line
 
 ONE_ROBOT = ("long", "at", "point", "against", "export")
 HEADER = (
-    "robot", "state", "busy", "waited", "swept m2", "through", "again", "driven m", "kB/s",
+    "robot", "state", "busy", "waited", "swept", "through", "again", "driven m", "kB/s",
     "plan ms",
 )  # fmt: skip
 
@@ -102,7 +102,7 @@ def _print(figures: FleetFigures) -> None:
         )
     console.print(table)
     console.print(
-        "through, again: m2 that another had swept. kB/s: messages to the fleet (most over 5 s). "
+        "swept [m2]; through, again: of these, what another had swept. kB/s: messages to the fleet (most over 5 s). "
         "plan ms: median, 99 %, by the recorder's clock.",
         style="dim",
     )
