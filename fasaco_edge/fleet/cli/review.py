@@ -102,7 +102,8 @@ def _print(figures: FleetFigures) -> None:
         )
     console.print(table)
     console.print(
-        "swept [m2]; through, again: of these, what another had swept. kB/s: messages to the fleet (most over 5 s). "
+        "swept [m2]; through, again: of these, what another had swept. kB/s: messages to the fleet "
+        "(most over 5 s). "
         "plan ms: median, 99 %, by the recorder's clock.",
         style="dim",
     )
