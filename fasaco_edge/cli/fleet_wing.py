@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fasaco_edge.fleet.mission.travel import apart
     from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
     from fasaco_edge.fleet.review.drawing import draw_fleet_mission
+    from fasaco_edge.fleet.review.others import swept_by_others
 
 __all__ = [
     "apart",
@@ -26,6 +27,7 @@ __all__ = [
     "plan_fleet",
     "print_fleet",
     "run_fleet_recorder",
+    "swept_by_others",
 ]
 
 _PLACES = {
@@ -37,6 +39,7 @@ _PLACES = {
     "plan_fleet": "cli.plan",
     "print_fleet": "cli.review",
     "run_fleet_recorder": "recording.recorder",
+    "swept_by_others": "review.others",
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.config.loading import load_config
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.replay.cycle_replay import CycleReplay, Difference, read_turns
 from fasaco_edge.replay.replay import PROPOSALS, Replay, read_run
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
@@ -37,9 +38,10 @@ code 1. One without is replayed approximately: time is that of the samples and p
 in work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
-The column `then` shows whether the path equals the recorded one cell by cell; without a turn log
-paths are not compared. With --config or --work the replay is of another mission, and approximate,
-too. Plans of a user's own planner, as earlier releases had them, cannot be repeated.
+Times are the robot's, since the recording began, as in its review. The column `then` shows whether
+the path equals the recorded one cell by cell; without a turn log paths are not compared. With
+--config or --work the replay is of another mission, and approximate, too. Plans of a user's own
+planner, as earlier releases had them, cannot be repeated.
 """
 
 
@@ -68,10 +70,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Replay."""
-    from fasaco_edge.recording.read.run import RecordedSamples
+    from fasaco_edge.recording.read.run import RecordedSamples, read_clock
 
     samples = RecordedSamples(args.recordings)
-    recorded = read_run(samples)
+    recorded, robots_clock = read_run(samples), read_clock(args.recordings)
     config = load_config(args.config) if args.config else recorded.daemon_config()
     is_as_it_was = args.config is None and args.work is None
     record = read_turns(samples) if is_as_it_was else None
@@ -84,14 +86,23 @@ def run(args: argparse.Namespace) -> int:
     began = time.monotonic()
     steps: list[ReplayStep] = []
     last_s = 0.0
+
+    def robots_s(at_s: float, step: ReplayStep | None = None) -> float:
+        """Return the robot's seconds since the recording began, as in its review."""
+        at_ns = replay.began_ns + round(1e9 * at_s)
+        if step is not None and step.as_recorded and step.decision.path is not None:
+            at_ns = recorded.path_ns.get(step.decision.path.revision, at_ns)
+        return robots_clock.seconds(at_ns)
+
     for step in replay.steps(samples):
         last_s = step.at_s
         if step.is_news:
-            steps.append(step)
+            steps.append(replace(step, at_s=robots_s(step.at_s, step)))
+    last_s = robots_s(last_s)
     summary = _summary(replay, recorded, samples, steps, last_s)
     compared = None
     if record is not None and isinstance(replay, CycleReplay):
-        compared = _comparison(replay, record)
+        compared = _comparison(replay, record, robots_s)
     if args.json:
         verdict = msgspec.to_builtins(compared) if compared else {"equal": None}
         document = msgspec.to_builtins(summary) | verdict
@@ -100,7 +111,8 @@ def run(args: argparse.Namespace) -> int:
         console = terminal.out()
         console.print(_table(steps))
         console.print(terminal.figures([*_rows(summary), *_compared_rows(compared)]))
-        terminal.err().print(f"{last_s:.1f} s in {time.monotonic() - began:.1f} s")
+        took_s = time.monotonic() - began
+        terminal.err().print(f"{clock(last_s)} of the robot's time in {took_s:.1f} s")
     return Exit.OK if compared is None or compared.equal else Exit.ERROR
 
 
@@ -111,7 +123,7 @@ def _count(text: str) -> int:
 
 
 def _document(step: ReplayStep) -> dict[str, object]:
-    document: dict[str, object] = {"at_s": round(step.at_s, 6), "state": step.state}
+    document: dict[str, object] = {"at_s": round(step.at_s, 3), "state": step.state}
     document["reason"] = step.reason
     if step.decision.plan is not None:
         document["asked"] = step.decision.plan.reason
@@ -183,7 +195,7 @@ def _summary(
 
 def _table(steps: Sequence[ReplayStep]) -> Table:
     table = Table(box=None, pad_edge=False)
-    for name in ("s", "state", "path", "steps", "proposals", "then"):
+    for name in ("at", "state", "path", "steps", "proposals", "then"):
         table.add_column(name, justify="left" if name in ("state", "then") else "right")
     table.add_column("why", overflow="fold")
     for step in steps:
@@ -201,7 +213,7 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
             ]
         if update or step.changed or faults:
             table.add_row(
-                f"{step.at_s:.2f}", step.state, *row, "; ".join(filter(None, (why, *faults)))
+                clock(step.at_s), step.state, *row, "; ".join(filter(None, (why, *faults)))
             )
     return table
 
@@ -245,10 +257,12 @@ class Comparison(msgspec.Struct):
     kernels: Versions
 
 
-def _comparison(replay: CycleReplay, record: CycleRecord) -> Comparison:
+def _comparison(
+    replay: CycleReplay, record: CycleRecord, robots_s: Callable[[float], float]
+) -> Comparison:
     difference = replay.difference
     if difference is not None:
-        difference = replace(difference, at_s=round(difference.at_s, 6))
+        difference = replace(difference, at_s=round(robots_s(difference.at_s), 3))
     return Comparison(
         equal=difference is None and not record.gap,
         turns=record.turns,
@@ -286,7 +300,7 @@ def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
 
 def _words(found: Difference) -> str:
     return (
-        f"turn {found.turn} at {found.at_s:.2f} s: {found.what} "
+        f"turn {found.turn} at {clock(found.at_s)}: {found.what} "
         f"was {found.recorded}, is {found.replayed}"
     )
 

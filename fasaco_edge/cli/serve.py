@@ -129,10 +129,12 @@ def _recording(args: argparse.Namespace) -> Iterator[Callable[[], Playback]]:
                 f"--{option.replace('_', '-')}: a recording is only looked at, and has no bus",
                 hint="leave it out, or leave out FILE.rrd",
             )
+    from fasaco_edge.cli.console.recordings import files_of_a_run
     from fasaco_edge.recording.read.frames import is_fleet_recording
     from fasaco_edge.recording.read.timeline import open_timeline
     from fasaco_edge.serve.recorded import Playback
 
+    args.recordings = files_of_a_run(args.recordings)
     if is_fleet_recording(args.recordings[0]):
         raise BadConfiguration(
             f"{args.recordings[0]}: this is the recording of a fleet",

@@ -22,6 +22,7 @@ RECOVERED: tuple[Colour, ...] = ((255, 232, 176), (255, 206, 140), (250, 172, 12
 LEFT_OUT: Colour = (244, 214, 232)
 # Reachable floor that was not swept: darker than cells left out, as it may lie on them.
 UNSWEPT: Colour = (233, 120, 170)
+BY_OTHERS: Colour = (205, 230, 208)
 UNREACHABLE: Colour = (200, 60, 60)
 
 START: Colour = (13, 128, 92)

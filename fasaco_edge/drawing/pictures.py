@@ -12,18 +12,18 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.rooms import number_rooms, paint_rooms
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
+from fasaco_edge.drawing.visits import ENDS, draw_visits, visits_of
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.label_place import label_place
-from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
+from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms
-from fasaco_edge.kernels.lattice.reach import reachable_from
 
 
 def draw_swept(plot: Plot, swept: MapLayer, words: str) -> list[KeyEntry]:
     """Tint the swept floor; return the meaning of the tint and of a line's marks."""
     plot.paint(swept, palette.COVERED)
-    return [*_ENDS, KeyEntry("tile", palette.COVERED, f"{words} ({swept.area_m2:,.1f} m2)")]
+    return [*ENDS, KeyEntry("tile", palette.COVERED, f"{words} ({swept.area_m2:,.1f} m2)")]
 
 
 def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
@@ -31,6 +31,13 @@ def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
     plot.paint(unswept, palette.UNSWEPT)
     label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
+
+
+def draw_by_others(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
+    """Paint floor that other robots swept; return the meaning of the colour."""
+    plot.paint(swept, palette.BY_OTHERS)
+    label = f"swept by other robots of its fleet ({swept.area_m2:,.1f} m2)"
+    return [KeyEntry("tile", palette.BY_OTHERS, label)]
 
 
 def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
@@ -44,67 +51,6 @@ def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]
             plot.outline(polygon, colour)
         key += [KeyEntry("tile", colour, label)] if polygons else []
     return key
-
-
-_ENDS = (KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end"))
-
-
-def draw_visits(
-    plot: Plot,
-    lattice: CoverageLattice,
-    visits: NDArray[np.integer],
-    start: Cell,
-) -> list[KeyEntry]:
-    """Tint the lattice's cells by number of visits; return the meaning of the tints.
-
-    Args:
-        plot: what to draw on.
-        lattice: the planning grid.
-        visits: shape of the lattice: how often each cell was visited.
-        start: cell (row, col) from where the others can be reached or not.
-    """
-    never = lattice.coverable & (visits == 0)
-    reachable = _reachable(lattice, start)
-    left_out, unreachable = never & reachable, never & ~reachable
-
-    tints = np.array([palette.PAPER, palette.COVERED, *palette.RECOVERED], np.uint8)
-    colours = tints[np.minimum(visits, len(tints) - 1)]
-    colours[left_out] = palette.LEFT_OUT
-    plot.tint(lattice, colours)
-    plot.hatch(lattice, unreachable, palette.UNREACHABLE)
-
-    key = _visit_key(visits)
-    if left_out.any():
-        key.append(_entry("tile", palette.LEFT_OUT, "not passed", left_out))
-    if unreachable.any():
-        key.append(_entry("hatch", palette.UNREACHABLE, "unreachable", unreachable))
-    return key
-
-
-def _reachable(lattice: CoverageLattice, start: Cell) -> NDArray[np.bool_]:
-    if not lattice.contains(start) or lattice.states[lattice.local(start)] != COVERABLE:
-        # Without a start, no cell is called unreachable.
-        return np.ones(lattice.states.shape, np.bool_)
-    return reachable_from(lattice.steps, *lattice.local(start)).astype(np.bool_)
-
-
-def _visit_key(visits: NDArray[np.integer]) -> list[KeyEntry]:
-    key = [
-        *_ENDS,
-        _entry("tile", palette.COVERED, "covered once", visits == 1),
-    ]
-    most = len(palette.RECOVERED) + 1
-    for times, colour in enumerate(palette.RECOVERED, start=2):
-        cells = visits >= times if times == most else visits == times
-        if cells.any():
-            label = f"{times} times or more" if times == most else f"{times} times"
-            key.append(_entry("tile", colour, label, cells))
-    return key
-
-
-def _entry(symbol: str, colour: palette.Colour, label: str, cells: NDArray[np.bool_]) -> KeyEntry:
-    count = int(np.count_nonzero(cells))
-    return KeyEntry(symbol, colour, f"{label} ({count:,} cell{'s' * (count != 1)})")
 
 
 Points = NDArray[np.float64]
@@ -247,14 +193,6 @@ def in_pieces(line: Points, longest: float) -> Points:
     return np.vstack([line[:1], line[:-1][segment] + share * ways[segment]])
 
 
-def visits_of(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return how often a walk visits each cell of a lattice."""
-    visits = np.zeros(lattice.states.shape, np.int64)
-    window = lattice.window
-    np.add.at(visits, (cells[:, 0] - window.row0, cells[:, 1] - window.col0), 1)
-    return visits
-
-
 def draw_line(plot: Plot, line: Points, cell_m: float) -> None:
     """Draw a line, points (n, 2) with n >= 2 [m], beside its middle, and arrows along it."""
     moves = np.ones(len(line), np.bool_)
@@ -309,6 +247,7 @@ def draw_mission(
     driven: NDArray[np.bool_] | None = None,
     swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
+    by_others: MapLayer | None = None,
     zones: Sequence[Polygon] = (),
     keep_out: Sequence[Polygon] = (),
     rooms: Sequence[tuple[str, Polygon]] = (),
@@ -326,6 +265,7 @@ def draw_mission(
         driven: bool (n - 1,), which places are joined to the next; None for all.
         swept: reachable floor that was swept, shown in place of the cells; None to show these.
         unswept: reachable floor that was not swept; None where that is not known.
+        by_others: floor that other robots swept; None without them.
         zones, keep_out: polygons of the order [m].
         rooms: names and outlines [m].
     """
@@ -339,6 +279,8 @@ def draw_mission(
         key = draw_swept(plot, swept, "reachable floor swept")
     if unswept is not None:
         key += draw_unswept(plot, unswept)
+    if by_others is not None:
+        key += draw_by_others(plot, by_others)
     for _, outline in rooms:
         plot.line(np.array((*outline, outline[0])), palette.FAINT_INK, ROOM_PX)
     key += draw_order(plot, zones, keep_out)

@@ -22,7 +22,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypedDict
 
 import numpy as np
 
@@ -152,6 +153,12 @@ class JudgedFloor:
         """Reachable unswept pixels, bool (rows, cols)."""
         return self.reachable & ~self.swept
 
+    def only(self, asked: Mask) -> JudgedFloor:
+        """Return the floor of these pixels alone, bool (rows, cols); figures of the drive stay."""
+        reachable, swept = self.reachable & asked, self.swept & asked
+        areas = _areas(reachable, swept, self.geometry.resolution)
+        return JudgedFloor(replace(self.figures, **areas), self.geometry, reachable, swept)
+
 
 def judge_floor(
     grid: OccupancyGrid,
@@ -264,10 +271,8 @@ class _Floor:
 
 def _figures(floor: _Floor, line: DrivenLine, reachable: Mask, swept: Mask) -> FloorFigures:
     pixel_m, robot = floor.geometry.resolution, floor.robot
-    reachable_m2, swept_m2 = (
-        int(np.count_nonzero(mask)) * pixel_m * pixel_m for mask in (reachable, swept)
-    )
-    left_m2 = Patches.of(reachable & ~swept).pixels * pixel_m * pixel_m
+    areas = _areas(reachable, swept, pixel_m)
+    swept_m2 = areas["swept_m2"]
     ways_px, bends_deg = line.ways_and_bends
     length_m, quarters = float(ways_px.sum()) * pixel_m, float(bends_deg.sum()) / 90.0
     arcs = None
@@ -280,18 +285,36 @@ def _figures(floor: _Floor, line: DrivenLine, reachable: Mask, swept: Mask) -> F
         seconds = drive_seconds(ways_px * pixel_m, bends_deg, robot.speed_m_s, robot.limits, arcs)
     least_m = max(swept_m2 / robot.tool_m - math.pi * robot.tool_m / 4, 0.0)
     return FloorFigures(
-        reachable_m2=reachable_m2,
-        swept_m2=swept_m2,
-        swept_share=swept_m2 / reachable_m2 if reachable_m2 else None,
+        **areas,
         illegal_share=floor.illegal_share(line),
         length_m=length_m,
         quarter_turns=quarters,
         seconds=seconds,
         least_s=least_m / robot.speed_m_s,
         seconds_per_m2=seconds / swept_m2 if swept_m2 else None,
-        patches_over_4_dm2=int(np.count_nonzero(left_m2 > PATCH_M2)),
-        largest_patch_m2=float(left_m2.max(initial=0.0)),
         pixel_m=pixel_m,
         reversals=stops,
         spot_turns=0 if arcs is None else int(np.count_nonzero(arcs.spots)),
+    )
+
+
+class _Areas(TypedDict):
+    reachable_m2: float
+    swept_m2: float
+    swept_share: float | None
+    patches_over_4_dm2: int
+    largest_patch_m2: float
+
+
+def _areas(reachable: Mask, swept: Mask, pixel_m: float) -> _Areas:
+    reachable_m2, swept_m2 = (
+        int(np.count_nonzero(mask)) * pixel_m * pixel_m for mask in (reachable, swept)
+    )
+    left_m2 = Patches.of(reachable & ~swept).pixels * pixel_m * pixel_m
+    return _Areas(
+        reachable_m2=reachable_m2,
+        swept_m2=swept_m2,
+        swept_share=swept_m2 / reachable_m2 if reachable_m2 else None,
+        patches_over_4_dm2=int(np.count_nonzero(left_m2 > PATCH_M2)),
+        largest_patch_m2=float(left_m2.max(initial=0.0)),
     )

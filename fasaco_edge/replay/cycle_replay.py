@@ -58,6 +58,7 @@ class CycleRecord:
         turns: number of cycles without a gap, from the first.
         gap: what is missing after them; "" for nothing.
         taken: topic and checksum of every sample it took.
+        began_ns: when its first cycle was, by the recorder's clock [ns].
     """
 
     beginning: LogStart
@@ -65,6 +66,7 @@ class CycleRecord:
     turns: int = 0
     gap: str = ""
     taken: frozenset[tuple[str, int]] = field(default_factory=frozenset)
+    began_ns: int = 0
 
 
 def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
@@ -72,7 +74,7 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
     beginning: LogStart | None = None
     kernels, turns, gap = "", 0, ""
     taken: set[tuple[str, int]] = set()
-    log_ns = sample_ns = 0
+    log_ns = sample_ns = first_ns = began_ns = 0
     for arrival in samples:
         if arrival.topic != TURNS.name:
             sample_ns = arrival.wall_ns
@@ -93,6 +95,11 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
         if batch.first != turns + 1:
             gap = f"turns {turns + 1} to {batch.first - 1} are not in the recording"
             break
+        if batch.times:
+            # A batch comes just after its last cycle: the least delay counts.
+            first_ns = first_ns or round(1e9 * batch.times[0])
+            since_ns = log_ns - round(1e9 * batch.times[-1]) + first_ns
+            began_ns = min(began_ns or since_ns, since_ns)
         turns += len(batch.times)
         kernels = kernels or batch.kernels
         taken.update((s.topic, s.checksum) for turn in batch.turns for s in turn.samples)
@@ -100,7 +107,7 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
         return None
     if sample_ns - log_ns > SILENT_NS:
         gap = gap or f"the log ends {1e-9 * (sample_ns - log_ns):.1f} s before the recording"
-    return CycleRecord(beginning, kernels, turns, gap, frozenset(taken))
+    return CycleRecord(beginning, kernels, turns, gap, frozenset(taken), began_ns)
 
 
 class UntakenSamples:
@@ -178,10 +185,11 @@ class CycleReplay:
         plans: how many plans were made, including those in spare time.
         difference: the first decision or sample that differs; None without one.
         kernels: name of the compiled kernels in use.
+        began_ns: when its first cycle was, by the recorder's clock [ns].
     """
 
     def __init__(self, config: DaemonConfig, record: CycleRecord) -> None:
-        self._record = record
+        self._record, self.began_ns = record, record.began_ns
         ledger, rooms = record.beginning.ledger, record.beginning.rooms
         restored = decode_ledger(ledger, config.cell_m) if ledger else None
         self._drive = MissionDrive(config, restored, decode_rooms(rooms) if rooms else None)

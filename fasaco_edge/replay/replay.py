@@ -61,6 +61,7 @@ class RecordedRun:
             does not have them.
         starts: how often a daemon was started after the first.
         paths: reasons of its published paths by revision, without those of a second daemon.
+        path_ns: when each of them came, by the recorder's clock [ns].
     """
 
     config: Settings = field(default_factory=dict)
@@ -69,6 +70,7 @@ class RecordedRun:
     restored_cells: int = 0
     starts: int = 0
     paths: Mapping[int, str] = field(default_factory=dict)
+    path_ns: Mapping[int, int] = field(default_factory=dict)
 
     def daemon_config(self) -> DaemonConfig:
         """Return the configuration in the keys and names of this release.
@@ -99,16 +101,18 @@ def read_run(samples: Iterable[Arrival]) -> RecordedRun:
     """Return the daemon's run, from samples in order."""
     statuses: list[tuple[Arrival, Status]] = []
     paths: dict[int, str] = {}
+    path_ns: dict[int, int] = {}
     for arrival in samples:
         with suppress(MalformedMessage):
             if arrival.topic == PATH_DIGEST:
                 about = decode_tolerant(arrival.sample.attachment, PathAttachment)
                 paths.setdefault(about.revision, about.reason)
+                path_ns.setdefault(about.revision, arrival.wall_ns)
             elif arrival.topic == "status":
                 statuses.append((arrival, decode_tolerant(arrival.sample.payload, Status)))
     paths.pop(0, None)  # a daemon's first path, which belongs to no mission
     if not statuses:
-        return RecordedRun(paths=paths)
+        return RecordedRun(paths=paths, path_ns=path_ns)
     first = statuses[0][1]
     # The mission begins with a map, and keeps it as long as it lives.
     ready = [arrival.at_ns for arrival, status in statuses if status.map is not None]
@@ -120,6 +124,7 @@ def read_run(samples: Iterable[Arrival]) -> RecordedRun:
         restored_cells=first.ledger.restored_cells,
         starts=sum(before and not now for before, now in pairwise(begun)),
         paths=paths,
+        path_ns=path_ns,
     )
 
 
@@ -133,6 +138,7 @@ class Replay:
 
     Attributes:
         mission: the mission, for inspection between steps.
+        began_ns: when its first sample came, by the recorder's clock [ns].
     """
 
     def __init__(
@@ -146,7 +152,7 @@ class Replay:
         self._due: tuple[float, PlanReady] | None = None
         self._commands = 0
         self._now = 0.0
-        self._base_ns = 0
+        self._base_ns = self.began_ns = 0
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
         """Yield each cycle; samples that are no input of the mission only advance the time. If a
@@ -156,6 +162,7 @@ class Replay:
         last = 0.0
         for arrival in samples:
             if self._drive.began is None:
+                self.began_ns = arrival.wall_ns
                 self._base_ns = arrival.at_ns - arrival.wall_ns
                 self._drive.began = self._now = 1e-9 * arrival.at_ns
             last = max(last, self._at(arrival))

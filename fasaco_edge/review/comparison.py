@@ -9,9 +9,10 @@ from typing import TypeGuard
 import msgspec
 
 from fasaco_edge.judge.floor import swept_words
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
-from fasaco_edge.review.wording import NOT_KNOWN, clock, count
+from fasaco_edge.review.wording import NOT_KNOWN, count
 
 # Keys of the configuration by the name of a setting.
 SETTINGS = {

@@ -95,12 +95,15 @@ class ReviewDocument(msgspec.Struct):
         complete: of the last order: whether the mission reached `done` with every reachable cell
             (of its zones) covered.
         covered_cells, coverable_cells: at the end, by the daemon's last recorded count: covered
-            cells, and all reachable cells.
+            cells, and all reachable cells, of the order's zones where it had some, and also of
+            other robots of its fleet.
         recovered_cells: cells covered more than once.
         unreachable_cells: cells where the robot would fit, but that it cannot get to.
         reachable_m2, swept_m2: floor at the end, by pixels of the last map: all that the tool's
             disc touches wherever the robot's disc can be; the part that the tool passed over along
-            the recorded poses [m2].
+            the recorded poses [m2]. If each order was for zones, floor in these alone.
+        swept_by_others_m2: reachable floor that other robots of its fleet swept, by their cells,
+            and that is not part of these figures [m2]; null for a robot alone.
         patches_over_4_dm2, largest_patch_m2: connected patches of this floor that were not swept
             [m2].
         swept_before_m2: floor swept before the recording began, approximately, as counted by the
@@ -170,6 +173,7 @@ class ReviewDocument(msgspec.Struct):
     unreachable_cells: int | None = None
     reachable_m2: float | None = None
     swept_m2: float | None = None
+    swept_by_others_m2: float | None = None
     swept_before_m2: float = 0.0
     patches_over_4_dm2: int | None = None
     largest_patch_m2: float | None = None

@@ -9,6 +9,8 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
@@ -22,6 +24,7 @@ from fasaco_edge.review.document import (
 )
 from fasaco_edge.review.orders import commands_of
 from fasaco_edge.review.spot import left_patches
+from fasaco_edge.wire.documents.settings import known_settings
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -133,9 +136,13 @@ def _add_coverage(document: ReviewDocument, review: Review) -> None:
     if (grid := review.data.grid) is not None:
         document.map = MapSize(grid.geometry.rows, grid.geometry.cols, grid.geometry.resolution)
     if (counts := review.data.counts) is not None:
-        document.covered_cells, document.coverable_cells = counts.covered, counts.coverable
         document.recovered_cells, document.unreachable_cells = counts.recovered, counts.unreachable
+    if (cells := review.cells) is not None:
+        document.covered_cells, document.coverable_cells = cells
     document.swept_before_m2 = round(review.data.swept_before_m2, 3)
+    if (others := review.by_others) is not None and review.floor is not None:
+        pixel_m2 = review.floor.geometry.resolution**2
+        document.swept_by_others_m2 = round(int(np.count_nonzero(others)) * pixel_m2, 3)
     if (floor := review.floor) is not None:
         figures = floor.figures
         document.reachable_m2 = _rounded(figures.reachable_m2)
@@ -205,6 +212,8 @@ def _not_recorded(review: Review) -> dict[str, str]:
         why[FLOOR] = f"{before}, which does not show which ones"
     elif review.floor is None:
         why[FLOOR] = "no pose lies on the map"
+    if known_settings(data.config).fleet.name and review.by_others is None:
+        why["swept_by_others_m2"] = "no message of another robot was recorded"
     if data.ledger_floor is None:
         why["ledger_swept_m2, left_by_reason, out_of_reach_by_reason"] = (
             "no recorded status has figures of the floor"

@@ -7,11 +7,18 @@ from dataclasses import dataclass, field
 
 import msgspec
 
-from fasaco_edge.mission.orders.order import MissionOrder, OrderDocument, order_document
+from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.mission.orders.order import (
+    MissionOrder,
+    OrderDocument,
+    ZoneDocument,
+    order_document,
+)
 from fasaco_edge.mission.orders.passes import passes_words
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData
-from fasaco_edge.wire.documents.replies import UnreachedArea
+from fasaco_edge.text import one_line
+from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
 from fasaco_edge.wire.documents.status import Status
 
 ENDS = ("cancel", "reset")
@@ -88,23 +95,57 @@ def chapters(data: RunData, states: Sequence[Span], end_s: float) -> tuple[Order
         _chapter(data, states, *one)
         for one in held
         # Before the first command there may have been nothing.
-        if len(held) == 1 or one[0] == "command" or _has_begun(states, one[1], one[2])
+        if len(held) == 1 or one[4] is not None or _has_begun(states, one[1], one[2])
     )
 
 
-def _is_complete(status: Status) -> bool:
-    """Return whether an order is done with nothing left uncovered, by its last status."""
+def cells_of(status: Status) -> tuple[int, int] | None:
+    """Return the covered and all reachable cells of the order; None if they are not counted."""
     if zones := status.mission.zones:
-        return all(zone.covered == zone.cells for zone in zones)
+        return sum(zone.covered for zone in zones), sum(zone.cells for zone in zones)
     count = status.coverage
-    return count is not None and count.covered == count.coverable > 0
+    return None if count is None else (count.covered, count.coverable)
+
+
+def ordered_words(orders: Sequence[OrderChapter]) -> str:
+    """Return of which zones the figures of floor are, as " of A and B"; "" for all floor."""
+    asked = [order.order.zones if order.order else [] for order in orders]
+    names = dict.fromkeys(one_line(zone.name) for zones in asked for zone in zones)
+    return f" of {' and '.join(names)}" if names and all(asked) else ""
+
+
+def ordered_zones(data: RunData, orders: Sequence[OrderChapter]) -> tuple[Polygon, ...]:
+    """Return the zones that were ordered [m]; () if one order was for everything."""
+    found: tuple[Polygon, ...] = ()
+    for order in orders:
+        zones = _zones(data, order.at_s, order.until_s)
+        if not zones:
+            return ()
+        found += tuple(zone.polygon for zone in zones if zone.polygon)
+    return found
+
+
+def _zones(data: RunData, begin_s: float, end_s: float) -> tuple[ZoneReport, ...]:
+    """Return the zones of the order between two times [s], by its statuses."""
+    told = (each.status.mission.zones for each in reversed(data.statuses)
+            if begin_s <= each.at_s <= end_s)  # fmt: skip
+    return next(filter(None, told), ())
+
+
+def _told(zones: Sequence[ZoneReport]) -> OrderDocument | None:
+    """Return an order whose command was not recorded, by its zones; None without any."""
+    asked = [ZoneDocument(zone.name, list(zone.polygon) or None, zone.passes) for zone in zones]
+    return OrderDocument(asked) if asked else None
 
 
 def _held(
     data: RunData, states: Sequence[Span], end_s: float
 ) -> Iterator[tuple[str, float, float, str | None, MissionOrder | None]]:
     """Yield each order with its source, its period in force [s] and its end."""
-    ordered, began, order = "itself", 0.0, None
+    # An order that is older than the recording: the daemon was restarted, or the recorder.
+    first_s = next((at_s for at_s, name, _ in data.commands if name == "start"), end_s)
+    told = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)
+    ordered, began, order = next(filter(None, told), "itself"), 0.0, None
     is_open = True
     for at_s, name, given in data.commands:
         if name == "start" and is_open and _goes_on(order, given, _state_at(states, at_s)):
@@ -146,12 +187,13 @@ def _chapter(
     until = end_s if ended_by else float("inf")
     state = _state_at(states, until)
     statuses = [each.status for each in data.statuses if begin_s <= each.at_s < until]
-    counted = [status for status in statuses if status.coverage is not None]
+    counted = [cells for status in statuses if (cells := cells_of(status)) is not None]
+    covered, coverable = counted[-1] if counted else (None, None)
     complete: bool | None = None
     if state and (state != "done" or counted):
-        complete = state == "done" and _is_complete(counted[-1])
-    count = counted[-1].coverage if counted else None
+        complete = state == "done" and bool(covered) and covered == coverable
     times = data.times[1:]
+    zones = _zones(data, begin_s, until)
     return OrderChapter(
         ordered,
         begin_s,
@@ -159,9 +201,9 @@ def _chapter(
         ended_by,
         state or None,
         complete,
-        count.covered if count else None,
-        count.coverable if count else None,
-        order=msgspec.convert(order_document(order), OrderDocument) if order else None,
+        covered,
+        coverable,
+        order=msgspec.convert(order_document(order), OrderDocument) if order else _told(zones),
         replans=sum(
             begin_s <= path.at_s < until for path in data.paths if path.about.planner is not None
         ),

@@ -11,9 +11,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import MapTooFar, MapTooLarge
+from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.judge.floor import JudgedFloor
+from fasaco_edge.judge.pixels import Mask
 from fasaco_edge.mission.orders.zones import kept_out, without
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import (
@@ -36,9 +39,11 @@ from fasaco_edge.review.moments import (
     spans_of,
     troubles_at_rest,
 )
-from fasaco_edge.review.orders import OVER, OrderChapter, chapters
-from fasaco_edge.review.rooms import RoomChapter, room_chapters
+from fasaco_edge.review.orders import OVER, OrderChapter, cells_of, chapters, ordered_zones
+from fasaco_edge.review.rooms import RoomChapter, labels_of, room_chapters
 from fasaco_edge.review.run_data import RunData, gather
+from fasaco_edge.wire.documents.settings import FleetSettings, known_settings
+from fasaco_edge.wire.topics import TURNS
 
 # Progress is reported with every n-th sample.
 REPORT_EVERY = 200
@@ -48,12 +53,21 @@ Progress = Callable[[str, int, int], None]
 Item = TypeVar("Item")
 
 
-def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> Review:
+Others = Callable[[Iterable[Arrival], FleetSettings, GridGeometry], Mask | None]
+"""Returns the pixels that other robots of a fleet swept, by the turn log of one."""
+
+
+def read_review(
+    paths: Sequence[Path],
+    progress: Progress = lambda *_: None,
+    others: Others = lambda *_: None,
+) -> Review:
     """Read the parts of one run, and review it.
 
     Args:
         paths: the files, in any order; they are not changed.
         progress: called now and then.
+        others: called for a robot of a fleet.
 
     Raises:
         UnreadableRecording: a file is missing, no recording, or without samples.
@@ -66,7 +80,7 @@ def read_review(paths: Sequence[Path], progress: Progress = lambda *_: None) -> 
     about = max(batch.place.first for batch in record.batches) + 1
     data = gather(_reported(samples, progress, "decoding", about), record.clock)
     progress("following the robot", 0, 1)
-    return review_of(record, data, samples.missing)
+    return review_of(record, data, samples.missing, others)
 
 
 def _reported(items: Iterable[Item], progress: Progress, task: str, total: int) -> Iterator[Item]:
@@ -91,8 +105,11 @@ class Review:
             large or too far away.
         no_lattice: why there is none; "" if there is one.
         visits: uint16, its shape: how often the tool passed over each cell.
-        floor: the swept part of the reachable floor; None without a lattice, or if some was swept
-            before.
+        floor: the swept part of the reachable floor that was ordered; None without a lattice, or
+            if some was swept before.
+        all_floor: the same of all floor, ordered or not.
+        by_others: reachable floor that other robots of its fleet swept, and so not part of both;
+            None for a robot alone, or if it is not known.
         replans: plans after the first.
         states: of the mission, in order.
         recorder_states: of the recorder.
@@ -107,6 +124,8 @@ class Review:
     no_lattice: str
     visits: NDArray[np.uint16] | None
     floor: JudgedFloor | None
+    all_floor: JudgedFloor | None
+    by_others: Mask | None
     replans: Replans
     states: tuple[Span, ...]
     recorder_states: tuple[Span, ...]
@@ -129,26 +148,38 @@ class Review:
     def covered_share(self) -> NDArray[np.float64]:
         """Times [s] and covered shares of the cells that could be covered at the end, (n, 2).
 
-        They are drawn every two seconds, of the cells known then; statuses, recorded four times a
-        minute and at the end, say how many these were.
+        They are drawn every two seconds, of all cells known then; statuses, recorded four times a
+        minute and at the end, say how many these were, and how many were ordered.
         """
         known = [
-            (each.at_s, count.covered, count.coverable, each.status.state in OVER)
+            (each.at_s, *cells, count.covered, count.coverable, status.state in OVER)
             for each in self.data.statuses
-            if (count := each.status.coverage) is not None
+            if (cells := cells_of(status := each.status)) and (count := status.coverage)
         ]
         if not known or not known[-1][2]:
             return np.zeros((0, 2))
-        at_s, covered, coverable, is_over = np.array(known, np.float64).T
+        at_s, covered, coverable, of_all, all_cells, is_over = np.array(known, np.float64).T
         drawn = self.record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
         # It is drawn a little late: once an order is over, it says nothing new.
         before = np.searchsorted(at_s, drawn[:, 0], side="right") - 1
         drawn = drawn[(before < 0) | (is_over[before] == 0)]
-        more = drawn[:, 1] * np.interp(drawn[:, 0], at_s, coverable)
+        # Zones get as much of what they gain until the next status as is drawn of all cells.
+        now = np.searchsorted(at_s, drawn[:, 0], side="right").clip(1, len(at_s)) - 1
+        then = np.minimum(now + 1, len(at_s) - 1)
+        since = drawn[:, 1] * np.interp(drawn[:, 0], at_s, all_cells) - of_all[now]
+        gain = (covered[then] - covered[now]) / np.maximum(of_all[then] - of_all[now], 1.0)
+        is_zoned = (covered != of_all) | (coverable != all_cells)
+        more = covered[now] + since * np.where(is_zoned[now], gain.clip(0.0, 1.0), 1.0)
         points = np.vstack([np.column_stack((drawn[:, 0], more)), np.column_stack((at_s, covered))])
         points[:, 1] /= coverable[-1]
         found: NDArray[np.float64] = points[np.argsort(points[:, 0], kind="stable")]
         return found
+
+    @property
+    def cells(self) -> tuple[int, int] | None:
+        """The daemon's last count of covered and all reachable cells of the order; None without."""
+        counted = (cells_of(each.status) for each in reversed(self.data.statuses))
+        return next((cells for cells in counted if cells is not None), None)
 
     @property
     def complete(self) -> bool | None:
@@ -194,28 +225,44 @@ class Review:
     @property
     def rooms(self) -> tuple[RoomChapter, ...]:
         """The rooms, and what was done in each; none if no rooms were recorded."""
-        return room_chapters(self.data, self.states, self.floor)
+        return room_chapters(self.data, self.states, self.all_floor)
 
 
-def review_of(record: RunRecord, data: RunData, missing: int) -> Review:
+def review_of(
+    record: RunRecord, data: RunData, missing: int, others: Others = lambda *_: None
+) -> Review:
     """Return the review of a recording.
 
     Args:
         record: its content.
         data: of its samples.
         missing: number of samples lost in between.
+        others: called for a robot of a fleet.
     """
     end_s = _end_s(record, data)
     lattice, no_lattice = _lattice(data)
     states = spans_of(_mission_states(data, record), end_s)
     replans = Replans.of(data.paths)
+    floor = all_floor = swept_floor(data, lattice) if lattice else None
+    by_others = None
+    fleet = known_settings(data.config).fleet
+    if all_floor is not None and fleet.name:
+        turns = RecordedSamples((), record.batches, (TURNS.name,))
+        by_others = others(turns, fleet, all_floor.geometry)
+        if by_others is not None:
+            by_others &= all_floor.unswept
+            floor = all_floor = all_floor.only(~by_others)
+    if floor is not None and (zones := ordered_zones(data, chapters(data, states, end_s))):
+        floor = floor.only(labels_of(floor.geometry, zones) > 0)
     return Review(
         record=record,
         data=data,
         lattice=lattice,
         no_lattice=no_lattice,
         visits=visits_of(data, lattice) if lattice else None,
-        floor=swept_floor(data, lattice) if lattice else None,
+        floor=floor,
+        all_floor=all_floor,
+        by_others=by_others,
         replans=replans,
         states=states,
         recorder_states=spans_of(

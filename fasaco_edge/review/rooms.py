@@ -73,7 +73,7 @@ def room_chapters(
     geometry = floor.geometry if floor else data.grid.geometry if data.grid else None
     if not rooms or geometry is None:
         return ()
-    labels = _labels(geometry, [room.outline for room in rooms])
+    labels = labels_of(geometry, [room.outline for room in rooms])
     at = geometry.values_at(labels, data.track[:, :2])
     seconds = np.bincount(at[:-1], _work_s(data, states), len(rooms) + 1) if len(at) else None
     # Between rooms, in doors and beside furniture, it is in none.
@@ -108,7 +108,7 @@ def room_chapters(
     return tuple(sorted(found, key=lambda chapter: chapter.room))
 
 
-def _labels(geometry: GridGeometry, outlines: Sequence[Polygon]) -> NDArray[np.int16]:
+def labels_of(geometry: GridGeometry, outlines: Sequence[Polygon]) -> NDArray[np.int16]:
     """Return which room each pixel is in, from 1, int16 (rows, cols); later ones lie above."""
     whole = Window(0, 0, geometry.rows, geometry.cols)
     labels = np.zeros((geometry.rows, geometry.cols), np.int16)

@@ -31,10 +31,11 @@ from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLine, drawings
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.review.drive import nearest_points, swept_floor
 from fasaco_edge.review.run_data import maps_of
-from fasaco_edge.review.wording import clock
+from fasaco_edge.review.wording import SWEPT_BY_OTHERS
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.reasons import plain
 
@@ -54,8 +55,9 @@ class Spot(msgspec.Struct):
 
     Attributes:
         swept: whether the tool passed over it; None if unknown.
-        why: the reason in a word: swept, never seen, not floor, keep-out, too narrow, closed off,
-            not ordered, poses missing, still to come, seen late, missed, not worth it, not known.
+        why: the reason in a word: swept, swept by others, never seen, not floor, keep-out, too
+            narrow, closed off, not ordered, poses missing, still to come, seen late, missed, not
+            worth it, not known.
         words: the reason in full.
         missed_m: least distance of the tool's edge [m].
         nearest_s: when the robot came nearest [s since the recording began].
@@ -158,7 +160,7 @@ class _Judge:
         return Spot(round(self._x, 3), round(self._y, 3), swept, why, words)
 
     def spot(self) -> Spot:
-        grid, floor, footprint = self._data.grid, self._review.floor, self._data.footprint
+        grid, floor, footprint = self._data.grid, self._review.all_floor, self._data.footprint
         if grid is None or footprint is None:
             why = self._review.no_lattice or "there is no map"
             return self._spot("not known", why, swept=None)
@@ -168,6 +170,9 @@ class _Judge:
         if floor is None:
             words = "floor was swept before the recording began, or no pose lies on the map"
             return self._spot("not known", words, swept=None)
+        others = self._review.by_others
+        if others is not None and self._is_in(others, floor.geometry):
+            return self._spot(SWEPT_BY_OTHERS, "swept by others of its fleet")
         if not self._is_in(floor.reachable, floor.geometry):
             return self._out_of_reach(grid, footprint)
         return self._within_reach(floor)

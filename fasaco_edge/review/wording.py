@@ -1,15 +1,9 @@
-"""The wording of times and amounts in a review."""
+"""The wording of amounts in a review."""
 
 from __future__ import annotations
 
 NOT_KNOWN = "not known"
-
-
-def clock(seconds: float) -> str:
-    """Return a time as minutes and seconds, or with hours."""
-    minutes, rest = divmod(round(seconds, 1), 60)
-    hours, minutes = divmod(int(minutes), 60)
-    return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
+SWEPT_BY_OTHERS = "swept by others"
 
 
 def amount(value: float | None, unit: str) -> str:

@@ -28,9 +28,16 @@ class Blocks:
         self._kept: dict[str, tuple[object, list[str]]] = {}
 
     def block(self, shown: RenderableType, width: int, height: int) -> list[str]:
-        """Return a renderable of rich as lines and columns of a given number."""
+        """Return a renderable of rich as lines and columns of a given number.
+
+        The last line says how many there is no room for.
+        """
         options = self._console.options.update(width=width, height=None)
-        lines = self._console.render_lines(shown, options, pad=True)[:height]
+        lines = self._console.render_lines(shown, options, pad=True)
+        if len(lines) > height > 1:
+            more = Text(f"{len(lines) - height + 1} more rows: a taller terminal", FAINT)
+            lines[height - 1 :] = self._console.render_lines(more, options, pad=True)
+        lines = lines[:height]
         drawn = [self.glyphs.drawn(line) for line in lines]
         return drawn + [" " * width] * (height - len(drawn))
 

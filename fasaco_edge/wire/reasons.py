@@ -11,6 +11,8 @@ WORDS = {
     "better further on": "a better path found for floor further ahead",
     "line polished": "the line ahead improved",
 }
+# The recorder's word for a daemon that sends nothing.
+SILENT = "the planner is silent"
 # A mission's ending has it, too; where the swept floor is shown in full, ``possible`` says it.
 _POSSIBLE = re.compile(r", or of [\d.]+ m2 if walls are a pixel thinner than on the map")
 
@@ -23,6 +25,7 @@ def plain(text: str) -> str:
     """Return a text with the reasons in it in plain words."""
     for reason, words in WORDS.items():
         text = text.replace(reason, words)
+    text = text.replace(SILENT, "no status came from the daemon")
     text = _ALL_COVERED.sub(r"the tool has passed the centre of every cell\1 that it reaches", text)
     return _POSSIBLE.sub("", text)
 

@@ -25,6 +25,8 @@ from fasaco_edge.mission.map.room_watch import update
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, inflated_sample, read_turns
 from fasaco_edge.replay.replay import read_run
+from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.turns import EarlySample, decode_turns
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
@@ -250,8 +252,14 @@ def test_the_command_says_that_it_is_equal(recording, capsys):
     assert main(words) == 0
     assert "equal bit for bit" in capsys.readouterr().out
     assert main([*words, "--json"]) == 0
-    summary = json.loads(capsys.readouterr().out)["summary"]
+    told = json.loads(capsys.readouterr().out)
+    summary = told["summary"]
     assert summary["equal"] is True
+    # Its times are those of the review.
+    at_s = {one["path"]["revision"]: one["at_s"] for one in told["decisions"] if "path" in one}
+    replans = document_of(read_review(recording.paths)).replan_list
+    assert len(replans) > 2
+    assert [at_s[one["revision"]] for one in replans] == [one["at_s"] for one in replans]
     assert summary["turns_equal"] == summary["turns"]
     assert summary["paths_as_recorded"] == summary["paths_recorded"] == summary["paths"]
     assert main([*words, "--work", "0", "--json"]) == 0

@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.cli.review.screen import curve
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.robot_clock import RobotClock
+from fasaco_edge.recording.read.robot_clock import RobotClock, clock
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.moments import (
     faults_of,
@@ -17,7 +17,6 @@ from fasaco_edge.review.moments import (
 )
 from fasaco_edge.review.review import review_of
 from fasaco_edge.review.run_data import RunData, StatusSample
-from fasaco_edge.review.wording import clock
 from fasaco_edge.wire.documents.replies import CoverageReport
 from fasaco_edge.wire.documents.status import Status
 

@@ -15,10 +15,10 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import MapSize, ReviewDocument
 from fasaco_edge.review.moments import spans_of
-from fasaco_edge.review.orders import OrderChapter, chapters
-from fasaco_edge.review.output.rows import verdicts
+from fasaco_edge.review.orders import OrderChapter, chapters, order_words
+from fasaco_edge.review.output.verdicts import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
-from fasaco_edge.wire.documents.replies import CoverageReport
+from fasaco_edge.wire.documents.replies import CoverageReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.status import Status
 
 ALL = read_order({})
@@ -62,7 +62,7 @@ def test_three_orders_have_three_verdicts():
     document = ReviewDocument(complete=False, orders=list(orders))
     assert [text for _, text in verdicts(document)] == [
         "order 1, begun by itself, 0:00.0 to 0:30.0: complete, 60 of 60 cells",
-        "order 2, ordered, 0:30.0 to 0:50.0: not complete: covering when another order came, "
+        "order 2 of k, ordered, 0:30.0 to 0:50.0: not complete: covering when another order came, "
         "9 of 20 cells",
         "order 3, ordered, 0:50.0 to 1:40.0: not complete: done at the end of the recording, "
         "52 of 56 cells",
@@ -74,6 +74,38 @@ def test_a_complete_mission_says_how_much_floor_it_swept():
     document = ReviewDocument(complete=True, swept_m2=47.7, reachable_m2=49.4)
     words = "complete: every cell covered; 47.7 of 49.4 m2 (96.6 %) of floor swept"
     assert verdicts(document) == [(True, words)]
+
+
+def test_an_order_of_zones_is_judged_by_these():
+    (order,) = restarted(MissionReport("command", zones=(ZoneReport("kitchen", 2, 1, 9, 9),)))
+    assert (order.ordered, order.complete) == ("command", True)
+    assert (order.covered_cells, order.coverable_cells) == (9, 9)
+    assert order_words(order.order) == "zone kitchen 2 times"
+    document = ReviewDocument(complete=True, orders=[order], swept_m2=4.7, reachable_m2=4.9)
+    words = "complete: every cell of kitchen covered; 4.7 of 4.9 m2 (95.9 %) of its floor swept"
+    assert verdicts(document) == [(True, words)]
+
+
+@pytest.mark.parametrize("ordered", ["command", "itself", None])
+def test_an_order_from_before_a_restart_is_still_the_one_who_gave_it(ordered):
+    (order,) = restarted(MissionReport(ordered))
+    assert (order.ordered, order.order) == (ordered or "itself", None)
+
+
+def test_a_robot_that_waited_for_its_first_order_had_none_before():
+    waits, works = MissionReport(), MissionReport("command")
+    orders = restarted(waits, works, states=("idle", "done"), commands=[(50, "start", KITCHEN)])
+    assert [order.at_s for order in orders] == [50]
+
+
+def restarted(*missions, states=("done",), commands=()):
+    """Return the chapters of a recording with a status of each mission, of 5 in 60 cells."""
+    statuses = [
+        StatusSample(at_s, Status(state=state, mission=mission, coverage=CoverageReport(60, 5)))
+        for at_s, state, mission in zip((0.0, 60.0), states, missions, strict=False)
+    ]
+    spans = spans_of([(each.at_s, each.status.state, "") for each in statuses], 100.0)
+    return chapters(RunData(statuses=statuses, commands=list(commands)), spans, 100.0)
 
 
 def test_a_mission_that_is_done_with_cells_left_says_how_many():

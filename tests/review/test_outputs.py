@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -15,8 +17,11 @@ from PIL import Image
 pytest.importorskip("rerun")
 
 from pyarrow import parquet
+from rich.console import Console
+from rich.text import Text
 
 from fasaco_edge.cli import main
+from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.review.screen import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
@@ -28,6 +33,7 @@ from fasaco_edge.review.output.pictures import draw_review
 from fasaco_edge.review.output.rows import charge_rows, screen_rows
 from fasaco_edge.review.review import read_review, review_of
 from fasaco_edge.review.run_data import StatusSample
+from fasaco_edge.review.spot import explain
 from fasaco_edge.wire.documents.replies import CoverageReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.status import BatteryReport, LedgerReport, Status
 from tests.review.test_parts import run_told
@@ -64,6 +70,46 @@ def test_a_line_over_the_floor_is_drawn_by_what_it_sweeps(review):
     colours = {colour for _, colour in draw_review([line]).getcolors(maxcolors=1 << 20)}
     assert {palette.COVERED, palette.UNSWEPT} <= colours
     assert not {palette.LEFT_OUT, *palette.RECOVERED} & colours
+
+
+def test_floor_that_others_of_its_fleet_swept_is_not_left(review):
+    left = review.floor.unswept
+    fleet = replace(review.data, config={**review.data.config, "fleet": {"name": "house"}})
+    half = left & (np.arange(left.shape[1]) < left.shape[1] // 2)
+    shared = review_of(review.record, fleet, 0, lambda *_: half.copy())
+    told, pixel_m2 = document_of(shared), review.floor.geometry.resolution**2
+    assert told.swept_by_others_m2 == pytest.approx(half.sum() * pixel_m2, abs=0.01)
+    assert told.reachable_m2 == pytest.approx(
+        document_of(review).reachable_m2 - told.swept_by_others_m2, abs=0.01
+    )
+    assert (shared.floor.unswept == left & ~half).all()
+    row, col = np.argwhere(half)[len(np.argwhere(half)) // 2].tolist()
+    (spot,) = explain(shared, [review.floor.geometry.to_map(col + 0.5, row + 0.5)])
+    assert (spot.why, spot.swept) == ("swept by others", False)
+    assert "more swept by other robots" in dict(screen_rows(shared, told))["by others"]
+    colours = {colour for _, colour in draw_review([shared]).getcolors(maxcolors=1 << 20)}
+    assert {palette.BY_OTHERS, palette.UNSWEPT} <= colours
+    # An older recording does not say where.
+    unknown = review_of(review.record, fleet, 0)
+    assert document_of(unknown).not_recorded["swept_by_others_m2"]
+    assert "counts as left" in dict(screen_rows(unknown, document_of(unknown)))["by others"]
+
+
+@pytest.mark.parametrize(("height", "fits"), [(60, True), (14, False)])
+def test_on_a_low_terminal_it_says_how_many_rows_are_left_out(review, monkeypatch, height, fits):
+    shown = io.StringIO()
+    console = Console(file=shown, force_terminal=True, width=80, height=height)
+    monkeypatch.setattr(terminal, "out", lambda: console)
+    print_review(review, document_of(review), full=False)
+    lines = shown.getvalue().splitlines()
+    # The prompt takes the last line.
+    assert len(lines) < height
+    found = re.match(r"(\d+) more rows?: --long", Text.from_ansi(lines[-1]).plain)
+    assert (found is None) == fits
+    names = [name for name, _ in screen_rows(review, document_of(review))]
+    told = [Text.from_ansi(line).plain.split("  ")[0] for line in lines]
+    missing = [name for name in names if name not in told]
+    assert missing == names[len(names) - (int(found[1]) if found else 0) :]
 
 
 def test_without_a_map_there_is_no_picture(review):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import time
 
@@ -15,8 +16,10 @@ from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.recording.read.frames import recording_id
 from fasaco_edge.review.comparison import side_by_side
 from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -172,7 +175,10 @@ def test_troubles_and_faults_are_told(parts):
     review = read_review(parts)
     told = document(review)
     # On a slow computer the planner is heard late, too.
+    row = dict(screen_rows(read_review(parts), document_of(read_review(parts))))["troubles"]
+    assert "degraded" not in row
     troubles = [one for one in told["troubles"] if one["state"] != "silent"]
+    assert troubles[0]["reason"] in row
     assert [(one["state"], one["reason"]) for one in troubles] == [
         ("degraded", "no pose for 3 s"),
         ("paused", "the dock gives no current"),
@@ -207,11 +213,16 @@ def test_of_a_killed_recorder_all_is_told(tmp_path, parts):
     assert told["faults_by_code"]["wrong_frame"] == 2
 
 
-def test_parts_of_different_runs_are_refused(parts, other, capsys):
+def test_of_several_runs_the_newest_is_told(parts, other, capsys):
+    """As of ``review recordings/*.rrd`` in the guide."""
     with pytest.raises(DifferentRuns, match="parts of different runs"):
         read_review([parts[0], other[0]])
-    assert main(["review", str(parts[0]), str(other[0])]) == 1
-    assert "--against" in capsys.readouterr().err
+    earlier, newest = sorted(map(recording_id, (parts[0], other[0])))
+    assert main(["review", *map(str, (*parts, *other)), "--json"]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out)["recording"] == newest
+    assert f"2 runs: this is the newest, {newest}; of another one" in told.err
+    assert f"as {earlier}-*.rrd" in told.err
 
 
 def test_two_runs_side_by_side(parts, other, tmp_path, capsys):

@@ -17,15 +17,16 @@ pytest.importorskip("rerun")
 from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.instant import direction, heading_from, scene_at
+from fasaco_edge.review.instant import scene_at
 from fasaco_edge.review.output.answer_rows import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, spots_left
-from fasaco_edge.review.wording import clock
+from fasaco_edge.review.turn import direction, heading_from
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import FloorReport
@@ -109,6 +110,16 @@ def parts(tmp_path_factory):
 @pytest.fixture(scope="module")
 def review(parts):
     return read_review(parts)
+
+
+def test_floor_that_was_not_ordered_is_not_left(review):
+    """The standing zone ends at y = 2.3 m, the room at 3 m."""
+    free = (0.4, 2.6)
+    assert review.all_floor.geometry.values_at(review.all_floor.unswept, np.array([free]))[0]
+    assert not review.floor.geometry.values_at(review.floor.unswept, np.array([free]))[0]
+    assert (
+        " of a, by recorded poses" in dict(screen_rows(review, document_of(review)))["floor swept"]
+    )
 
 
 def turned_s(review):
@@ -200,7 +211,8 @@ def test_floor_of_a_time_without_poses_is_not_called_missed(review):
     data = review.data
     kept = [i for i, (x, *_) in enumerate(data.poses) if not 0.5 < x < 1.3]
     some = replace(data, poses=[data.poses[i] for i in kept], pose_s=[data.pose_s[i] for i in kept])
-    lost = replace(review, data=some, floor=swept_floor(some, review.lattice))
+    floor = swept_floor(some, review.lattice)
+    lost = replace(review, data=some, floor=floor, all_floor=floor)
     (spot,) = explain(lost, [(0.9, Y)])
     assert (spot.why, spot.swept) == ("poses missing", None)
     first, end = (

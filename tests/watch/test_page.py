@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import json
 
 import numpy as np
 import pytest
 from rich.cells import cell_len
 from rich.color import ColorSystem
+from rich.console import Console
+from rich.text import Text
 
 from fasaco_edge.client.robot_state import Token
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
+from fasaco_edge.watch.blocks import Blocks
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
@@ -290,3 +294,10 @@ def test_no_number_that_a_status_may_have_ends_the_page(size):
     for payload in extreme_statuses():
         tell(view, "status", payload)
         assert len(page_of(view, *size).split("\n")) == size[1]
+
+
+def test_a_block_says_how_many_rows_have_no_place():
+    blocks = Blocks(Console(file=io.StringIO(), width=40))
+    lines = [line.strip() for line in blocks.block(Text("a\nb\nc\nd"), 40, 3)]
+    assert lines == ["a", "b", "2 more rows: a taller terminal"]
+    assert [line.strip() for line in blocks.block(Text("a\nb"), 40, 3)] == ["a", "b", ""]

@@ -20,6 +20,26 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.map_files import find_map
 from fasaco_edge.host.files import make_own_folder
 
+EPILOG = """\
+summary.json and --json hold:
+  map, complete    the building; whether every reachable cell was covered
+  reachable_cells, covered_cells
+                   as the daemon counts them, of several the one with the most left
+  reachable_m2, swept_m2
+                   floor, by the true building and the true tracks of all robots
+  swept_twice_m2   floor that two or more robots swept, driving through included, by the same
+                   count; `review` of the fleet counts cells, and tells driving through apart
+  driven_m         by all robots; robots: of each name, driven_m, drive_s (driving and
+                   turning), swept_m2
+  plans, paths, errors
+                   of all daemons: plans, published paths, refused messages
+  wall_s, makespan_s
+                   seconds of this computer; of the robots, from the first robot's start of
+                   work to the last one's end
+  recording, fleet_recording, picture
+                   the files
+"""
+
 RUNS = Path("runs")
 MOST_IN_DEMO = 8
 SPEED, FLEET_SPEED = 20.0, 5.0
@@ -116,4 +136,5 @@ COMMAND = Command(
     "toggles the pheromone trail, q or Ctrl-C quits.",
     run=run,
     add_options=_add_options,
+    epilog=EPILOG,
 )

@@ -228,8 +228,9 @@ def _draw(args: argparse.Namespace, truth: _Truth, summary: Summary) -> None:
         names = [robot.name for robot in summary.robots]
         tracks = dict(zip(names, truth.trails, strict=True))
         title += f" by {len(names)} robots"
+        recording = [Path(file) for file in summary.fleet_recording]
         picture = draw_fleet_mission(
-            truth.grid, lattice, tracks, swept, unswept, title=title, lines=lines
+            truth.grid, lattice, tracks, swept, unswept, recording, title=title, lines=lines
         )
     else:
         picture = draw_mission(

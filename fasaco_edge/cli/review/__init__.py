@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,15 +24,19 @@ from fasaco_edge.review.document import explanations
 if TYPE_CHECKING:
     from PIL import Image
 
+    from fasaco_edge.bus.arrival import Arrival
+    from fasaco_edge.grid.geometry import GridGeometry
+    from fasaco_edge.judge.pixels import Mask
     from fasaco_edge.review.review import Review
+    from fasaco_edge.wire.documents.settings import FleetSettings
 
 DESCRIPTION = """\
 Report what happened in a recorded mission, on one screen; with --long all figures, orders,
 commands, replans, floor left and why, and faults. With --at and --point it answers a
 question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
 balance, floor swept again or only driven through, waiting and messages; such a recording takes
---json and --png only. Parts of one run are read together. Files are only read; of files that a
-crash cut short, the whole part is used.
+--json and --png only. Parts of one run are read together; of several runs the newest. Files are
+only read; of files that a crash cut short, the whole part is used.
 """
 
 
@@ -73,7 +77,11 @@ def _time(text: str) -> float:
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "recordings", nargs="+", type=Path, metavar="FILE.rrd", help="the parts of one run"
+        "recordings",
+        nargs="+",
+        type=Path,
+        metavar="FILE.rrd",
+        help="the parts of one run; of several runs of a robot it takes the newest",
     )
     parser.add_argument(
         "--against",
@@ -132,7 +140,12 @@ def run(args: argparse.Namespace) -> int:
     for file in recordings:
         with open_part(file):  # reports a file that is no recording before loading the rest
             pass
+    from fasaco_edge.cli.console.recordings import files_of_a_run
     from fasaco_edge.recording.read.frames import is_fleet_recording
+
+    args.recordings = files_of_a_run(args.recordings)
+    if args.against:
+        args.against = files_of_a_run(args.against)
 
     if is_fleet_recording(args.recordings[0]):
         from fasaco_edge.cli.fleet_wing import print_fleet
@@ -177,11 +190,11 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
     """Answer questions about a moment, and about spots."""
     import msgspec
 
+    from fasaco_edge.recording.read.robot_clock import clock
     from fasaco_edge.review.instant import scene_at
     from fasaco_edge.review.output import answer_rows
     from fasaco_edge.review.output.pictures import draw_scene, draw_spots
     from fasaco_edge.review.spot import explain
-    from fasaco_edge.review.wording import clock
 
     if args.at is not None and args.at > review.duration_s:
         raise BadConfiguration(
@@ -228,7 +241,15 @@ def _read(paths: Sequence[Path], name: str) -> Review:
         def tell(what: str, done: int, total: int) -> None:
             bar.update(task, description=f"{name}: {what}", completed=done, total=total)
 
-        return read_review(paths, tell)
+        return read_review(paths, tell, _by_others)
+
+
+def _by_others(
+    turns: Iterable[Arrival], fleet: FleetSettings, geometry: GridGeometry
+) -> Mask | None:
+    from fasaco_edge.cli.fleet_wing import swept_by_others
+
+    return swept_by_others(turns, fleet, geometry)
 
 
 def _epilog() -> str:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.cli.console import terminal
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import (
     compared_rows,
     reason_counts,
@@ -20,8 +21,8 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
+from fasaco_edge.review.output.verdicts import verdicts
 from fasaco_edge.review.spot import spots_left
-from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
@@ -36,22 +37,26 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     """Print a review and its document: in ``full``, or as much as fits on a screen."""
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
-    verdicts = rows.verdicts(document)
-    for complete, text in verdicts if full else verdicts[:MOST_VERDICTS]:
+    every = verdicts(document)
+    shown_verdicts = every if full else every[:MOST_VERDICTS]
+    for complete, text in shown_verdicts:
         verdict = Text(one_line(text), colours[complete])
         if full:
             console.print(f"{document.recording}:", verdict, style="bold", soft_wrap=True)
         else:
             console.print(verdict)
-    if not full and len(verdicts) > MOST_VERDICTS:
-        console.print(f"and {len(verdicts) - MOST_VERDICTS} more orders")
+    if len(every) > len(shown_verdicts):
+        console.print(f"and {len(every) - MOST_VERDICTS} more orders")
     _print_curve(console, review, PLOT_HEIGHT if full else SCREEN_PLOT_HEIGHT)
     found = rows.screen_rows(review, document)
-    console.print(terminal.summary([*found, *rows.card_rows(document)] if full else found))
     if not full:
-        hint = "more: --long; a moment: --at MM:SS; a spot: --point X,Y; a browser: serve FILE"
-        console.print(hint)
+        shown = _fitting(console, found, [text for _, text in shown_verdicts])
+        console.print(terminal.summary(shown))
+        left_out = len(found) - len(shown)
+        more = f"{left_out} more row{'s' * (left_out != 1)}" if left_out else "more"
+        console.print(f"{more}: --long; a moment: --at MM:SS; a spot: --point X,Y; page: serve")
         return
+    console.print(terminal.summary([*found, *rows.card_rows(document)]))
     console.print(terminal.figures(rows.figure_rows(document)))
     _print_table(console, "Orders", rows.ORDERS, rows.order_rows(document))
     _print_table(console, "Rooms", rows.ROOMS, rows.room_rows(document, review))
@@ -67,6 +72,22 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
     _print_table(console, "Charges", rows.CHARGES, rows.charge_rows(document))
     _print_table(console, "Refused messages", ("code", "messages"), rows.fault_rows(document))
     _print_remarks(console, document)
+
+
+def _fitting(
+    console: Console, found: list[tuple[str, str]], above: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Return the first rows, which matter most: as many as a terminal shows with all the rest."""
+
+    def height(shown: RenderableType) -> int:
+        return len(console.render_lines(shown))
+
+    # Title and times of the curve; the last line, and that of the prompt.
+    room = console.height - sum(map(height, above)) - (2 + SCREEN_PLOT_HEIGHT) - 2
+    shown = list(found)
+    while console.is_terminal and len(shown) > 1 and height(terminal.summary(shown)) > room:
+        shown.pop()
+    return shown
 
 
 def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:

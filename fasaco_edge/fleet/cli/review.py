@@ -13,12 +13,12 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.fleet.review.report import FleetFigures, review_fleet
-from fasaco_edge.review.wording import clock
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.text import one_line
 
 ONE_ROBOT = ("long", "at", "point", "against", "export")
 HEADER = (
-    "robot", "state", "busy", "waited", "swept m2", "through", "again", "driven m", "kB/s",
+    "robot", "state", "busy", "waited", "swept", "through", "again", "driven m", "kB/s",
     "plan ms",
 )  # fmt: skip
 
@@ -102,7 +102,8 @@ def _print(figures: FleetFigures) -> None:
         )
     console.print(table)
     console.print(
-        "through, again: m2 that another had swept. kB/s: messages to the fleet (most over 5 s). "
+        "swept [m2]; through, again: of these, what another had swept. kB/s: messages to the fleet "
+        "(most over 5 s). "
         "plan ms: median, 99 %, by the recorder's clock.",
         style="dim",
     )

@@ -246,10 +246,22 @@ def read_notes(paths: Sequence[Path]) -> list[NoteBatch]:
     batches = [batch for path in sorted(set(paths)) for batch in _batches(path)]
     if not batches:
         names = ", ".join(str(path) for path in paths)
-        raise UnreadableRecording(f"{names}: holds no notes of a fleet", hint=HINT)
+        raise UnreadableRecording(
+            f"{names}: holds no notes of a fleet",
+            hint="no robot came while it was recorded: check the fleet's name, and the endpoint",
+        )
     if len({batch.run for batch in batches}) > 1:
         raise DifferentRuns(f"parts of different runs: {', '.join(map(str, paths))}")
     return sorted(batches, key=lambda batch: batch.notes[0].at_ms if batch.notes else 0)
+
+
+def numbers_of(paths: Sequence[Path]) -> dict[str, int]:
+    """Return the number of each robot in a recording, which is that of its colour; as above."""
+    return {
+        robot.name: number
+        for batch in read_notes(paths)
+        for number, robot in enumerate(batch.robots)
+    }
 
 
 def _batches(path: Path) -> Iterator[NoteBatch]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +15,14 @@ from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import draw_line, draw_unswept, in_pieces
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
+from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.fleet.observer.cells import Cells, mask_of, together, window_of
+from fasaco_edge.fleet.recording.notes import numbers_of
 from fasaco_edge.fleet.review.report import FleetReview
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.wording import clock
+from fasaco_edge.recording.read.robot_clock import clock
 
 # Opacity of the colour of a robot's cells; cells that two robots pass have none.
 TINT = 0.35
@@ -68,6 +72,7 @@ def draw_fleet_mission(
     trails: Mapping[str, NDArray[np.float64]],
     swept: Sequence[MapLayer],
     unswept: MapLayer,
+    recording: Sequence[Path],
     *,
     title: str,
     lines: Sequence[str],
@@ -80,6 +85,7 @@ def draw_fleet_mission(
         trails: of each robot by its name, float64 (n, 2), n >= 1: places (x, y) [m], in order.
         swept: reachable floor that each swept, in the same order, all on one raster.
         unswept: reachable floor that none has swept.
+        recording: files of the fleet's: robots have their colours in it, if it has notes of them.
         title: heading.
         lines: caption below it.
     """
@@ -89,7 +95,11 @@ def draw_fleet_mission(
     plot.ground(grid)
     key = [KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end")]
     times = np.zeros(unswept.mask.shape, np.int8)
-    for number, (name, layer) in enumerate(zip(trails, swept, strict=True)):
+    numbers = {name: number for number, name in enumerate(trails)}
+    with suppress(UnreadableRecording):
+        numbers |= numbers_of(recording)
+    for name, layer in zip(trails, swept, strict=True):
+        number = numbers[name]
         plot.paint(layer, robot_tint(number))
         times += layer.mask
         key.append(
@@ -99,8 +109,8 @@ def draw_fleet_mission(
     plot.paint(twice, palette.RULE)
     key.append(KeyEntry("tile", palette.RULE, f"by two or more ({twice.area_m2:,.1f} m2)"))
     key += draw_unswept(plot, unswept)
-    for number, trail in enumerate(trails.values()):
-        plot.line(trail, _track_colour(number), TRACK_PX)
+    for name, trail in trails.items():
+        plot.line(trail, _track_colour(numbers[name]), TRACK_PX)
         plot.end_mark(trail[-1])
         plot.start_mark(trail[0])
     return Sheet(title, lines, key, None, plot.view.scale).around(plot.finished())

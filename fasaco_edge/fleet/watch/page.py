@@ -90,8 +90,6 @@ class FleetPage:
         # The table takes the line of the legend.
         room = min(layout.lines + 1, height - 1)
         totals = total_rows(view.floor, view.unheard(now), width, blocks.glyphs)
-        if len(robots) + 2 + len(totals) > room:
-            totals = []
         shown = Group(robot_table(robots, width), "", *totals) if robots else Text("")
         page += blocks.block(shown, width, room)
         if layout.entries:

@@ -232,6 +232,17 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
     raise ValueError("a number of more than ten bytes")
 
 
+def recording_id(path: Path) -> str:
+    """Return the id of the run that a file is a part of; "" if it has no whole frame.
+
+    Raises:
+        UnreadableRecording: it is missing, or is no recording.
+    """
+    with open_part(path) as (recording, scan):
+        found = (chunk.recording_id for chunk in chunks(recording, scan) if chunk is not None)
+        return next(found, "")
+
+
 def is_fleet_recording(path: Path) -> bool:
     """Return whether a file is a fleet's recording, by its first frames.
 

@@ -99,6 +99,13 @@ class RobotClock:
         return self.began_ns + round(1e9 * float(recorder_s))
 
 
+def clock(seconds: float) -> str:
+    """Return a time of a recording as minutes and seconds, or with hours."""
+    minutes, rest = divmod(round(seconds, 1), 60)
+    hours, minutes = divmod(int(minutes), 60)
+    return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
+
+
 def _settings(arrival: Arrival) -> KnownSettings | None:
     with suppress(FasacoError):
         if config := decode_tolerant(arrival.sample.payload, Status).config:

@@ -7,7 +7,7 @@ Pictures are skipped chunk by chunk, so that memory does not grow with them.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,7 +18,14 @@ from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.frames import Chunk, chunks, column, wall_ns
+from fasaco_edge.recording.read.frames import (
+    Chunk,
+    chunks,
+    column,
+    is_fleet_recording,
+    recording_id,
+    wall_ns,
+)
 from fasaco_edge.recording.read.repair import HINT, open_part
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.samples import Place, SampleDecoder, place_of
@@ -104,12 +111,25 @@ def _batches_of(chunk: Chunk, path: Path) -> list[Batch]:
     return [Batch(place_of(body), body, path) for body in bodies]
 
 
-def _no_samples(paths: Iterable[Path]) -> UnreadableRecording:
+def _no_samples(paths: Sequence[Path]) -> UnreadableRecording:
     """Return the error of files that hold no samples."""
     files = ", ".join(str(path) for path in paths)
-    return UnreadableRecording(
-        f"{files}: holds no samples", hint="recordings of this release and later ones do"
-    )
+    if any(map(is_fleet_recording, paths)):
+        return UnreadableRecording(
+            f"{files}: this is the recording of a fleet",
+            hint="name the recording of one of its robots",
+        )
+    hint = "no message came while it was recorded: check the robot's name, and the endpoint"
+    if any(_is_drawn(path) for path in paths):
+        hint = "recordings of this release and later ones do"
+    return UnreadableRecording(f"{files}: holds no samples", hint=hint)
+
+
+def _is_drawn(path: Path) -> bool:
+    """Return whether a file has a robot or a map: a daemon was recorded."""
+    with open_part(path) as (recording, scan):
+        found = (chunk.entity for chunk in chunks(recording, scan) if chunk is not None)
+        return any(entity in (entities.MAP, entities.ROBOT) for entity in found)
 
 
 def _batches(path: Path) -> list[Batch]:
@@ -202,6 +222,16 @@ def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRe
     return reader.record()
 
 
+def read_clock(paths: Sequence[Path]) -> RobotClock:
+    """Return the clock of the parts of a run, as that of its ``RunRecord``; raises as above.
+
+    Of several runs it is that of the first.
+    """
+    ids = {path: recording_id(path) for path in paths}
+    first = min(filter(None, ids.values()), default="")
+    return read_run_record([path for path in paths if ids[path] == first], lambda: None).clock
+
+
 @dataclass(slots=True)
 class _RunReader:
     """Collects the content of the parts."""
@@ -254,7 +284,7 @@ class _RunReader:
                 + ", ".join(f"{path} of {name}" for name, path in sorted(self.ids.items()))
             )
         if not self.batches:
-            raise _no_samples(part.path for part in self.parts)
+            raise _no_samples([part.path for part in self.parts])
         began = min(self.span, default=0)
         for rows in self.rows.values():
             rows.sort(key=lambda row: row[0])

@@ -1,21 +1,25 @@
-"""Drawings of paths and of the driven path in a recording."""
+"""Drawings of paths, of the driven path, and of zones, keep-outs and rooms in a recording."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from msgspec.structs import astuple
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Bounds
+from fasaco_edge.grid.geometry import Bounds, Polygon, Pose2D
+from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, MissionOrder
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
-from fasaco_edge.recording.scene.layers import Layers
+from fasaco_edge.recording.scene.layers import Anchor, Layers
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
+from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.reasons import plain
 
@@ -181,3 +185,75 @@ class DrivenPathDrawing:
         self._writer.log(entities.DRIVEN_PATH, piece)
         # The next piece begins where this one ends.
         self._piece = self._piece[-1:]
+
+
+Named = tuple[str, Polygon | None]
+
+
+class AreaDrawing:
+    """Outlines the rooms, the zones of the order, its keep-outs and the operator's.
+
+    Args:
+        writer: what to draw with.
+        layers: that limit the rate of the rooms.
+        anchored: returns the origin of drawings, for a first place.
+    """
+
+    def __init__(
+        self, writer: RecordingWriter, layers: Layers, anchored: Callable[[Pose2D], Anchor]
+    ) -> None:
+        self._writer, self._layers, self._anchored = writer, layers, anchored
+        # The order, by the last command, and the operator's keep-outs, by the last status.
+        self._order = EVERYTHING_ONCE
+        self._kept_out: list[Named] = []
+        self._zones: list[Named] = []
+        self._rooms: Sequence[Named] = ()
+
+    def begin(self, order: MissionOrder) -> None:
+        """Draw the zones of a new order."""
+        self._order, self._zones = order, []
+        self._draw()
+
+    def add_report(self, report: MissionReport) -> None:
+        """Draw zones and keep-outs, if they have changed."""
+        kept_out: list[Named] = [
+            (f"keep out: {keep_out.name}", keep_out.polygon)
+            for keep_out in report.keep_outs
+            if keep_out.by == "operator"
+        ]
+        zones: list[Named] = [(zone.name, zone.polygon) for zone in report.zones if zone.polygon]
+        if (kept_out, zones) != (self._kept_out, self._zones):
+            self._kept_out, self._zones = kept_out, zones
+            self._draw()
+
+    def add_rooms(self, named: Sequence[Named]) -> None:
+        """Draw the rooms, if they have changed."""
+        if named == self._rooms:
+            return
+        self._rooms = named
+
+        def draw_rooms() -> None:
+            self._writer.log(entities.ROOMS, self._polygons(draw.ROOM, named), latched=True)
+
+        points = sum(len(outline or ()) for _, outline in named)
+        size = 2 * POINT_BYTES * points
+        self._layers.draw(entities.ROOMS, size, draw_rooms, self._writer.wall_ns)
+
+    def _draw(self) -> None:
+        order = self._order
+        # An order may name a standing zone or a room in place of a polygon.
+        zones = self._zones or [(zone.name, zone.polygon) for zone in order.zones]
+        keep_out = [*(("keep out", polygon) for polygon in order.keep_out), *self._kept_out]
+        for entity, style, polygons in (
+            (entities.ZONES, draw.ZONE, zones),
+            (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
+        ):
+            self._writer.log(entity, self._polygons(style, polygons), latched=True)
+
+    def _polygons(self, style: draw.LineStyle, polygons: Sequence[Named]) -> rr.LineStrips3D:
+        placed = [
+            (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
+            for name, corners in polygons
+            if corners
+        ]
+        return draw.polygons_archetype(placed, style)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import PatchWithoutBase
-from fasaco_edge.grid.geometry import Bounds, Polygon, Pose2D, StampedPose, union_bounds
+from fasaco_edge.grid.geometry import Bounds, Pose2D, StampedPose, union_bounds
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, known_bounds
-from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, Command
+from fasaco_edge.mission.orders.order import Command
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
@@ -23,7 +23,7 @@ from fasaco_edge.recording.scene.curves import (
     Curves,
     StatusFigures,
 )
-from fasaco_edge.recording.scene.drawings import POINT_BYTES, DrivenPathDrawing, PathDrawing
+from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.flows import flows_of
 from fasaco_edge.recording.scene.layers import (
     Anchor,
@@ -34,7 +34,6 @@ from fasaco_edge.recording.scene.layers import (
 from fasaco_edge.recording.scene.runcard import UNDER_WAY, Outcome, RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
@@ -64,11 +63,6 @@ class Scene:
         self._errors = self._restored = 0
         self._robot: Pose2D | None = None
         self._states: dict[str, str] = {}
-        # The order, by the last command, and the operator's keep-outs, by the last status.
-        self._order = EVERYTHING_ONCE
-        self._kept_out: list[tuple[str, Polygon]] = []
-        self._zones: list[tuple[str, Polygon]] = []
-        self._rooms: list[tuple[str, Polygon]] = []
         self._troubles: set[str] = set()
         # What was drawn last of the grids that a daemon publishes again unchanged.
         self._drawn: dict[str, object] = {}
@@ -78,6 +72,7 @@ class Scene:
         self._driven = DrivenPathDrawing(writer)
         self._figures = StatusFigures(self._curves)
         self._paths = PathDrawing(writer, self._layers)
+        self._areas = AreaDrawing(writer, self._layers, self._anchored)
         log_styles(writer)
         self._describe()
         self._draw_robot(DEFAULT_RADIUS_M)
@@ -128,43 +123,11 @@ class Scene:
         self.add_line(entities.MISSION_LOG, f"command: {command.name}{which}")
         if command.name in ("start", "cancel", "reset"):
             # Only a start has an order; other commands remove its zones.
-            self._order, self._zones = command.order, []
-            self._draw_areas()
+            self._areas.begin(command.order)
 
     def add_rooms(self, found: Rooms) -> None:
         """Draw the outlines of the rooms, with their names; a drive alone changes neither."""
-        named = [(room.title, room.outline) for room in found.outlined]
-        if named == self._rooms:
-            return
-        self._rooms = named
-
-        points = sum(len(outline) for _, outline in named)
-        self._draw(
-            entities.ROOMS, 2 * POINT_BYTES * points, lambda: self._polygons(draw.ROOM, named)
-        )
-
-    def _draw_areas(self) -> None:
-        """Draw the zones of the order, its keep-outs and the operator's."""
-        order = self._order
-        # An order may name a standing zone or a room in place of a polygon.
-        zones: Sequence[tuple[str, Polygon | None]] = self._zones
-        zones = zones or [(zone.name, zone.polygon) for zone in order.zones]
-        keep_out = [("keep out", polygon) for polygon in order.keep_out] + self._kept_out
-        for entity, style, polygons in (
-            (entities.ZONES, draw.ZONE, zones),
-            (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
-        ):
-            self._writer.log(entity, self._polygons(style, polygons), latched=True)
-
-    def _polygons(
-        self, style: draw.LineStyle, polygons: Sequence[tuple[str, Polygon | None]]
-    ) -> rr.LineStrips3D:
-        placed = [
-            (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
-            for name, corners in polygons
-            if corners
-        ]
-        return draw.polygons_archetype(placed, style)
+        self._areas.add_rooms([(room.title, room.outline) for room in found.outlined])
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
         """Draw the path to drive, over the previous one, and log its reason."""
@@ -223,15 +186,7 @@ class Scene:
         self._outcome.add_status(status)
         self._add_configuration(status)
         self._add_restored(status.ledger.restored_cells)
-        kept_out = [
-            (f"keep out: {keep_out.name}", keep_out.polygon)
-            for keep_out in status.mission.keep_outs
-            if keep_out.by == "operator"
-        ]
-        zones = [(zone.name, zone.polygon) for zone in status.mission.zones if zone.polygon]
-        if (kept_out, zones) != (self._kept_out, self._zones):
-            self._kept_out, self._zones = kept_out, zones
-            self._draw_areas()
+        self._areas.add_report(status.mission)
         if status.state not in UNDER_WAY:
             # The plans came before, and a viewer orders lines of one time by entity.
             self._paths.finish()

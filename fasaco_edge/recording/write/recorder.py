@@ -39,6 +39,7 @@ from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_g
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.messages.poses import DEFAULT_FRAMES, PoseDecoder
+from fasaco_edge.wire.reasons import SILENT
 
 REPORT_PERIOD_NS = 1_000_000_000
 # The daemon publishes a status once a second.
@@ -211,7 +212,7 @@ class Recorder:
         """Report a planner that was silent for long, up to a time [ns]."""
         last = self._last_status_ns
         if last is not None and heard_ns - last > SILENCE_NS:
-            self._scene.enter(entities.MISSION_STATE, "silent", "the planner is silent")
+            self._scene.enter(entities.MISSION_STATE, "silent", SILENT)
 
     def _report_writing(self) -> None:
         self._report_state(self._writer.state.value, self._writer.reason)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen, direction
-from fasaco_edge.review.wording import clock
+from fasaco_edge.recording.read.robot_clock import clock
+from fasaco_edge.review.instant import Instant, MapThen, PathThen, PlanThen
+from fasaco_edge.review.turn import direction
+from fasaco_edge.review.wording import SWEPT_BY_OTHERS
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
 
@@ -91,6 +93,7 @@ def _box_words(box: Rectangle) -> str:
 def spot_rows(spot: Spot) -> Iterator[tuple[str, str]]:
     """Yield name and text of each known fact about a spot."""
     known = {True: "swept", False: "not swept", None: "not known"}[spot.swept]
+    known += " by this robot" if spot.why == SWEPT_BY_OTHERS else ""
     yield "at", f"({spot.x:.2f}, {spot.y:.2f}) m: {known}"
     yield "why", spot.words if spot.words.startswith(spot.why) else f"{spot.why}: {spot.words}"
     if spot.patch_m2 is not None:

@@ -10,17 +10,23 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.pictures import draw_mission, draw_order, draw_unswept
+from fasaco_edge.drawing.pictures import (
+    draw_by_others,
+    draw_mission,
+    draw_order,
+    draw_unswept,
+)
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.instant import Scene
+from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.output.answer_rows import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
 from fasaco_edge.review.rooms import outlined
 from fasaco_edge.review.run_data import RunData
 from fasaco_edge.review.spot import Spot
-from fasaco_edge.review.wording import clock
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.settings import known_settings
 
@@ -49,6 +55,9 @@ def draw_map(review: Review) -> Image.Image | None:
     track, driven = _thinned(review.data)
     if grid is None or lattice is None or visits is None or not len(track):
         return None
+    others = None
+    if review.by_others is not None and floor is not None:
+        others = MapLayer(floor.geometry, review.by_others)
     # A line over the floor covers cells without passing their centres: visits would not show it.
     is_line = known_settings(review.data.config).planner.line != "cells"
     return draw_mission(
@@ -59,8 +68,9 @@ def draw_map(review: Review) -> Image.Image | None:
         title=f"{review.record.recording_id}: {DONE[review.complete]}",
         lines=_caption(review),
         driven=driven,
-        swept=MapLayer(floor.geometry, floor.swept) if floor and is_line else None,
+        swept=MapLayer(floor.geometry, floor.swept) if floor and (is_line or others) else None,
         unswept=MapLayer(floor.geometry, floor.unswept) if floor else None,
+        by_others=others,
         zones=review.data.zones,
         keep_out=review.data.keep_out,
         rooms=[(one_line(room.title), room.outline) for room in outlined(review.data)],
@@ -124,6 +134,8 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     key = []
     if review.floor is not None:
         key += draw_unswept(plot, MapLayer(review.floor.geometry, review.floor.unswept))
+        if review.by_others is not None:
+            key += draw_by_others(plot, MapLayer(review.floor.geometry, review.by_others))
     key += draw_order(plot, data.zones, data.keep_out)
     if driven.any():
         plot.track(drive[:-1][driven], drive[1:][driven], DRIVE_M)
@@ -148,17 +160,17 @@ def _simulated(review: Review) -> list[str]:
 
 
 def _caption(review: Review) -> list[str]:
-    counts, replans = review.data.counts, review.replans
+    cells, replans = review.cells, review.replans
     lines = _simulated(review)
-    if counts is not None:
+    if cells is not None:
         lines.append(
-            f"{counts.covered:,} of {counts.coverable:,} reachable cells covered; "
+            f"{cells[0]:,} of {cells[1]:,} reachable cells covered; "
             f"recorded for {clock(review.duration_s)}"
         )
     if review.floor is not None:
         figures = review.floor.figures
         swept = swept_words(figures.swept_m2, figures.reachable_m2)
-        lines.append(f"floor swept: {swept}, by recorded poses")
+        lines.append(f"floor swept{ordered_words(review.orders)}: {swept}, by recorded poses")
     median, slowest = replans.milliseconds(50), replans.milliseconds(100)
     if median is not None and slowest is not None:
         lines.append(

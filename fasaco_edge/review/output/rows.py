@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 from msgspec.structs import astuple
 
 from fasaco_edge.client.phrases import percent, scale_words
+from fasaco_edge.judge.floor import swept_words
+from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import figures, floor_words
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
-from fasaco_edge.review.orders import order_words
+from fasaco_edge.review.orders import order_words, ordered_words
 from fasaco_edge.review.rooms import room_at
-from fasaco_edge.review.wording import NOT_KNOWN, amount, clock, count
+from fasaco_edge.review.wording import NOT_KNOWN, amount, count
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
 
@@ -125,29 +127,33 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         for area in order.unreached
     ]
     troubles = [
-        f"{t.state} {clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s" for t in document.troubles
+        f"{clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s: {plain(t.reason) or t.state}"
+        for t in document.troubles
     ]
     commands = [" ".join(row) for row in command_rows(document)]
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
     has_count = document.covered_cells is not None
+    whose = "its tool, or another robot's," if in_fleet(document) else "the tool"
+    covered_how = f": {whose} passed their centres"
     found = [
         ("run", f"{_began(document.began)}, {sides}{planner}, {document.robot or 'robot'}"),
         *clock_rows(document),
-        ("floor swept", _swept(document, by_name["floor swept"])),
-        ("covered", by_name["covered"] + ": the tool passed their centres" * has_count),
+        ("floor swept", _swept(review, document)),
+        ("by others", _by_others(document)),
+        ("covered", by_name["covered"] + covered_how * has_count),
         ("cells after", ", ".join(reached)),
         ("left", _some(left)),
         ("not reached", _some(unreached)),
-        ("driven", amount(document.driven_m, "m")),
-        ("replans", replans),
-        ("processor", _processor(document)),
+        ("troubles", _some(troubles)),
+        ("poses", _lost_way(review)),
         ("commands", _some(commands)),
         ("rooms", _shares(document)),
         ("charges", _some(charges)),
-        ("poses", _lost_way(review)),
+        ("driven", amount(document.driven_m, "m")),
         ("stood", _stood(document)),
-        ("troubles", _some(troubles)),
+        ("replans", replans),
         ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
+        ("processor", _processor(document)),
     ]
     return [(name, text) for name, text in found if text]
 
@@ -190,45 +196,31 @@ def _some(texts: Sequence[str]) -> str:
     return "; ".join(texts[:MOST_PLACES]) + more
 
 
-def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
-    """Return for each order whether it was completed, also in words."""
-    orders = document.orders
-    if len(orders) < 2:
-        return [(document.complete, _ending(document))]
-    found = []
-    for number, order in enumerate(orders, 1):
-        span = f"{clock(order.at_s)} to {clock(order.until_s)}"
-        who = "ordered" if order.ordered == "command" else "begun by itself"
-        ended = "another order" if order.ended_by == "start" else order.ended_by
-        how = {
-            True: "complete",
-            False: f"not complete: {order.state or 'no state recorded'}"
-            + (f" when {ended} came" if ended else " at the end of the recording"),
-            None: "not known whether it was completed",
-        }[order.complete]
-        cells = f", {order.covered_cells} of {order.coverable_cells} cells"
-        counted = "" if None in (order.covered_cells, order.coverable_cells) else cells
-        found.append((order.complete, f"order {number}, {who}, {span}: {how}{counted}"))
-    return found
-
-
-def _ending(document: ReviewDocument) -> str:
-    if document.complete:
-        floor = floor_words(document)
-        return "complete: every cell covered" + (f"; {floor} of floor swept" if floor else "")
-    if document.complete is None:
-        return "not recorded whether it was completed"
-    covered, coverable = document.covered_cells, document.coverable_cells
-    if document.state == "done" and (covered or 0) < (coverable or 0):
-        return f"not complete: the mission was done with {covered} of {coverable} cells covered"
-    how = "ended" if document.is_ended else "broke off"
-    return f"not complete: the recording {how} while the mission was {document.state}"
-
-
-def _swept(document: ReviewDocument, text: str) -> str:
+def _swept(review: Review, document: ReviewDocument) -> str:
+    text, by, orders = floor_words(document), "recorded poses", document.orders
+    told = review.data.ledger_floor
+    if not text and told is not None and told.reached_m2 is not None:
+        text, by = swept_words(told.reached_m2, told.reachable_m2 or 0.0), "the daemon's count"
+        orders = orders[-1:]
+    if not text:
+        return NOT_KNOWN
     before_m2 = document.swept_before_m2
-    by = ", by recorded poses" if document.swept_m2 is not None else ""
-    return text + by + (f", and {before_m2:.1f} m2 before it began" if before_m2 else "")
+    before = f", and {before_m2:.1f} m2 before it began" if before_m2 else ""
+    return f"{text}{ordered_words(orders)}, by {by}{before}"
+
+
+def _by_others(document: ReviewDocument) -> str:
+    """Return how much the other robots of a fleet swept; "" for a robot alone."""
+    if not in_fleet(document):
+        return ""
+    if document.swept_by_others_m2 is None:
+        return "not recorded: floor that other robots swept counts as left"
+    return f"{document.swept_by_others_m2:.1f} m2 more swept by other robots of its fleet"
+
+
+def in_fleet(document: ReviewDocument) -> bool:
+    """Return whether the robot shares its work with others."""
+    return bool(document.config.get("fleet.name"))
 
 
 def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fasaco_edge.wire.documents.fleet import Angle, Coordinate
 from fasaco_edge.wire.documents.json_text import Document, tolerant
 
 Settings = dict[str, object]
@@ -72,6 +73,15 @@ class RosSettings(Document, frozen=True):
     frames: Frames | None = None
 
 
+class FleetSettings(Document, frozen=True):
+    """Name of the fleet, "" without one; pose of the map's origin in its frame [m], [deg]."""
+
+    name: str = ""
+    x_m: Coordinate = 0.0
+    y_m: Coordinate = 0.0
+    yaw_deg: Angle = 0.0
+
+
 class KnownSettings(Document, frozen=True):
     """The settings of a daemon that its readers use."""
 
@@ -81,6 +91,7 @@ class KnownSettings(Document, frozen=True):
     pose: PoseSettings = PoseSettings()
     mission: MissionSettings = MissionSettings()
     ros2: RosSettings = RosSettings()
+    fleet: FleetSettings = FleetSettings()
 
     @property
     def cell_m(self) -> float:

@@ -17,7 +17,8 @@ import numpy as np
 
 from fasaco_edge.fleet.mission.kind import FleetKind, giving_way_of
 from fasaco_edge.fleet.mission.message import Messages
-from fasaco_edge.fleet.review.report import RobotTrack, find_again
+from fasaco_edge.fleet.review.report import find_again
+from fasaco_edge.fleet.review.tracks import RobotTrack
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid

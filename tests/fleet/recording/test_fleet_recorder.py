@@ -318,6 +318,9 @@ def test_the_review_of_a_fleet_is_printed_and_drawn(studio, tmp_path):
         refused = fasaco_edge("review", part, *words)
         assert refused.code == Exit.CONFIG
         assert f"{words[0]}: this is the recording of a fleet" in refused.err
+    replayed = fasaco_edge("replay", part)
+    assert "this is the recording of a fleet" in replayed.err
+    assert "hint: name the recording of one of its robots" in replayed.err
 
 
 def test_each_figure_of_a_fleet_is_in_the_help():

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rerun")
 
+from fasaco_edge.drawing.plot import MapLayer
+from fasaco_edge.fleet.recording import notes
 from fasaco_edge.fleet.recording.notes import NOTES_VERSION, Note, NoteBatch, NotedRobot, Pass
 from fasaco_edge.fleet.review import report as fleet
+from fasaco_edge.fleet.review.drawing import draw_fleet_mission, robot_tint
 from fasaco_edge.fleet.review.report import review_fleet
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from tests.fleet.told import tiles
+from tests.support.rooms import RESOLUTION_M, room
 
 CELL_M = 0.5
 GROUND = [(row, col) for row in range(8) for col in range(12)]
@@ -106,3 +114,29 @@ def test_durations_are_the_simulated_robots(monkeypatch):
     assert (first.messages_s, first.kb_s) == (0.22, 0.06)
     assert figures.again_m2 == real.again_m2
     assert first.plan_ms_p99 == 4.0
+
+
+def test_robots_have_the_colours_of_the_recording(monkeypatch):
+    """They are numbered as they join, whatever their names; a fleet without a recording by name."""
+    pixels = room(3.0, 2.0)
+    geometry = GridGeometry(*pixels.shape, RESOLUTION_M, Pose2D(0.0, 0.0))
+    grid = OccupancyGrid(geometry, pixels)
+    lattice = CoverageLattice.from_map(grid, Footprint(0.3, 0.18))
+    left = np.arange(geometry.cols) < geometry.cols // 2
+    swept = [MapLayer(geometry, np.broadcast_to(half, pixels.shape)) for half in (left, ~left)]
+    trails = {"r1": np.array([(0.5, 1.0), (1.0, 1.0)]), "r2": np.array([(2.0, 1.0), (2.5, 1.0)])}
+    nothing = MapLayer(geometry, np.zeros(pixels.shape, np.bool_))
+
+    def drawn():
+        picture = draw_fleet_mission(
+            grid, lattice, trails, swept, nothing, [], title="", lines=()
+        )  # fmt: skip
+        middle = picture.height // 2
+        row = [picture.getpixel((x, middle)) for x in range(picture.width)]
+        return [tint for tint in dict.fromkeys(row) if tint in (robot_tint(0), robot_tint(1))]
+
+    assert drawn() == [robot_tint(0), robot_tint(1)]
+    robots = [NotedRobot(name, 0.2, CELL_M, 0.0, 0.0, 0.0, 0.0) for name in ("r2", "r1")]
+    batch = NoteBatch(NOTES_VERSION, 1, "house", robots, [])
+    monkeypatch.setattr(notes, "read_notes", lambda paths: [batch])
+    assert drawn() == [robot_tint(1), robot_tint(0)]

@@ -1,0 +1,44 @@
+"""The files of a recording, as the command line names them: of several runs the newest."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from fasaco_edge.cli.console import terminal
+from fasaco_edge.errors import DifferentRuns
+from fasaco_edge.recording.read.frames import is_fleet_recording, recording_id
+
+# run00002-20261130T064945Z-robot: which one, when, and of what robot.
+_NAME = re.compile(r"(run\d+|)-?\d{8}T\d{6}Z-(?P<robot>.*)")
+
+
+def files_of_a_run(paths: Sequence[Path]) -> list[Path]:
+    """Return the files of the newest run, and say that there are others.
+
+    The recording of a whole fleet goes before those of its robots.
+
+    Raises:
+        DifferentRuns: they are of several robots.
+        UnreadableRecording: a file is missing, or is no recording.
+    """
+    fleets = [path for path in paths if is_fleet_recording(path)]
+    runs: dict[str, list[Path]] = {}
+    for path in fleets or paths:
+        runs.setdefault(recording_id(path), []).append(path)
+    # A recorder that was killed just after it began a part left no name in it.
+    nameless = runs.pop("", [])
+    robots = {match["robot"] if (match := _NAME.match(run)) else run for run in runs}
+    if len(robots) > 1:
+        raise DifferentRuns(
+            f"recordings of several robots: {', '.join(sorted(robots))}",
+            hint="name those of one robot at a time, or the one of their fleet",
+        )
+    if len(runs) > 1:
+        terminal.err().print(
+            f"{len(runs)} runs: this is the newest, {max(runs)}; of another one name its files, as "
+            f"{min(runs)}-*.rrd",
+            soft_wrap=True,
+        )
+    return [*(runs[max(runs)] if runs else []), *nameless]

@@ -1,0 +1,97 @@
+"""The robots of a recorded fleet: their notes, cells on one lattice, and clocks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.fleet.observer.cells import (
+    Cells,
+    Place,
+    Seat,
+    cells_of,
+    together,
+)
+from fasaco_edge.fleet.recording.notes import Note, NoteBatch, NotedRobot
+from fasaco_edge.recording.read.robot_clock import RobotClock
+
+# How far a simulated robot's clock is extended beyond its stamps [s]: longer than any recording.
+AROUND_S = 1e6
+
+
+@dataclass(slots=True, eq=False)
+class RobotTrack:
+    """Notes of a robot, its cells on the lattice of the first robot.
+
+    Attributes:
+        name, number: of the robot, the latter in order of joining: its colour.
+        notes: in order of time.
+        swept_ms: the cells it swept, and the time of the first report [ms].
+        passes: the cells it entered, in order, int64 (n, 3): time [ms], row, col.
+        again: the cells of ``swept_ms`` that another robot had swept before: for each the share of
+            the passes around it that counts as sweeping again.
+        clock: its seconds since the recording began.
+    """
+
+    name: str
+    number: int = 0
+    notes: list[Note] = field(default_factory=list)
+    swept_ms: dict[Place, int] = field(default_factory=dict)
+    passes: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    again: dict[Place, float] = field(default_factory=dict)
+    clock: RobotClock = field(default_factory=lambda: RobotClock(0))
+
+
+def seat_of(robot: NotedRobot) -> Seat:
+    return Seat(robot.cell_m, robot.lattice_deg, robot.x, robot.y, robot.deg)
+
+
+def tracks_of(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack], Cells]:
+    """Return the robots by name, and the cells that any of them could reach."""
+    tracks: dict[str, RobotTrack] = {}
+    passes: dict[str, list[NDArray[np.int64]]] = {}
+    ground: list[Cells] = []
+    for batch in batches:
+        for note in batch.notes:
+            robot = batch.robots[note.robot]
+            own = seat_of(robot)
+            track = tracks.setdefault(robot.name, RobotTrack(robot.name, note.robot))
+            for cell in own.carried(cells_of(note.swept), seat).tolist():
+                track.swept_ms.setdefault((cell[0], cell[1]), note.at_ms)
+            ground.append(np.unique(own.carried(cells_of(note.ground), seat), axis=0))
+            if note.in_force:
+                continue
+            track.notes.append(note)
+            if note.passes:
+                passed = np.array([(p.at_ms, p.row, p.col) for p in note.passes], np.int64)
+                passed[:, 1:] = own.carried(passed[:, 1:], seat)
+                passes.setdefault(robot.name, []).append(passed)
+    for name, pieces in passes.items():
+        tracks[name].passes = np.concatenate(pieces)
+    for track in tracks.values():
+        track.clock = _clock(track.notes)
+    return sorted(tracks.values(), key=lambda track: track.name), together(ground)
+
+
+def _clock(notes: Sequence[Note]) -> RobotClock:
+    """Return the clock of a robot, by the stamps of its poses if it is simulated.
+
+    Before the first and after the last stamp it has the configured time scale: other robots may be
+    at work then.
+    """
+    stamped = [note for note in notes if note.stamp_ms]
+    scale = stamped[-1].time_scale if stamped else 1.0
+    if scale == 1.0 or not 0.0 < scale < math.inf:
+        return RobotClock(0)
+    times_s = 1e-3 * np.array([(note.at_ms, note.stamp_ms) for note in stamped])
+    around_s = [times_s[end] + (sign * AROUND_S, sign * scale * AROUND_S)
+                for end, sign in ((0, -1.0), (-1, 1.0))]  # fmt: skip
+    return RobotClock.by_stamps(0, scale, *np.vstack([around_s[0], times_s, around_s[1]]).T)
+
+
+def seconds_of(clock: RobotClock, at_ms: Sequence[int]) -> NDArray[np.float64]:
+    return clock.all_seconds(1_000_000 * np.array(at_ms, np.int64))
