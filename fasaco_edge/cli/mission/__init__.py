@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission, show_troubles
+from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
@@ -33,6 +33,7 @@ from fasaco_edge.wire.documents.replies import Reply
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply as Answer
 
+NO_MAP = "there is no map yet: whether known floor lies in it is shown by `mission status` later"
 KEPT = "what is covered is kept: `mission start --keep-covered` goes on with the rest"
 
 EPILOG = """\
@@ -200,8 +201,8 @@ def run(args: argparse.Namespace) -> int:
         show_keep_outs(answer)
     else:
         show_mission(reply)
-        if command == "status":
-            show_troubles(ask(args, "status"))
+        if asked["command"] == "keep_out_add" and answer.coverage is None:
+            err().print(NO_MAP)
         if command == "cancel" and answer.coverage and answer.coverage.covered > 1:
             err().print(KEPT)
     return Exit.OK
