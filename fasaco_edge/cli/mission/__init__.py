@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
-from fasaco_edge.cli.geojson import SUFFIX, is_geojson, order_of
 from fasaco_edge.cli.mission.keep_outs import (
     add_actions,
     asked_by,
@@ -22,8 +20,8 @@ from fasaco_edge.cli.mission.keep_outs import (
     polygon,
     show_keep_outs,
 )
+from fasaco_edge.cli.order_file import read_order_file
 from fasaco_edge.errors import OrderError, WouldForget
-from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.mission.orders.commands import FORGETFUL
 from fasaco_edge.mission.orders.order import order_document, read_order
 from fasaco_edge.mission.orders.passes import passes_document
@@ -241,24 +239,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         options_given = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
         names = ", ".join(f"--{name}" for name in options_given)
         raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
-    try:
-        document = _read(args.order)
-        return order_document(read_order(order_of(document) if is_geojson(document) else document))
-    except OrderError as error:
-        raise OrderError(f"{args.order}: {error}", hint=error.hint) from error
-
-
-def _read(path: Path) -> object:
-    try:
-        text = read_bounded(path)
-        # YAML 1.1 would take 1e3 for a text.
-        return json.loads(text) if path.suffix in (".json", SUFFIX) else load(text)
-    except OSError as error:
-        raise OrderError(str(error.strerror), hint="name a file that can be read") from error
-    except RecursionError as error:
-        raise OrderError("nested too deeply") from error
-    except ValueError as error:
-        raise OrderError(f"neither plain YAML nor JSON: {error}") from error
+    return order_document(read_order_file(args.order))
 
 
 def _zone(text: str) -> dict[str, object]:
