@@ -15,8 +15,6 @@ from collections.abc import Collection, Iterator
 from difflib import get_close_matches
 from typing import Any, get_args
 
-import msgspec
-
 MOST = 2_000
 """What is shown of a text at most [characters]; longer texts are cut."""
 
@@ -89,9 +87,9 @@ def nearest(name: str, names: Collection[str], least: float = 0.6) -> list[str]:
     return near or get_close_matches(name, names, 1, least)
 
 
-def objects_of(kind: object, depth: int = 3) -> Iterator[type[msgspec.Struct]]:
-    """Yield the objects that a value of this type is or holds, ``depth`` levels down."""
-    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+def objects_of(kind: object, depth: int = 3) -> Iterator[type[Any]]:
+    """Yield the structs that a value of this type is or holds, ``depth`` levels down."""
+    if isinstance(kind, type) and hasattr(kind, "__struct_fields__"):
         yield kind
     for part in get_args(kind) if depth else ():
         yield from objects_of(part, depth - 1)
