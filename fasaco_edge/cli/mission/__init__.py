@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply as Answer
 
 NO_MAP = "there is no map yet: whether known floor lies in it is shown by `mission status` later"
+ROOMS_KEPT = (
+    "rooms keep names, borders and settings, and keep-outs stay; in another building with the same "
+    "map frame, stop the daemon, delete <robot>.rooms.json beside the ledger, and start it"
+)
 KEPT = "what is covered is kept: `mission start --keep-covered` goes on with the rest"
 
 EPILOG = """\
@@ -75,6 +79,8 @@ by itself (mission.autostart of its configuration).
 
 Another order, and a reset, forget what is covered where the order before is not over: on a
 terminal they say how much and ask first; elsewhere they are refused without --yes.
+A reset keeps names, borders and settings of rooms, and keep-outs. To forget rooms, as in another
+building with the same map frame, stop the daemon, and delete <robot>.rooms.json beside the ledger.
 `start --keep-covered` goes on with the rest. `resume` goes on with what was paused, also the way
 home.
 
@@ -96,7 +102,7 @@ COMMANDS = {
     "cancel": "stop and drop the order; what is covered is kept",
     "stop": "the same as cancel; to go on later with the same order, pause it",
     "replan": "plan in full now, starting from the current path",
-    "reset": "stop and drop the order and what is covered; the ledger's file is renamed",
+    "reset": "stop and drop the order and what is covered; rooms keep their names",
     "keep-out": "areas to keep out of, changed in mid-mission: add, remove, list",
     "status": "show state, progress, and what could not be reached",
 }
@@ -201,6 +207,8 @@ def run(args: argparse.Namespace) -> int:
         show_mission(reply)
         if asked["command"] == "keep_out_add" and answer.coverage is None:
             err().print(NO_MAP)
+        if command == "reset":
+            err().print(ROOMS_KEPT)
         if command == "cancel" and answer.coverage and answer.coverage.covered > 1:
             err().print(KEPT)
     return Exit.OK
