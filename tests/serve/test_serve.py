@@ -52,8 +52,8 @@ ROOM = {"name": "by the door", "polygon": [[0.5, 0.5], [3.0, 0.5], [3.0, 3.0], [
 
 
 def is_told(said: dict[str, Any]) -> bool:
-    """Tell whether a state is that of the robot here, which does not move: later it is degraded."""
-    return said["state"] in ("covering", "degraded")
+    """Return whether a state is that of the robot here; as that does not move, later degraded."""
+    return said.get("state") in ("covering", "degraded")
 
 
 @pytest.fixture(scope="module")
