@@ -205,19 +205,14 @@ class SampleDecoder:
         if _checksum(payloads) != lane.checksum:
             raise MalformedMessage(f"sample {numbers[0]}, or one after it, is not what it was")
         attachments = lane.attachments or [b""] * len(numbers)
-        samples = [
-            Numbered(number, Arrival(lane.topic, sample, at_ns, at_ns + ahead_ns))
-            for number, at_ns, ahead_ns, sample in zip(
-                numbers,
-                accumulate(lane.at_ns),
-                accumulate(lane.ahead_ns),
-                (
-                    Sample(lane.key, payload, lane.schema, attachment)
-                    for payload, attachment in zip(payloads, attachments, strict=True)
-                ),
-                strict=True,
-            )
-        ]
+        times = accumulate(lane.at_ns), accumulate(lane.ahead_ns)
+        samples = []
+        for number, payload, attachment, at_ns, ahead_ns in zip(
+            numbers, payloads, attachments, *times, strict=True
+        ):
+            sample = Sample(lane.key, payload, lane.schema, attachment)
+            arrival = Arrival(lane.topic, sample, at_ns, at_ns + ahead_ns)
+            samples.append(Numbered(number, arrival))
         self._last[lane.topic] = samples[-1]
         if sum(len(kept.arrival.sample.payload) for kept in self._last.values()) > MOST_BATCH_BYTES:
             raise MalformedMessage("samples of more topics, and larger ones, than there are")

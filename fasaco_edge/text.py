@@ -11,7 +11,9 @@ from __future__ import annotations
 import json
 import re
 import reprlib
-from typing import Any
+from collections.abc import Collection, Iterator
+from difflib import get_close_matches
+from typing import Any, get_args
 
 MOST = 2_000
 """What is shown of a text at most [characters]; longer texts are cut."""
@@ -77,6 +79,20 @@ def duration(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"
+
+
+def nearest(name: str, names: Collection[str], least: float = 0.6) -> list[str]:
+    """Return the names that one was probably meant for: without its unit, or misspelt."""
+    near = [each for each in names if each.startswith(f"{name}_")]
+    return near or get_close_matches(name, names, 1, least)
+
+
+def objects_of(kind: object, depth: int = 3) -> Iterator[type[Any]]:
+    """Yield the structs that a value of this type is or holds, ``depth`` levels down."""
+    if isinstance(kind, type) and hasattr(kind, "__struct_fields__"):
+        yield kind
+    for part in get_args(kind) if depth else ():
+        yield from objects_of(part, depth - 1)
 
 
 def misfit(message: str, document: object) -> tuple[str, str, object]:

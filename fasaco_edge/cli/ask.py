@@ -32,7 +32,6 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
 from fasaco_edge.wire.documents.rooms import Rooms
-from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
@@ -152,7 +151,7 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
 
 
 def show_mission(reply: Reply) -> None:
-    """Print the state and the mission in a status, or in the answer to a command."""
+    """Print state, mission and troubles in a status, or in the answer to a command."""
     answer = decode_tolerant(reply.payload, replies.Reply)
     mission, console = answer.mission, out()
     console.print(figures(_rows(answer)))
@@ -160,13 +159,8 @@ def show_mission(reply: Reply) -> None:
         console.print(_zones(mission.zones))
     if mission.unreached.areas:
         console.print(_unreached(mission.unreached))
-
-
-def show_troubles(reply: Reply) -> None:
-    """Print the troubles in a status, with what to do about each."""
-    found = phrases.troubles(decode_tolerant(reply.payload, Status))
-    if found:
-        out().print(figures([("trouble", f"{what}: {to_do}") for what, to_do in found]))
+    if found := phrases.troubles(answer):
+        console.print(figures([("trouble", f"{what}: {to_do}") for what, to_do in found]))
 
 
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
@@ -218,7 +212,6 @@ def show(name: str, reply: Reply) -> None:
         out().print(figures(known(_figures(reply))))
     elif name in ("status", "mission"):
         show_mission(reply)
-        show_troubles(reply)
     elif name == "rooms":
         show_rooms(decode_tolerant(reply.payload, Rooms))
     else:

@@ -12,7 +12,7 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.loading import inspect_config, mask_fault
+from fasaco_edge.config.loading import inspect_config, with_mask
 from fasaco_edge.config.reading import Fault
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import memory_limit
@@ -51,11 +51,10 @@ def run(args: argparse.Namespace) -> int:
     """Check the configuration, and print the result."""
     from fasaco_edge.daemon.memory import mask_bytes
 
-    config, found = inspect_config(args.file)
-    if config is not None:
-        most_bytes = mask_bytes(config, memory_limit())
-        if fault := mask_fault(config, args.file, most_bytes):
-            config, found = None, (fault,)
+    def read_mask(config: DaemonConfig) -> None:
+        with_mask(config, args.file, mask_bytes(config, memory_limit()))
+
+    config, found = inspect_config(args.file, read_mask)
     faults = sorted(found, key=lambda fault: fault.line or 0)
     if args.json:
         print_json(_document(args, config, faults))

@@ -13,6 +13,7 @@ from typing import TypeGuard
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
+from fasaco_edge.text import nearest
 from fasaco_edge.wire.documents.rooms import Rooms
 
 SUFFIX = ".geojson"
@@ -21,6 +22,10 @@ HINT = "draw each zone as a Polygon; `rooms list --geojson` shows what one looks
 OF_ZONES = ("name", "passes", "room", "priority")
 # Members of the collection that are members of an order.
 OF_ORDERS = ("passes", "return_home", "keep_covered", "unknown", "until_min")
+# Other properties of a feature with a meaning, and members that a collection has.
+OF_FEATURES, OF_COLLECTIONS = ("keep_out", "skip"), ("type", "features", "name", "crs", "bbox")
+# How alike an unknown member is to the one that it was probably meant for.
+ALIKE = 0.8
 
 Feature = dict[str, object]
 
@@ -69,23 +74,29 @@ def _ring(outline: Sequence[Point]) -> list[list[float]]:
 
 
 def is_geojson(document: object) -> TypeGuard[dict[str, object]]:
-    """Return whether a document is a collection of features."""
-    return isinstance(document, dict) and document.get("type") == "FeatureCollection"
+    """Return whether a document is GeoJSON; no order has a type."""
+    return isinstance(document, dict) and "type" in document
 
 
-def order_of(document: dict[str, object]) -> dict[str, object]:
-    """Return the order that a collection of polygons stands for.
+def order_of(document: dict[str, object]) -> tuple[dict[str, object], dict[str, str]]:
+    """Return the order that a collection of polygons stands for, and which feature, by its place
+    and name, each zone and keep-out comes from.
 
     A polygon is a zone, with ``OF_ZONES`` of its properties; with ``"keep_out": true`` it is one
     that the robot must not touch. A room is ordered by its number, whatever its outline, unless it
     is to be skipped. ``OF_ORDERS`` of the collection are those of the order.
 
     Raises:
-        OrderError: there is no feature, or one is no polygon without holes.
+        OrderError: there is no feature, or one is no polygon without holes, or has what is
+            probably a misspelt property.
     """
     zones: list[dict[str, object]] = []
     keep_out: list[object] = []
+    origins: dict[str, str] = {}
     features = document.get("features")
+    _check_spelling(document, OF_ORDERS, "the collection")
+    if (kind := document["type"]) != "FeatureCollection":
+        raise OrderError(f"type: must be FeatureCollection, got {kind!r:.80}", hint=HINT)
     if not isinstance(features, list) or not features:
         raise OrderError("features: there is none", hint=HINT)
     for number, each in enumerate(features):
@@ -93,23 +104,35 @@ def order_of(document: dict[str, object]) -> dict[str, object]:
         properties = members.get("properties") or {}
         if not isinstance(properties, dict):
             raise OrderError(f"{where}: properties must be an object", hint=HINT)
+        name = properties.get("name") or members.get("id")
+        where += "" if name is None else f" {name!r:.80}"
         geometry = members.get("geometry")
         if _is_set(properties, "keep_out", where):
+            origins[f"keep_out[{len(keep_out)}]"] = where
             keep_out.append(_corners(geometry, where))
         elif not _is_set(properties, "skip", where):
             own = {name: properties[name] for name in OF_ZONES if properties.get(name) is not None}
             named = {"name": f"zone {number + 1}"} | own
             placed = {} if "room" in own else {"polygon": _corners(geometry, where)}
+            origins[f"zones[{len(zones)}]"] = where
             zones.append(named | placed)
+        _check_spelling(properties, (*OF_ZONES, *OF_FEATURES), where)
     order = {name: document[name] for name in OF_ORDERS if name in document}
-    return order | {"zones": zones, "keep_out": keep_out}
+    return order | {"zones": zones, "keep_out": keep_out}, origins
+
+
+def _check_spelling(members: dict[str, object], known: Sequence[str], where: str) -> None:
+    """Check that no unknown member looks like a known one: programs write others of their own."""
+    for name in (each for each in members if each not in (*known, *OF_COLLECTIONS)):
+        if near := nearest(name, known, ALIKE):
+            raise OrderError(f"{where}: unknown member {name}; did you mean {near[0]}?", hint=HINT)
 
 
 def _is_set(properties: dict[str, object], name: str, where: str) -> bool:
     """Return a property that is true or false; without it false."""
     value = properties.get(name)
     if value is not None and not isinstance(value, bool):
-        raise OrderError(f"{where}.{name}: must be true or false, is {value!r}", hint=HINT)
+        raise OrderError(f"{where}: {name}: must be true or false, is {value!r}", hint=HINT)
     return bool(value)
 
 
@@ -120,8 +143,12 @@ def _corners(geometry: object, where: str) -> list[object]:
     if kind != "Polygon" or not isinstance(rings, list) or not rings:
         raise OrderError(f"{where}: must be a Polygon, is {kind or 'none'}", hint=HINT)
     if len(rings) > 1:
-        hint = 'draw the hole as a polygon of its own, with the property "keep_out": true'
-        raise OrderError(f"{where}: a zone has no holes, this one has {len(rings) - 1}", hint=hint)
+        raise OrderError(
+            f"{where}: the polygon must have one ring, got {len(rings)}: rings after the first are "
+            "holes in it, and an order takes no holes",
+            hint="delete the holes; to keep the robot out of one, draw it as a Polygon of its own, "
+            'with the property "keep_out": true',
+        )
     ring = rings[0]
     if not isinstance(ring, list) or len(ring) < 2 or ring[0] != ring[-1]:
         raise OrderError(f"{where}: the last corner must be the first again", hint=HINT)

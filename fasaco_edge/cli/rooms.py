@@ -22,6 +22,7 @@ examples:
   fasaco-edge rooms list
   fasaco-edge rooms list --geojson > rooms.geojson   for a drawing program; also an order for them
   fasaco-edge rooms name 3 kitchen
+  fasaco-edge rooms name kitchen ""                  has no name any more
   fasaco-edge rooms split kitchen 1.5,0 1.5,3.2      from wall to wall, in metres on the map
   fasaco-edge rooms merge kitchen 5 --name "living room"
   fasaco-edge rooms set kitchen --passes auto,cross  a cross pass, wherever an order says nothing
@@ -38,7 +39,7 @@ exit codes: 0 done; 1 refused, or no answer; 2 usage error; 78 invalid robot nam
 
 ACTIONS = {
     "list": "show the rooms: number, name, area, swept share, neighbours and settings",
-    "name": "give a room a name",
+    "name": "give a room a name, or take it away",
     "split": "split a room along a line from wall to wall",
     "merge": "merge rooms that have a passage to each other",
     "set": "set what orders do in a room",
@@ -61,7 +62,8 @@ def _add_actions(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_name(action: argparse.ArgumentParser) -> None:
-    action.add_argument("name", metavar="NAME", help="the name, which no other room has")
+    text = 'the name, which no other room has; "" takes its name away'
+    action.add_argument("name", metavar="NAME", help=text)
 
 
 def _add_split(action: argparse.ArgumentParser) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -152,8 +153,8 @@ def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Gu
     # The library logs each connection.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     try:
-        _say(address, guard, args.tokens, secured is not None)
-        asyncio.run(server.run(address, secured))
+        say = partial(_say, address, guard, args.tokens, secured is not None)
+        asyncio.run(server.run(address, secured, ready=say))
     except OSError as error:
         why = f"--listen: cannot listen at {address.shown}: {error.strerror or error}"
         print(one_line(f"fasaco-edge: {why}"), file=sys.stderr)

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.documents.status import TROUBLES, Status
+from fasaco_edge.wire.documents.replies import TROUBLES
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.reasons import plain
 
 KEPT = 200

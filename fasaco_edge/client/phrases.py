@@ -6,13 +6,15 @@ import time
 
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import (
+    TROUBLES,
     CoverageReport,
     FloorReport,
     MissionReport,
+    Reply,
     ZoneReport,
 )
 from fasaco_edge.wire.documents.settings import known_settings
-from fasaco_edge.wire.documents.status import TROUBLES, DriveReport, Status
+from fasaco_edge.wire.documents.status import DriveReport, Status
 from fasaco_edge.wire.reasons import possible
 
 # Offset of the wall clock from the monotonic one, when this module was imported [s].
@@ -99,7 +101,7 @@ def drive(report: DriveReport) -> str:
     return ", ".join(words) or "not measured yet"
 
 
-def troubles(status: Status) -> list[tuple[str, str]]:
+def troubles(status: Status | Reply) -> list[tuple[str, str]]:
     """Return the troubles, their durations, and what to do about each."""
     return [
         (f"{one_line(each.text)} (for {age(each.since_s)})", one_line(each.do))

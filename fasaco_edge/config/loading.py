@@ -64,16 +64,6 @@ def with_mask(config: DaemonConfig, file: Path | None, most_bytes: int | None) -
     return structs.replace(config, mission=structs.replace(mission, keep_out_mask=mask))
 
 
-def mask_fault(config: DaemonConfig, file: Path, most_bytes: int | None) -> Fault | None:
-    """Return the fault of a configuration's keep-out mask, with its line in ``file``."""
-    try:
-        with_mask(config, file, most_bytes)
-    except BadConfiguration as error:
-        key = _named_in(error)
-        return Fault(key, error, read_text(file).line_of(key))
-    return None
-
-
 def decode_config(document: bytes) -> DaemonConfig:
     """Return a configuration from the JSON that another process of the package has encoded.
 
@@ -86,10 +76,16 @@ def decode_config(document: bytes) -> DaemonConfig:
         raise BadConfiguration(f"configuration on standard input: {error}") from error
 
 
-def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
+def inspect_config(
+    path: Path | None, check: Callable[[DaemonConfig], object] = lambda _: None
+) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
     """Read a YAML file; return the configuration, or None and all faults.
 
-    Whether values fit together is checked once each is valid by itself.
+    Whether values fit together is checked of all sections that no fault of a value concerns.
+
+    Args:
+        path: the file; None for the defaults.
+        check: a further check of these sections; raises BadConfiguration.
     """
     if path is None:
         return DaemonConfig(), ()
@@ -98,15 +94,29 @@ def inspect_config(path: Path | None) -> tuple[DaemonConfig | None, tuple[Fault,
     except BadConfiguration as error:
         return None, (Fault("", error),)
     faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
-    if not faults and isinstance(text.document, dict):
-        document = with_credentials(without_removed(text.document))
-        config = msgspec.convert(document, DaemonConfig)
-        faults = [Fault(_named_in(error), error) for error in _misfits(config)]
-        if not faults:
-            return config, ()
+    unclear = {each for fault in faults for each in _sections_in(f"{fault.key} {fault.error}")}
+    document = text.document if isinstance(text.document, dict) else {}
+    sound = {name: document[name] for name in SECTIONS if name in document and name not in unclear}
+    config = msgspec.convert(with_credentials(without_removed(sound)), DaemonConfig)
+    misfits = [*_misfits(config), *_refused("", lambda: check(config))]
+    faults += [
+        Fault(_named_in(error), error)
+        for error in misfits
+        if not unclear.intersection(_sections_in(str(error)))
+    ]
+    if not faults:
+        return config, ()
     return None, tuple(
         replace(fault, line=fault.line or text.line_of(fault.key)) for fault in faults
     )
+
+
+SECTIONS = tuple(field.encode_name for field in structs.fields(DaemonConfig))
+
+
+def _sections_in(text: str) -> Iterator[str]:
+    """Yield the sections that a text names."""
+    return (name for name in SECTIONS if re.search(rf"\b{name}\b", text))
 
 
 def _named_in(error: BadConfiguration) -> str:

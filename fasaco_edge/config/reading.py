@@ -6,7 +6,6 @@ import dataclasses
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
@@ -15,7 +14,7 @@ import yaml
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
-from fasaco_edge.text import misfit, shown
+from fasaco_edge.text import misfit, nearest, objects_of, shown
 
 FOLDER = "CREDENTIALS_DIRECTORY"
 # Keys of earlier releases: why each was removed, and its replacement. An empty one asked for
@@ -117,22 +116,14 @@ def renamed(config: Mapping[str, object]) -> dict[str, object]:
 
 def section_of(kind: object) -> type[Section] | None:
     """Return the section that a key of this type holds, also an optional one."""
-    return next((each for each in _objects_of(kind, 1) if issubclass(each, Section)), None)
-
-
-def _objects_of(kind: object, depth: int = 3) -> Iterator[type[msgspec.Struct]]:
-    """Yield the objects that a value of this type is or holds, ``depth`` levels down."""
-    if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
-        yield kind
-    for part in get_args(kind) if depth else ():
-        yield from _objects_of(part, depth - 1)
+    return next((each for each in objects_of(kind, 1) if issubclass(each, Section)), None)
 
 
 def _unknown_keys(kind: object, value: object, key: str, root: type[Section]) -> Iterator[Fault]:
     """Yield the unknown keys of an object, or of each in a list, such as a dock or zones."""
     objects = {f"{key}[{at}]": each for at, each in enumerate(value if type(value) is list else ())}
     for place, held in (objects or {key: value}).items():
-        for structure in _objects_of(kind) if isinstance(held, dict) else ():
+        for structure in objects_of(kind) if isinstance(held, dict) else ():
             names = [field.encode_name for field in msgspec.structs.fields(structure)]
             for name in (str(each) for each in held if each not in names):
                 path = f"{place}.{name}"
@@ -163,11 +154,7 @@ def _choices(kind: object) -> str:
 def _meant(name: str, key: str, names: list[str], root: type[Section]) -> str:
     """Return the key that was probably meant, or the existing keys."""
     before = f"{key}." if key else ""
-    # A name without its unit, or one that is spelt wrong.
-    near = [each for each in names if each.startswith(f"{name}_")] or (
-        get_close_matches(name, names, 1)
-    )
-    if near:
+    if near := nearest(name, names):
         return f"; did you mean {' or '.join(before + each for each in near)}?"
     elsewhere = [path for path in _paths(root, "") if path.rpartition(".")[2] == name]
     if elsewhere:
@@ -226,7 +213,7 @@ def read_text(path: Path) -> ConfigText:
         raise BadConfiguration(f"not plain YAML: {error}", hint=hint) from error
     lines: dict[str, int] = {}
     twice = []
-    for key, line in _keys(node, ""):
+    for key, line in keys_and_lines(node):
         if key in lines:
             text = f"{key}: is given twice, in line {lines[key]} and in line {line}"
             twice.append(Fault(key, BadConfiguration(text), line))
@@ -234,18 +221,18 @@ def read_text(path: Path) -> ConfigText:
     return ConfigText(document if document is not None else {}, lines, tuple(twice))
 
 
-def _keys(node: yaml.Node | None, before: str) -> Iterator[tuple[str, int]]:
+def keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:
     """Yield each key and its line."""
     if isinstance(node, yaml.MappingNode):
         for name, value in node.value:
             key = f"{before}.{name.value}" if before else str(name.value)
             yield key, name.start_mark.line + 1
-            yield from _keys(value, key)
+            yield from keys_and_lines(value, key)
     elif isinstance(node, yaml.SequenceNode):
         for index, item in enumerate(node.value):
             key = f"{before}[{index}]"
             yield key, item.start_mark.line + 1
-            yield from _keys(item, key)
+            yield from keys_and_lines(item, key)
 
 
 def with_credentials(part: object, environ: Mapping[str, str] = os.environ) -> object:

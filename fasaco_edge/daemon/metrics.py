@@ -19,8 +19,8 @@ from msgspec import UnsetType
 
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.documents.replies import STATES
-from fasaco_edge.wire.documents.status import TROUBLES, Status
+from fasaco_edge.wire.documents.replies import STATES, TROUBLES
+from fasaco_edge.wire.documents.status import Status
 
 LOG = logging.getLogger(__name__)
 

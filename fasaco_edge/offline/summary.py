@@ -10,7 +10,7 @@ from fasaco_edge.offline.settings import CELLS
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.passes import PassPlans
-    from fasaco_edge.offline.result import Plan
+    from fasaco_edge.offline.result import Drive, Plan
 
 Rows = list[tuple[str, str]]
 
@@ -19,23 +19,20 @@ def rows_of(plan: Plan) -> Rows:
     """Return the figures that matter, as names and words."""
     drive, path, floor = plan.drive, plan.path, plan.floor
     rows = [("map", f"{plan.map.name}, {plan.problem.cells} cells of {_metres(plan)}")]
+    line = "centres of cells" if plan.line == CELLS else plan.line
+    rows.append(("line", f"driven: {line_words(drive)} ({line})"))
     if floor is not None:
         rows.append(("swept", _swept(floor)))
-    time = drive.time
-    if floor is not None and floor.seconds_per_m2 is not None:
-        time += f", {floor.seconds_per_m2:.1f} s a square metre"
-    rows.append(("time", time))
     if drive.gap is not None:
-        rows.append(("gap", f"at most {100 * drive.gap:.1f} % above the shortest possible time"))
-    line = "through the centres of cells" if plan.line == CELLS else f"{plan.line}, over the floor"
-    rows.append(("line", f"{drive.metres:,.1f} m, {drive.turns:,.0f} quarter-turns, {line}"))
+        above = f"line: at most {100 * drive.gap:.1f} % above the shortest possible time"
+        rows.append(("gap", above))
     if plan.curve_words:
         rows.append(("curve", plan.curve_words))
     if floor is not None and floor.illegal_share:
         rows.append(
             ("caution", f"{100 * floor.illegal_share:.1f} % of the line is too close to obstacles")
         )
-    walk = f"{path.steps} steps by {path.planner}, seed {path.seed}"
+    walk = f"before the line: {path.steps} steps by {path.planner}, seed {path.seed}"
     rows.append(("walk", walk + above_bound(path)))
     if count := int(plan.problem.unreachable.sum()):
         rows.append(("not reached", f"{count} cells that no walk from the start leads to"))
@@ -47,11 +44,15 @@ def rows_of_passes(plans: PassPlans) -> Rows:
     """Return the same of several passes together."""
     first, floor, drive = plans.plans[0], plans.floor, plans.drive
     rows = [("map", f"{first.map.name}, {first.problem.cells} cells in the first pass")]
+    rows.append(("line", f"{drive.metres:,.1f} m in {len(plans.plans)} passes, {drive.time}"))
     if floor is not None:
         rows.append(("swept", _swept(floor)))
-    rows.append(("time", drive.time))
-    rows.append(("line", f"{drive.metres:,.1f} m in {len(plans.plans)} passes"))
     return rows
+
+
+def line_words(drive: Drive) -> str:
+    """Return what driving a line takes, in words."""
+    return f"{drive.metres:,.1f} m, {drive.turns:,.0f} quarter-turns, {drive.time}"
 
 
 def pass_words(plan: Plan) -> str:
@@ -69,6 +70,6 @@ def _swept(floor: FloorFigures) -> str:
     """Return what a line sweeps and leaves, in words."""
     if floor.swept_share is None:
         return "no floor is reachable"
-    return (
-        f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2; {patches_left(floor)}"
-    )
+    pace = "" if floor.seconds_per_m2 is None else f", {floor.seconds_per_m2:.1f} s a square metre"
+    share = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2"
+    return f"{share}{pace}; {patches_left(floor)}"

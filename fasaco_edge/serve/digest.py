@@ -114,7 +114,7 @@ def state(
         "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
         "mission": _mission(mission),
-        "again": _again(mission, order),
+        "again": _again(order),
         "battery": _battery(status),
         "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
@@ -239,12 +239,13 @@ def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None
     }
 
 
-def _again(mission: MissionReport, order: dict[str, Any] | None) -> Digest | None:
-    """Return the last order, if it is over, so that the user can repeat it; else None.
+def _again(order: dict[str, Any] | None) -> Digest | None:
+    """Return the last order by command, so that the user can repeat it once it is over; else None.
 
-    It is empty if Start gives the same order.
+    It is sent from its beginning on: a page keeps it, also if this server begins anew before the
+    end. It is empty if Start gives the same order.
     """
-    if order is None or (mission.ordered is not None and mission.stage != "over"):
+    if order is None:
         return None
     # The outline of a room may have changed since: its number is enough.
     given = order.get("zones")

@@ -55,8 +55,14 @@ class Server:
         self._ended = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
 
-    async def run(self, address: Address, secured: ssl.SSLContext | None = None) -> None:
-        """Serve until SIGTERM or SIGINT.
+    async def run(
+        self,
+        address: Address,
+        secured: ssl.SSLContext | None = None,
+        *,
+        ready: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Serve until SIGTERM or SIGINT; call ``ready`` once it listens.
 
         Raises:
             OSError: it cannot listen there.
@@ -80,6 +86,7 @@ class Server:
             max_queue=4,
             write_limit=WAITING_BYTES,
         ):
+            ready()
             release_unused()
             working = asyncio.create_task(asyncio.to_thread(self._work))
             # If it fails the server ends, too: a page must not show old data for ever.

@@ -13,6 +13,7 @@ from websockets.frames import CloseCode
 
 from fasaco_edge.errors import FasacoError, UnreadableRecording
 from fasaco_edge.serve.messages import Hello, Order, Role, Seek, Wants, from_page, message_text
+from fasaco_edge.serve.plain import NEEDS
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import Error
@@ -35,6 +36,8 @@ ANSWER_S = 8.0
 ALIVE_S = 5.0
 # Close codes of a connection, from the range for applications.
 DENIED, MALFORMED = 4401, 4400
+# Commands that say where the robot must not drive.
+PLACING = ("start", "keep_out_add")
 
 
 class Source(Protocol):
@@ -155,7 +158,9 @@ class Viewer:
         except FasacoError as error:
             return message_text("answer", id=order.id, ok=False, text=str(error), hint=error.hint)
         text = f"{answer.state}: {plain(answer.reason)}"
-        return message_text("answer", id=order.id, ok=True, text=text, hint="")
+        is_idle = any(each.code == "no_effect" for each in answer.troubles)
+        needs = NEEDS["no_effect"] if is_idle and order.command in PLACING else ""
+        return message_text("answer", id=order.id, ok=True, text=text, hint="", needs=needs)
 
 
 @contextlib.asynccontextmanager

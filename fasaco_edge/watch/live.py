@@ -71,8 +71,10 @@ class Watched(Protocol):
 
 def watch_on_screen(
     watched: Watched, terminal: TextIO, go_on: Callable[[], bool] = lambda: True
-) -> None:
+) -> bool:
     """Show pages until q is typed, a signal arrives, or ``go_on``, called for each, returns False.
+
+    Return whether q was typed.
 
     Raises:
         OSError: the terminal is gone.
@@ -88,9 +90,10 @@ def watch_on_screen(
                 screen.show(watched.page(now, *size), size)
             typed = screen.keys(FRAME_S).lower()
             if "q" in typed:
-                return
+                return True
             if watched.press(typed):
                 shown_at = (0, (0, 0), "")
+    return False
 
 
 def watch_in_lines(watched: Watched) -> None:

@@ -1,4 +1,4 @@
-"""What somebody might try against a daemon behind mutual TLS; each says what came of it."""
+"""What an attacker might try against a daemon behind mutual TLS; each says what came of it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.support.outsider import open_client
 from tests.support.rooms import map_bytes, pose_bytes, room, update_bytes
 from tests.support.secured import Authority, House, transport
 
-# A map of a megabyte, and the mission's: to hear it once more changes nothing.
+# A map of a megabyte, and the mission's: to get it once more changes nothing.
 HALL = room(50.0, 50.0)
 GOOD_MAP = map_bytes(HALL)
 AT = (0.75, 0.75)
@@ -127,7 +127,7 @@ def oversized(megabytes: float) -> Callable[[House], str]:
 
 
 def flood(name: str, topic: str, payload: bytes, hertz: float = FLOOD_HZ) -> Callable[[House], str]:
-    """Return an attack: somebody sends one message over and over."""
+    """Return an attack: a peer sends one message over and over."""
 
     def send(house: House) -> str:
         with house.sender(name) as sender:
@@ -192,7 +192,7 @@ def half_open_tls(house: House) -> str:
 
 
 def let_in(house: House) -> str:
-    """Connect as somebody honest, as often as it takes."""
+    """Connect as an honest peer, as often as it takes."""
     began = time.monotonic()
     open_client(house.endpoint, transport(house.ca.files("eye"))).close()  # type: ignore[no-untyped-call]
     return f"viewer in after {time.monotonic() - began:.1f} s"

@@ -62,7 +62,7 @@ class ChargingMission(OnlineMission):
         return (BatteryReceived(round(self.battery.level, 3), power),)
 
     def _go(self) -> bool:
-        """Drive a leg, charge, or stand for a tick; tell whether the mission gets on."""
+        """Drive a leg, charge, or stand for a tick; return whether the mission gets on."""
         began, is_docked = self.now, self._mission.state is State.CHARGING
         if is_docked:
             self.now += TICK_S

@@ -84,7 +84,7 @@ class Campaign:
     def look(self) -> None:
         """Look at the recordings' folder: what is gone has to be older than what is there."""
         there = {path.name for path in self.runs.glob("*.rrd")}
-        # Of one recorder, so that of two which came since the last look the numbers tell.
+        # Of one recorder, so that of two which came since the last look the numbers show.
         self.created += sorted(there - set(self.created), key=_part)
         first = next((i for i, name in enumerate(self.created) if name in there), 0)
         gone = [name for name in self.created if name not in there]

@@ -54,7 +54,7 @@ PROCESSES = 2
 PATIENCE_S = 120.0
 # So much more may be there in the end; what is random in each, and no more.
 MORE = {"questions_hz": 1.0, "threads": 4, "descriptors": 4, "cores": 0.03, "rss_mb": 5.0}
-# What goes down when it is noticed that somebody is gone; memory and processor's time do not.
+# What goes down when it is noticed that a program is gone; memory and processor's time do not.
 SETTLES = ("questions_hz", "threads", "descriptors")
 # Where others connect to a daemon itself, Zenoh takes threads at both ends, and keeps some for
 # a while: a recorder has more of them just after that daemon has started again.

@@ -52,7 +52,7 @@ ROUTER = Path(__file__).parents[1] / "support" / "router.py"
 
 
 class Base:
-    """A base that moves as it is told, and a note of everything that it hears.
+    """A base that moves as commanded, and a note of everything that it receives.
 
     Attributes:
         moves: time [s, monotonic] and sender of each command that moves.

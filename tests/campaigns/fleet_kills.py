@@ -176,11 +176,11 @@ class House:
         return {name: self.robots[name].seat.status.heard[-1].json() for name in names}
 
     def is_done(self, names: Collection[str]) -> bool:
-        """Tell whether robots are done."""
+        """Return whether robots are done."""
         return all(status["state"] == "done" for status in self.statuses(names).values())
 
     def is_shared(self, names: Collection[str]) -> bool:
-        """Tell whether the whole building is divided among robots, or swept."""
+        """Return whether the whole building is divided among robots, or swept."""
         statuses = self.statuses(names)
         if all(status["state"] == "done" for status in statuses.values()):
             return True

@@ -68,7 +68,7 @@ class Tally:
 
 
 def run_campaign(schema: str, mutations: int, seed: int, advance: Callable[[int], object]) -> Tally:
-    """Judge so many mutations of one message type; ``advance`` hears of every batch."""
+    """Judge so many mutations of one message type; ``advance`` is called for every batch."""
     rng, seeds = random.Random(f"{seed} {schema}"), seeds_of(schema)
     tally = Tally(schema, schema in ENCODERS)
     # What is loaded or cached on first use is none of the decoder's memory.

@@ -56,7 +56,7 @@ class Campaign:
     """A trap, what was run in it, and what came of that.
 
     Attributes:
-        folder: of root's alone: what the commands are told to write goes here.
+        folder: of root's alone: what the commands write goes here.
         endpoint: where the daemon listens.
         slow: compile the kernels where no cache can be trusted, and run the demo.
     """
@@ -154,7 +154,7 @@ def try_alone(campaign: Campaign) -> None:
     if campaign.slow:
         campaign.run("plan", "flat", "--budget", "0.2", cache=False)
         campaign.run("bench", "speed", ends=(0, 1))
-    # Where to is foreseen, and is a link of somebody's: it says so, and does nothing.
+    # Where to is foreseen, and is a link of another user: it says so, and does nothing.
     campaign.run("demo", ends=(78,))
     if campaign.slow:
         campaign.run("demo", "--out", str(out / "demo"), "--json")
@@ -180,7 +180,7 @@ def try_together(campaign: Campaign) -> None:
             campaign.run("watch", "--once", *connect)
             campaign.run("doctor", "--config", config, ends=(0, 1))
             until(lambda: _bytes_in(recordings) > 200_000)
-    # In the home, where it is kept unless told otherwise, and what is there is links.
+    # In the home, where it is kept unless an option says otherwise, and what is there is links.
     with campaign.started("run", "--config", config):
         until(lambda: _asks(campaign, connect))
     recording = next(recordings.glob("*.rrd"))

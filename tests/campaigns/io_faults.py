@@ -69,7 +69,7 @@ class Outcome:
     Attributes:
         came: told, unnoticed, or wrong.
         exit_code: of the command.
-        said: the line that tells it, or what was wrong.
+        said: the line that reports it, or what was wrong.
         on: what the call was made on.
     """
 
@@ -105,7 +105,7 @@ def outcome_of(name: str, failure: Failure | None) -> tuple[Outcome, dict[Kind, 
 
 
 def _told_by(log: str) -> str:
-    """Return the first line of a log that tells of something wrong."""
+    """Return the first line of a log that reports something wrong."""
     for line in log.splitlines():
         if line.startswith(TELLS) and not any(usual in line for usual in USUAL):
             return line
@@ -225,7 +225,7 @@ def _all_of(name: str, most: int, seed: int, known: set[str], *, every: bool) ->
     started = time.monotonic()
     for number, failure in enumerate(failures, 1):
         outcome, _ = outcome_of(name, failure)
-        # A call that was not made this time tells nothing.
+        # A call that was not made this time shows nothing.
         if outcome.on or outcome.came == "wrong":
             yield outcome
         if outcome.came == "wrong":

@@ -91,7 +91,7 @@ def _endpoint(folder: Path) -> str:
 
 
 def _give_orders(folder: Path, environment: dict[str, str]) -> tuple[int | None, str]:
-    """Let a daemon without a map be told what to do, and end."""
+    """Let a daemon without a map get commands, and end."""
     with service(folder, _daemon_words(folder), environment) as daemon:
         if _is_ready(daemon):
             with Outsider(_endpoint(folder)) as outsider:

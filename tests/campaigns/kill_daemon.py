@@ -60,7 +60,7 @@ class Campaign:
         Args:
             trail: of the robot.
             since_s: when the check before was.
-            heard_s: from when on this daemon heard poses; inf if it never did.
+            heard_s: from when on this daemon received poses; inf if it never did.
             killed_s: when it was killed.
         """
         self.counted["torn writes"] += (self.folder / "robot.ledger.new").exists()
@@ -90,7 +90,7 @@ def run_campaign(folder: Path, kills: int, map_name: str, seed: int = 0) -> dict
     """Kill a daemon so often at random moments; check what it knows afterwards.
 
     Each time it must go on with all that it had on disk, must have lost no more than the
-    last second of what it heard, and must know of no cell the robot was not in. The robot
+    last second of what it received, and must know of no cell the robot was not in. The robot
     drives on while there is no daemon. Returns figures.
     """
     rng, totals = random.Random(seed), Counter[str]()

@@ -43,7 +43,7 @@ class Kill:
         parts: files.
         torn: of these, how many the repair had to cut.
         drawn_lost_s: age of the newest pose that is drawn [s].
-        heard_lost_s: age of the newest pose as the mission heard it [s].
+        heard_lost_s: age of the newest pose as the mission received it [s].
     """
 
     parts: int

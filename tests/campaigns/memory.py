@@ -108,7 +108,7 @@ class Row:
 
 
 def map_payload(flood: Flood, number: int) -> bytes:
-    """Return a hall; ``number`` tells it from others."""
+    """Return a hall; ``number`` distinguishes it from others."""
     pixels = np.zeros((flood.side, flood.side), np.int8)
     pixels[[0, -1]] = pixels[:, [0, -1]] = 100
     pixels[flood.side // 2, flood.side // 2 + 8 * number] = 100
@@ -210,7 +210,7 @@ def settled(
 
     Args:
         outsider, daemon: whom to ask, and about whom.
-        earlier: the status before something was sent, of which it has to tell.
+        earlier: the status before something was sent, which it has to report.
     """
     until, before = time.monotonic() + ANSWERS_S, ()
     known = earlier and (_maps(earlier), earlier["errors"]["total"])

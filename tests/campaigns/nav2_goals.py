@@ -104,7 +104,7 @@ def forced_s(pauses: list[dict[str, Any]], points: list[Point]) -> float:
 
 
 def _leads_on(line: Line, end: float, early_m: float) -> bool:
-    """Tell whether a goal that begins so early leads on beyond the end of the last one."""
+    """Return whether a goal that begins so early leads on beyond the end of the last one."""
     return early_m <= end and end_of_piece(line, end - early_m, NEAR_M) >= end + GAIN_M
 
 

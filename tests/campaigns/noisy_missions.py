@@ -51,7 +51,7 @@ LIMIT_S = 900.0
 # The most that areas may differ, of the floor that was ever reachable.
 MOST_SHARE = 0.01
 # By how much a claim is above the truth at most, of the floor that is a pixel off walls: of what is
-# beside them a map of such pixels tells nothing for certain.
+# beside them a map of such pixels shows nothing for certain.
 MOST_EXCESS = 0.05
 # A robot with work left leaves where it is, by so much [m], in so long [s].
 LEAVES_M, LEAVES_S = 0.05, 20.0

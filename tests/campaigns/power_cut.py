@@ -80,7 +80,7 @@ class Trace:
     Attributes:
         root: the folder they lie in.
         calls: in order.
-        driven: when the tool first passed over each cell that the daemon has heard of [s].
+        driven: when the tool first passed over each cell that the daemon has poses of [s].
         touched: cells that it may have passed over.
     """
 

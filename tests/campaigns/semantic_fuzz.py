@@ -66,7 +66,7 @@ class Findings:
 
 
 class Progress:
-    """Tells now and then how far it is."""
+    """Reports now and then how far it is."""
 
     def __init__(self, events: int) -> None:
         self.done = 0

@@ -167,7 +167,7 @@ class Senseless:
             yield self._pose(self._x, self._y) | {"frame": frame}
 
     def _transforms(self) -> Iterator[Event]:
-        """Tell links of a chain; now and then one that hangs on itself, or one too many."""
+        """Return links of a chain; now and then one that hangs on itself, or one too many."""
         for _ in range(self._rng.randint(1, 60)):
             frame, child = self._rng.choice(
                 [("map", "odom"), ("odom", "base_link"), ("odom", "base_link")] * 6
@@ -471,7 +471,7 @@ class Senseless:
         }
 
     def _stamp(self) -> int:
-        """Return a time that no message had before [ns]: it tells which map a path is on."""
+        """Return a time that no message had before [ns]: it says which map a path is on."""
         self._serial += 1
         return self._rng.choice(EPOCHS) + self._serial
 

@@ -1,4 +1,4 @@
-"""Senseless events into a living daemon behind a router, and what is heard of it meanwhile.
+"""Senseless events into a living daemon behind a router, and what it publishes meanwhile.
 
 Mapper, viewer, router and daemon have a process or a session of their own. What the daemon says is
 judged as it comes: a path against the very map it names, a status against its schema. What the
@@ -64,7 +64,7 @@ SOON = {"period_init_ms": 100, "period_max_ms": 500}
 MAP_AGAIN_EVERY = 50
 # A session silent for this long is dead to the others [s].
 LEASE_S = 10.0
-# Puts between two looks at what was heard.
+# Puts between two looks at what came.
 LOOK_EVERY = 100
 
 
@@ -79,7 +79,7 @@ def unit_memory_mb() -> float:
 
 
 class Judge:
-    """Looks at all that is heard.
+    """Looks at all that comes.
 
     Attributes:
         counts: of what was looked at.
@@ -112,12 +112,12 @@ class Judge:
             self._maps.popitem(last=False)
 
     def forget(self) -> None:
-        """Forget what was heard of a daemon that is gone."""
+        """Forget what came from a daemon that is gone."""
         self._heard.clear()
         self.in_force = PathInForce()
 
     def look(self) -> None:
-        """Look at all that was heard since the last time."""
+        """Look at all that came since the last time."""
         while self._heard:
             name, payload, beside, at = self._heard.popleft()
             self.counts[f"heard: {name}"] += 1
@@ -313,7 +313,7 @@ class Campaign:
                 self._rival(event)
 
     def look(self) -> None:
-        """Look at what was heard and answered, and whether the daemon lives."""
+        """Look at what came and was answered, and whether the daemon lives."""
         self._look_at_process()
         self.judge.look()
         while self._answers:
@@ -553,7 +553,7 @@ class Campaign:
     # What has to hold.
 
     def _asked_status(self) -> dict[str, Any] | None:
-        """Return the status as the daemon tells it when asked; None where nobody answers."""
+        """Return the status as the daemon replies when asked; None without a reply."""
         self._look_at_process()
         for reply in self._viewer.get(f"{PREFIX}/@rpc/status", timeout=2.0):
             if reply.ok is not None:

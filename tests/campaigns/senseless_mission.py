@@ -76,7 +76,7 @@ class BrokenInvariantError(AssertionError):
 
 
 class MissionTrial:
-    """A mission that is told events.
+    """A mission that gets events.
 
     Attributes:
         counts: of what happened, by name; codes of faults among them.

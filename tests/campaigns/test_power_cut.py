@@ -97,7 +97,7 @@ def test_a_daemon_starts_after_some_cuts_of_a_mission(tmp_path):
     mission = power_cut.watched_mission(tmp_path / "mission", seconds=1.0)
     history = [written.holds for written in power_cut.ledgers_of(mission)]
     assert len(history) > 3
-    assert contents(None) in history[1:], "the mission was told to begin anew"
+    assert contents(None) in history[1:], "the mission began anew by command"
     cuts = cuts_of(mission.root, mission.calls, 2, 0)
     outcomes = list(power_cut.outcomes_of(power_cut.MISSION, mission, cuts, tmp_path, tmp_path))
     assert len(outcomes) == 2

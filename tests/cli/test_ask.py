@@ -11,8 +11,9 @@ from fasaco_edge.cli import main
 from fasaco_edge.cli.ask import show
 from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.documents.replies import TroubleReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
-from fasaco_edge.wire.documents.status import Status, TroubleReport
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.topics import RPC_NAMES
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process

@@ -90,6 +90,18 @@ def test_what_does_not_go_together_is_told_at_once(check):
     assert "bus.security.kind tls" in told["faults"][2]["hint"]
 
 
+def test_one_round_names_what_is_known_of_both_kinds(check):
+    """A value may be wrong, and others not go together, but not those that the first concerns."""
+    wrong = "robot: {radius: 0.2, name: a/b}\nplanner: {seed: x}\nbattery: {reserv: 0.2}\n"
+    apart = "map: {free_at_most: 70}\nbus: {base: /x}\nmission: {keep_out_mask: none.yaml}\n"
+    code, told = check(wrong + apart)
+    assert code == 78
+    assert [(fault["line"], fault["key"]) for fault in told["faults"]] == [
+        *((1, "robot.radius"), (2, "planner.seed"), (3, "battery.reserv")),
+        *((4, "map.free_at_most"), (5, "bus.base"), (6, "mission.keep_out_mask")),
+    ]
+
+
 @pytest.mark.parametrize(
     ("text", "line", "said"),
     [

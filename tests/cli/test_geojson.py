@@ -7,6 +7,7 @@ import pytest
 
 from fasaco_edge.cli import main
 from fasaco_edge.cli.geojson import is_geojson, order_of, rooms_collection
+from fasaco_edge.cli.order_file import read_order_file
 from fasaco_edge.errors import OrderError
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
@@ -18,13 +19,19 @@ ROOMS = Rooms(
 )
 
 
+def read(document):
+    return order_of(document)[0]
+
+
 def collection(features):
     return {"type": "FeatureCollection", "features": features}
 
 
+SQUARE = [[0, 0, 9], [4, 0, 9], [4, 3, 9], [0, 3, 9], [0, 0, 9]]  # with a height
+
+
 def square(**properties):
-    corners = [[0, 0, 9], [4, 0, 9], [4, 3, 9], [0, 3, 9], [0, 0, 9]]  # with a height
-    geometry = {"type": "Polygon", "coordinates": [corners]}
+    geometry = {"type": "Polygon", "coordinates": [SQUARE]}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
 
 
@@ -47,13 +54,13 @@ def signed(ring):
 
 
 def test_rooms_that_were_written_are_an_order_for_these_rooms():
-    order = read_order(order_of(rooms_collection(ROOMS)))
+    order = read_order(read(rooms_collection(ROOMS)))
     assert [(zone.name, zone.room) for zone in order.zones] == [("ring", 1), ("room 2", 2)]
 
 
 def test_an_order_is_read_as_it_was_drawn():
     drawn = [square(name="kitchen", passes=["auto", "cross"]), square(keep_out=True), square()]
-    order = read_order(order_of(collection(drawn) | {"return_home": True, "until_min": 40}))
+    order = read_order(read(collection(drawn) | {"return_home": True, "until_min": 40}))
     assert [zone.name for zone in order.zones] == ["kitchen", "zone 3"]
     assert order.zones[0].passes == 2
     assert order.zones[0].polygon == ((0, 0), (4, 0), (4, 3), (0, 3))
@@ -76,17 +83,17 @@ def test_an_order_is_read_as_it_was_drawn():
 def test_a_feature_that_is_no_zone_is_named(geometry):
     drawn = [square(), {"type": "Feature", "geometry": geometry, "properties": None}]
     with pytest.raises(OrderError, match=r"features\[1\]|zones\[1\]"):
-        read_order(order_of(collection(drawn)))
+        read_order(read(collection(drawn)))
 
 
 def test_what_is_not_to_be_driven_is_never_floor_to_sweep():
     room = square(room=3, name="bath")
     drawn = [room | {"properties": room["properties"] | more} for more in KEPT]
-    order = read_order(order_of(collection([*drawn, square(name="hall", priority=90)])))
+    order = read_order(read(collection([*drawn, square(name="hall", priority=90)])))
     assert [(zone.name, zone.priority) for zone in order.zones] == [("hall", 90)]
     assert order.keep_out == (((0, 0), (4, 0), (4, 3), (0, 3)),)
     with pytest.raises(OrderError, match="keep_out: must be true or false, is 'true'"):
-        order_of(collection([square(keep_out="true")]))
+        read(collection([square(keep_out="true")]))
 
 
 KEPT = ({"keep_out": True}, {"skip": True})
@@ -95,7 +102,7 @@ KEPT = ({"keep_out": True}, {"skip": True})
 @pytest.mark.parametrize("features", [{}, {"features": []}, {"features": {"0": 1}}])
 def test_a_file_without_features_is_no_order_for_everything(features):
     with pytest.raises(OrderError, match="features: there is none"):
-        order_of({"type": "FeatureCollection"} | features)
+        read({"type": "FeatureCollection"} | features)
 
 
 def test_plan_writes_a_line_and_an_order_is_read_from_a_file(tmp_path, capsys):
@@ -108,7 +115,66 @@ def test_plan_writes_a_line_and_an_order_is_read_from_a_file(tmp_path, capsys):
     assert line["properties"] == {"pass": 1, "swept": pytest.approx(share, abs=1e-4)}
     # A line is no zone: that is said, with the file, without a daemon.
     assert main(["mission", "start", "--order", str(file)]) == 1
-    assert f"{file}: features[0]: must be a Polygon, is LineString" in screen(capsys)
+    assert f"{file}, line 1: features[0]: must be a Polygon, is LineString" in screen(capsys)
+
+
+HOLE = [[1, 1], [2, 1], [2, 2], [1, 1]]
+HALL = "line 5: features[1] 'hall': "
+CROSSING = [[0, 0], [4, 3], [4, 0], [0, 3], [0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("feature", "members", "said"),
+    [
+        (
+            {"rings": [SQUARE, HOLE]},
+            {},
+            HALL + "the polygon must have one ring",
+        ),
+        (
+            {"rings": [CROSSING]},
+            {},
+            HALL + "polygon crosses or touches itself",
+        ),
+        ({"passes": 0}, {}, HALL + "passes: expected int >= 1, got 0"),
+        (
+            {"pases": 2},
+            {},
+            HALL + "unknown member pases; did you mean passes?",
+        ),
+        ({"name": None, "id": 7, "passes": 0}, {}, "line 5: features[1] 7: passes: expected int"),
+        ({"stroke": "red"}, {"passes": 0}, "line 8: passes: expected int >= 1, got 0"),
+        (
+            {},
+            {"return-home": 1},
+            "line 8: the collection: unknown member return-home; did you mean",
+        ),
+        ({}, {"type": "Feature"}, "line 8: type: must be FeatureCollection, got 'Feature'"),
+    ],
+)
+def test_faults_of_a_drawn_order_have_a_line_and_the_features_name(
+    tmp_path, feature, members, said
+):
+    properties = {"name": "hall"} | feature
+    rings, number = properties.pop("rings", [SQUARE]), properties.pop("id", None)
+    drawn = square(**properties) | {"geometry": {"type": "Polygon", "coordinates": rings}}
+    drawn |= {} if number is None else {"id": number}
+    drawn = [square(keep_out=True), drawn]
+    lines = ['{"type": "FeatureCollection",', '\t"features":', "[", *map(json.dumps, drawn), "]"]
+    lines[3] += ","
+    lines += [f", {json.dumps({name: value})[1:-1]}" for name, value in members.items()]
+    file = tmp_path / "evening.geojson"
+    file.write_text("\n".join([*lines[:6], "", *lines[6:], "}"]))
+    with pytest.raises(OrderError) as caught:
+        read_order_file(file)
+    assert str(caught.value).startswith(f"{file}, {said}")
+
+
+def test_a_line_is_given_of_an_order_in_yaml(tmp_path):
+    file = tmp_path / "evening.yaml"
+    file.write_text("zones:\n  - name: hall\n    pases: 2\n")
+    with pytest.raises(OrderError, match=r"yaml, line 3: zones\[0\]: unknown member pases; did"):
+        read_order_file(file)
 
 
 def screen(capsys):

@@ -13,6 +13,7 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
+from fasaco_edge.cli.planning.results import OF_WALK
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -495,15 +496,17 @@ def test_figures_are_printed_for_people_too(grid_file, capsys):
     for key in KEYS:
         # But for what is null; why there is no floor is said.
         is_told = figures[key] is not None or key == "floor"
-        assert (f"│ {key.replace('_', ' ')} " in told) == is_told
+        label = f"walk {key}" if key in OF_WALK else key
+        assert (f"│ {label.replace('_', ' ')} " in told) == is_told
+    assert told.splitlines()[1].startswith("│ driven line ")
 
 
 @pytest.mark.parametrize(
     ("words", "names"),
     [
-        ((), "map swept time gap line walk search"),
-        (("--turn-radius", "0.4"), "map swept time gap line curve walk search"),
-        (("--passes", "edge,auto"), "map swept time line pass pass"),
+        ((), "map line swept gap walk search"),
+        (("--turn-radius", "0.4"), "map line swept gap curve walk search"),
+        (("--passes", "edge,auto"), "map line swept pass pass"),
         (("--robots", "1,1", "2,2"), "map time longest passed not robot robot"),
     ],
 )
@@ -518,11 +521,11 @@ def test_what_matters_fits_on_one_screen(words, names, tmp_path):
     assert f"wrote {png}" in lines
     assert "None" not in ended.out
     if "--robots" not in words:
-        assert re.search(r"^swept +9\d\.\d % of 49.4 m2; ", ended.out, re.MULTILINE)
-        assert re.search(r"^time +\d+ min \d\d s", ended.out, re.MULTILINE)
+        assert re.search(r"^swept +9\d\.\d % of 49.4 m2, ", ended.out, re.MULTILINE)
+        assert re.search(r"^line +.*, \d+ min \d\d s", ended.out, re.MULTILINE)
 
 
 def test_without_a_picture_it_is_said_how_to_have_one(grid_file):
     ended = fasaco_edge("plan", grid_file, "--ants", 8)
     assert ended.out.endswith("more: --long; a picture: --png FILE\n")
-    assert re.search(r"^time +1 min 20 s without turns *$", ended.out, re.MULTILINE)
+    assert re.search(r"^line +driven: .*, 1 min 20 s without turns", ended.out, re.MULTILINE)

@@ -45,7 +45,7 @@ TO_THE_END = [
     ("check-config mine.yaml", {0}, "mine.yaml: in order"),
     # By the computer that the tests run on.
     ("doctor --config mine.yaml", {0, 1}, "the daemon runs: covering"),
-    ("plan office --budget 0.1 --long", {0}, "recovered cells"),
+    ("plan office --budget 0.1 --long", {0}, "walk recovered cells"),
     ("ask status", {0}, "covering"),
     ("ask path", {0}, "length_m"),
     ("mission status", {0}, "everything reachable"),

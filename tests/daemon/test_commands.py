@@ -283,7 +283,7 @@ def begin_idle(outsider: Outsider) -> None:
     ("words", "said"),
     [
         (("start", "--order", "missing.yaml"), "missing.yaml: No such file or directory"),
-        (("start", "--order", "order.yaml"), "order.yaml: zones[0]: missing member name"),
+        (("start", "--order", "order.yaml"), "order.yaml, line 1: zones[0]: missing member name"),
         (("start", "--order", "order.json"), "order.json: neither plain YAML nor JSON"),
         (("start", "--order", "order.yaml", "--passes", "2"), "--order says it all, got --passe"),
         (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),

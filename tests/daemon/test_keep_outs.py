@@ -10,6 +10,7 @@ import pytest
 
 from tests.daemon.test_commands import ask, command
 from tests.daemon.test_mission import about, planned
+from tests.mission.test_idle_places import in_or_beside
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import begin, cells_of, drive, lanes
@@ -53,6 +54,12 @@ def test_a_keep_out_in_mid_mission_keeps_coverage_and_is_avoided(tmp_path):
         assert wrong["message"] == "keep_out.name: no keep-out 'lamp' was added; there are 'vase'"
         gone = keep_out(outsider, "remove", {"name": "vase"})
         assert (gone["mission"]["keep_out"], gone["coverage"]["covered"]) == (0, 12)
+        assert gone["troubles"] == []
+
+        # One without known floor holds, as the map may grow; the answer says so at once.
+        far = {"name": "far", "polygon": [[500, 500], [501, 500], [501, 501]]}
+        (trouble,) = keep_out(outsider, "add", far)["troubles"]
+        assert (trouble["code"], trouble["text"]) == ("no_effect", in_or_beside("keep-out 'far'"))
 
 
 def test_a_robot_inside_gets_an_empty_path_at_once(tmp_path):

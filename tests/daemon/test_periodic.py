@@ -94,18 +94,25 @@ def test_the_last_shares_of_an_order_do_not_wait():
     publisher.publish(drive.mission, now=0.0)
     number = room_at(drive, *IN_EAST).id
     start(drive, f"room {number}")
+    publisher.publish(drive.mission, now=ROOMS_PERIOD_S)
+    assert len(sent.messages) == 2
     drive.plan()
     drive.go()
     # While it drives, shares are not worth a message a second.
-    publisher.publish(drive.mission, now=ROOMS_PERIOD_S)
-    assert len(sent.messages) == 1
-    publisher.publish(drive.mission, now=SWEPT_PERIOD_S)
+    publisher.publish(drive.mission, now=2 * ROOMS_PERIOD_S)
     assert len(sent.messages) == 2
+    publisher.publish(drive.mission, now=2 * SWEPT_PERIOD_S)
+    assert len(sent.messages) == 3
     rooms = decode_document(sent.messages[-1][1], Rooms).rooms
     assert {room.id: room.to_go_s for room in rooms}[number] > 10.0
     drive.finish()
-    publisher.publish(drive.mission, now=SWEPT_PERIOD_S + ROOMS_PERIOD_S)
+    publisher.publish(drive.mission, now=2 * SWEPT_PERIOD_S + ROOMS_PERIOD_S)
     rooms = decode_document(sent.messages[-1][1], Rooms).rooms
     assert {room.id: (room.swept, room.to_go_s) for room in rooms}[number] == (1.0, None)
     publisher.publish(drive.mission, now=3 * SWEPT_PERIOD_S)
-    assert len(sent.messages) == 3
+    assert len(sent.messages) == 4
+    # Nor those of the next order, which begins with nothing swept.
+    start(drive, f"room {number}")
+    publisher.publish(drive.mission, now=3 * SWEPT_PERIOD_S + 0.1)
+    rooms = decode_document(sent.messages[-1][1], Rooms).rooms
+    assert {room.id: room.swept for room in rooms}[number] < 0.2

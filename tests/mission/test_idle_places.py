@@ -41,7 +41,7 @@ def said(drive, after=PERIOD_S):
 
 
 def in_or_beside(names):
-    return f"no free ground of the map so far lies in or beside {names}"
+    return f"no known floor lies in or beside {names}"
 
 
 @pytest.mark.parametrize("idle", [FAR, MILLIMETRES, IN_WALL])

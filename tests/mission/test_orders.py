@@ -91,9 +91,12 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
     ("document", "said"),
     [
         ([], "the order: expected object, got []"),
-        ({"zone": []}, "the order: unknown member zone"),
+        ({"zone": []}, "the order: unknown member zone; did you mean zones?"),
         ({"zones": [{"passes": 1}]}, "zones[0]: missing member name"),
-        ({"zones": [{**KITCHEN, "pass": 1}]}, "zones[0]: unknown member pass"),
+        (
+            {"zones": [{**KITCHEN, "pass": 1}]},
+            "zones[0]: unknown member pass; did you mean passes",
+        ),
         ({"zones": [{**KITCHEN, "name": 3}]}, "zones[0].name: expected str, got 3"),
         ({"zones": [{**KITCHEN, "name": ""}]}, "zones[0].name: expected str of length >= 1"),
         ({"zones": [{**KITCHEN, "name": "a\n"}]}, "zones[0].name must be 1..64 printable"),
@@ -110,6 +113,10 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
         ({"passes": ["x"]}, "passes[0]: expected auto, cross, edge, rest, got 'x'"),
         ({"passes": [30]}, "passes[0]: expected str | object, got 30"),
         ({"passes": [{"lanes": "x"}]}, "passes[0].lanes: expected auto, cross, got 'x'"),
+        (
+            {"passes": [{"floor": 1}]},
+            "passes[0]: unknown member floor; there are covers, lanes, angle_deg, speed_m_s",
+        ),
         ({"passes": [{"covers": 1}]}, "passes[0].covers: expected str, got 1"),
         ({"passes": [{"angle_deg": 361}]}, "passes[0].angle_deg: expected float <= 360.0, got 361"),
         ({"passes": [{"overlap": 0.6}]}, "passes[0].overlap: expected float <= 0.5, got 0.6"),

@@ -270,6 +270,17 @@ def test_no_map_gives_a_part_of_merged_rooms_to_another():
     assert at(book, *BATH) == at(book, *KITCHEN) == number
 
 
+def test_a_name_is_taken_away_and_free_again():
+    book = known(FLAT)
+    kitchen, bath = at(book, *KITCHEN), at(book, *BATH)
+    book.name(kitchen, "kitchen")
+    book.name("kitchen", "")
+    assert book.room(kitchen).title == f"room {kitchen}"
+    book.name(bath, "")
+    book.name(bath, "kitchen")
+    assert book.room("kitchen").id == bath
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [

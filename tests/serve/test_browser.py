@@ -252,6 +252,15 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         assert tab.complaints == []
 
 
+def keep_out_of_no_floor(tab: Tab) -> None:
+    """Add and remove a keep-out where no floor is known yet: it is taken, and that is said."""
+    far = '{ name: "far", polygon: [[500, 500], [501, 500], [501, 501]] }'
+    tab.js(f'command("keep_out_add", {{ keep_out: {far} }})')
+    until(lambda: "seen no floor" in tab.js("find('answer').textContent"))
+    photograph(tab, "no_floor")
+    tab.js('drop("far")')
+
+
 @needs_browser
 def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
     with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
@@ -288,6 +297,8 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
             tab.click("order")
             until(lambda: tab.js("find('loss').open"))
             press(tab, "Keep it, sweep the rest")
+            until(lambda: tab.js("find('answer').textContent") == "It sweeps the rest.")
+            keep_out_of_no_floor(tab)
             outsider.wait_status(lambda status: status["mission"]["keep_out"] == 2)
             assert outsider.ask_status()["coverage"]["covered"] == 12
             until(lambda: tab.js("drafts.length") == 0)

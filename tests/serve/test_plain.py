@@ -11,8 +11,8 @@ from fasaco_edge.mission.coverage import unreached
 from fasaco_edge.mission.line import unswept
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
-from fasaco_edge.wire.documents.replies import STATES
-from fasaco_edge.wire.documents.status import TROUBLES, Status
+from fasaco_edge.wire.documents.replies import STATES, TROUBLES
+from fasaco_edge.wire.documents.status import Status
 from tests.support.statuses import FULL
 
 # An engineer's words.

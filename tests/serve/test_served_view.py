@@ -55,7 +55,7 @@ def test_an_order_that_has_ended_can_be_given_again(ended):
     order = {"zones": zones, "return_home": True, "keep_covered": True}
     tell(view, "command", {"command": "start", "order": order}, 2.0)
     tell(view, "status", {"state": "covering", "mission": {"ordered": "command"}}, 2.0)
-    assert heard(view, "state", 2.0)["again"] is None
+    assert heard(view, "state", 2.0)["again"]["return_home"]
     if ended["ordered"] is None:
         tell(view, "command", {"command": "cancel"}, 3.0)
     tell(view, "status", {"state": "done", "mission": ended}, 3.0)

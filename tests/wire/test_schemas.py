@@ -10,8 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator, ValidationError
 
 from fasaco_edge.errors import NotYet
-from fasaco_edge.wire.documents.replies import STATES, encode_error
-from fasaco_edge.wire.documents.status import TROUBLES
+from fasaco_edge.wire.documents.replies import STATES, TROUBLES, encode_error
 from tests.wire.contract_files import CONTRACT, PROTOCOL, load
 from tests.wire.make_schemas import files
 from tests.wire.page_rows import MEMBERS, members_in, with_members

@@ -10,6 +10,7 @@ from fasaco_edge.cli.console.arguments import (
     DEFAULT_CELL_M,
     DEFAULT_RADIUS_M,
     Command,
+    Exit,
     add_json,
     naming,
 )
@@ -93,7 +94,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the mission; 0 if every reachable cell was covered."""
+    """Run the mission; 0 if every reachable cell was covered, or the user quits it."""
     from fasaco_edge.cli.demo.mission import DemoMission
     from fasaco_edge.cli.demo.robots import demo_robots
     from fasaco_edge.cli.demo.summary import print_summary, summarise
@@ -123,9 +124,11 @@ def run(args: argparse.Namespace) -> int:
             )
     with DemoMission(args, robots) as mission:
         ending = mission.watch()
+    if ending is None:
+        return Exit.OK
     summary = summarise(args, out, robots, ending)
     print_summary(summary, as_json=args.json)
-    return 0 if summary.complete else 1
+    return Exit.OK if summary.complete else Exit.ERROR
 
 
 COMMAND = Command(
@@ -133,7 +136,7 @@ COMMAND = Command(
     "of their own that talk Zenoh over loopback; show the mission; exit when every reachable cell "
     "is covered. Writes a recording (.rrd), a picture and the figures to the output folder. In a "
     "terminal of at least 60 x 20 characters it shows the mission as `fasaco-edge watch` does: f "
-    "toggles the pheromone trail, q or Ctrl-C quits.",
+    "toggles the pheromone trail, q quits.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

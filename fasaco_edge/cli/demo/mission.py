@@ -88,15 +88,16 @@ class DemoMission:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def watch(self) -> Ending:
-        """Show the mission until all is covered; return how it ended.
+    def watch(self) -> Ending | None:
+        """Show the mission until all is covered; return how it ended, None if the user quits.
 
         Raises:
-            KeyboardInterrupt: the user quits.
+            KeyboardInterrupt: a signal ends it.
             ProcessEnded: one of the processes has ended.
         """
         self._started = time.monotonic()
-        self._view.run(self._step)
+        if not self._view.run(self._step):
+            return None
         worked_at = self._worked_at
         worked_s = worked_at[-1] - worked_at[0] if worked_at else 0.0
         return Ending(

@@ -68,10 +68,11 @@ class LinesView:
         self._names = robots
         self._printed_at = [0.0] * len(robots)
 
-    def run(self, step: Callable[[float], bool]) -> None:
+    def run(self, step: Callable[[float], bool]) -> bool:
         """Call ``step`` until it returns True, each time with how long it may wait [s]."""
         while not step(WAIT_S):
             pass
+        return True
 
     def show(self, robot: int, status: Status, elapsed_s: float) -> None:
         """Print a line, if the one before is old enough."""
@@ -97,11 +98,11 @@ class LiveView:
         # A log may print on any thread.
         self._unseen: deque[str] = deque()
 
-    def run(self, step: Callable[[float], bool]) -> None:
-        """Show pages until ``step`` returns True.
+    def run(self, step: Callable[[float], bool]) -> bool:
+        """Show pages until ``step`` returns True, or q is typed; return whether it is over.
 
         Raises:
-            KeyboardInterrupt: the user quits.
+            KeyboardInterrupt: a signal ends it.
         """
         from fasaco_edge.watch.live import watch_on_screen
 
@@ -118,9 +119,10 @@ class LiveView:
 
             stack.callback(self._print_again)
             stack.enter_context(printed_by(self._keep))
-            watch_on_screen(watched, sys.stderr, go_on)
-        if not is_over:
+            quits = watch_on_screen(watched, sys.stderr, go_on)
+        if not (is_over or quits):
             raise KeyboardInterrupt
+        return is_over
 
     def show(self, robot: int, status: Status, elapsed_s: float) -> None:
         """Do nothing: what is watched comes by the bus."""

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission, show_troubles
+from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
-from fasaco_edge.cli.geojson import SUFFIX, is_geojson, order_of
 from fasaco_edge.cli.mission.keep_outs import (
     add_actions,
     asked_by,
@@ -22,8 +20,8 @@ from fasaco_edge.cli.mission.keep_outs import (
     polygon,
     show_keep_outs,
 )
+from fasaco_edge.cli.order_file import read_order_file
 from fasaco_edge.errors import OrderError, WouldForget
-from fasaco_edge.host.plain_yaml import load, read_bounded
 from fasaco_edge.mission.orders.commands import FORGETFUL
 from fasaco_edge.mission.orders.order import order_document, read_order
 from fasaco_edge.mission.orders.passes import passes_document
@@ -33,6 +31,11 @@ from fasaco_edge.wire.documents.replies import Reply
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply as Answer
 
+NO_MAP = "there is no map yet: whether known floor lies in it is shown by `mission status` later"
+ROOMS_KEPT = (
+    "rooms keep names, borders and settings, and keep-outs stay; in another building with the same "
+    "map frame, stop the daemon, delete <robot>.rooms.json beside the ledger, and start it"
+)
 KEPT = "what is covered is kept: `mission start --keep-covered` goes on with the rest"
 
 EPILOG = """\
@@ -76,6 +79,8 @@ by itself (mission.autostart of its configuration).
 
 Another order, and a reset, forget what is covered where the order before is not over: on a
 terminal they say how much and ask first; elsewhere they are refused without --yes.
+A reset keeps names, borders and settings of rooms, and keep-outs. To forget rooms, as in another
+building with the same map frame, stop the daemon, and delete <robot>.rooms.json beside the ledger.
 `start --keep-covered` goes on with the rest. `resume` goes on with what was paused, also the way
 home.
 
@@ -97,7 +102,7 @@ COMMANDS = {
     "cancel": "stop and drop the order; what is covered is kept",
     "stop": "the same as cancel; to go on later with the same order, pause it",
     "replan": "plan in full now, starting from the current path",
-    "reset": "stop and drop the order and what is covered; the ledger's file is renamed",
+    "reset": "stop and drop the order and what is covered; rooms keep their names",
     "keep-out": "areas to keep out of, changed in mid-mission: add, remove, list",
     "status": "show state, progress, and what could not be reached",
 }
@@ -200,8 +205,10 @@ def run(args: argparse.Namespace) -> int:
         show_keep_outs(answer)
     else:
         show_mission(reply)
-        if command == "status":
-            show_troubles(ask(args, "status"))
+        if asked["command"] == "keep_out_add" and answer.coverage is None:
+            err().print(NO_MAP)
+        if command == "reset":
+            err().print(ROOMS_KEPT)
         if command == "cancel" and answer.coverage and answer.coverage.covered > 1:
             err().print(KEPT)
     return Exit.OK
@@ -240,24 +247,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         options_given = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
         names = ", ".join(f"--{name}" for name in options_given)
         raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
-    try:
-        document = _read(args.order)
-        return order_document(read_order(order_of(document) if is_geojson(document) else document))
-    except OrderError as error:
-        raise OrderError(f"{args.order}: {error}", hint=error.hint) from error
-
-
-def _read(path: Path) -> object:
-    try:
-        text = read_bounded(path)
-        # YAML 1.1 would take 1e3 for a text.
-        return json.loads(text) if path.suffix in (".json", SUFFIX) else load(text)
-    except OSError as error:
-        raise OrderError(str(error.strerror), hint="name a file that can be read") from error
-    except RecursionError as error:
-        raise OrderError("nested too deeply") from error
-    except ValueError as error:
-        raise OrderError(f"neither plain YAML nor JSON: {error}") from error
+    return order_document(read_order_file(args.order))
 
 
 def _zone(text: str) -> dict[str, object]:

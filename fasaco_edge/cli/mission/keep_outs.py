@@ -21,6 +21,7 @@ examples:
 The robot keeps out of the area from now on: a path into it is cut off at once and planned anew,
 and a robot that is in it stops. The order goes on, and what is covered is kept. The area holds
 under every order, also without one, until it is removed; a restart or a reset does not remove it.
+An area in which no known floor lies is taken, as the map may grow: the answer says so.
 Areas of an order (`mission start --keep-out`) end with it: they are listed, but have no name to be
 removed by. Those of the configuration (mission.keep_out) are changed there.
 

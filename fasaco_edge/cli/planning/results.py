@@ -25,6 +25,14 @@ if TYPE_CHECKING:
     from fasaco_edge.offline.rooms import RoomsUnderLine
     from fasaco_edge.planners.planner import ColonySnapshot
 
+# Figures of the walk from cell to cell; the line that is made from it has others.
+OF_WALK = frozenset(
+    (
+        *("steps", "revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180"),
+        *("length_m", "cost_s", "lower_bound_steps", "lower_bound_cost_s", "gap"),
+    )
+)
+
 
 def write_files(
     args: argparse.Namespace, planned: Plan | PassPlans, trails: Sequence[ColonySnapshot]
@@ -101,7 +109,7 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
     """Print the figures as JSON, those that matter in some lines, or all as a table."""
     from fasaco_edge.offline.figures import floor_words
     from fasaco_edge.offline.passes import PassPlans
-    from fasaco_edge.offline.summary import pass_words, rows_of, rows_of_passes
+    from fasaco_edge.offline.summary import line_words, pass_words, rows_of, rows_of_passes
 
     figures: dict[str, Any] = planned.figures | {"map": str(args.map)}
     rooms = None if isinstance(planned, PassPlans) or not args.rooms else planned.rooms
@@ -116,8 +124,10 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
         figures["floor"] = "not known of a coverage grid" if floor is None else floor_words(floor)
         if not isinstance(planned, PassPlans):
             figures["curve"] = planned.curve_words or None
-        rows = [(name.replace("_", " "), text) for name, text in terminal.known(figures)]
-        console.print(terminal.figures(rows))
+        driven = {"driven line": line_words(planned.drive), "floor": figures.pop("floor")}
+        labelled = {f"walk {name}" if name in OF_WALK else name: figures[name] for name in figures}
+        known = terminal.known(driven | labelled)
+        console.print(terminal.figures((name.replace("_", " "), text) for name, text in known))
     elif isinstance(planned, PassPlans):
         console.print(terminal.summary(rows_of_passes(planned)))
     else:

@@ -333,7 +333,7 @@ class Loop:
         commands, runner = self._ports.commands, self._runner
         commands.note(answers, now)
         if commands.are_asked:
-            report = self._status.reply(runner)
+            report = self._status.reply(runner, now)
             now = time.monotonic()
             is_kept = self._keeper.is_kept(now) and self._rooms.is_kept(now)
             self._guard.attempt("@rpc/mission", partial(commands.answer, report, is_kept=is_kept))

@@ -19,6 +19,7 @@ from fasaco_edge.wire.documents.replies import (
     KeepOutReport,
     MissionReport,
     Point,
+    TroubleReport,
     UnreachedArea,
     UnreachedReport,
     ZoneReport,
@@ -29,7 +30,6 @@ from fasaco_edge.wire.documents.status import (
     MapReport,
     PlanCounts,
     PoseReport,
-    TroubleReport,
 )
 
 if TYPE_CHECKING:

@@ -244,11 +244,14 @@ class RoomsPublisher:
         self._published_at = float("-inf")
         self._version = -1
         self._progress: object = None
+        self._order: object = None
 
     def publish(self, mission: Mission | None, now: float) -> None:
         """Publish the rooms if that is due."""
         book, progress_id = self._book, None if mission is None else _progress_of(mission)
-        is_new = book.version != self._version
+        # Another order may have forgotten what was swept for the one before.
+        order = None if mission is None else mission.order_state.order
+        is_new = book.version != self._version or order is not self._order
         if not is_new and (progress_id == self._progress or not book.rooms):
             return
         # Shares at the end of an order are not to be missed by who ends with it.
@@ -256,6 +259,7 @@ class RoomsPublisher:
         if now - self._published_at < (ROOMS_PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
             return
         self._published_at, self._version, self._progress = now, book.version, progress_id
+        self._order = order
         progress = {} if mission is None else room_progress(mission)
         rooms = tuple(_report(room, progress.get(room.id)) for room in book.rooms)
         self._outbox.send(ROOMS, encode_json(Rooms(book.frame, book.version, rooms)))

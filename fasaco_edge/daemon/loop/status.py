@@ -28,14 +28,13 @@ from fasaco_edge.daemon.loop.mission_reports import (
 )
 from fasaco_edge.host.processes import resident_mb, thread_count
 from fasaco_edge.wire.documents.path_documents import PathReport
-from fasaco_edge.wire.documents.replies import Reply
+from fasaco_edge.wire.documents.replies import Reply, TroubleReport
 from fasaco_edge.wire.documents.status import (
     ClaimReport,
     Latencies,
     LedgerReport,
     Status,
     SupervisedRecorder,
-    TroubleReport,
 )
 
 if TYPE_CHECKING:
@@ -140,7 +139,7 @@ class StatusBoard:
             troubles=troubles,
         )
 
-    def reply(self, runner: MissionRunner) -> Reply:
+    def reply(self, runner: MissionRunner, now: float) -> Reply:
         """Return the reply to a command."""
         state, reason = self._state(runner)
         return Reply(
@@ -150,6 +149,7 @@ class StatusBoard:
             coverage=coverage_report(runner.mission),
             floor=floor_report(runner.mission),
             mission=mission_report(runner.mission, runner.order_state, self._standing),
+            troubles=self._troubles(runner, now),
         )
 
     def _state(self, runner: MissionRunner) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from fasaco_edge.mission.orders.mask import mask_frame, mask_polygons
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.zones import near_polygons
 
-# Least time between two looks [s]: a map that grows changes often.
+# Least time between two looks at the same places [s]: a map that grows changes often.
 PERIOD_S = 1.0
 # Limit on the pixels of a check, and number of pixels that each polygon counts in addition to its
 # own: some tens of milliseconds in all.
@@ -71,8 +71,9 @@ class IdlePlaces:
             is_theirs: whether the places of the configuration belong to this map.
         """
         asked = order.order.as_given.keep_out if order.order else ()
-        key = revision, asked, order.keep_out, is_theirs
-        if key == self._key or now - self._looked_at < PERIOD_S:
+        key = asked, order.keep_out, is_theirs, revision
+        is_late = now - self._looked_at >= PERIOD_S
+        if key == self._key or (key[:-1] == self._key[:-1] and not is_late):
             return self._said
         self._key, self._looked_at = key, now
         if grid.frame != self._frame:
@@ -101,7 +102,7 @@ class IdlePlaces:
             else:
                 idle.append(area[0])
         if idle:
-            yield f"no free ground of the map so far lies in or beside {_listed(idle)}"
+            yield f"no known floor lies in or beside {_listed(idle)}"
         x0, y0, x1, y1 = grid.geometry.bounds()
         outside = [name for name, (x, y) in self._points if not (x0 <= x <= x1 and y0 <= y <= y1)]
         if outside and is_theirs:

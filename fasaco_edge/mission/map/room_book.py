@@ -243,13 +243,14 @@ class RoomBook:
         return f"there are {titles:.{MOST_LISTED}}" if titles else "no room is known yet"
 
     def name(self, called: str | int, name: str) -> None:
-        """Give a room a name.
+        """Give a room a name; "" takes it away.
 
         Raises:
             OrderError: there is no such room, or another one has that name, or it is no name.
         """
         room = self.room(called)
-        self.check_name("room.name", name, room.id)
+        if name:
+            self.check_name("room.name", name, room.id)
         self.put_by_hand(replace(room, name=name))
 
     def holes(self, room: Room) -> tuple[Polygon, ...]:

@@ -30,7 +30,7 @@ from fasaco_edge.mission.orders.room_requests import (
     RoomRequest,
 )
 from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
-from fasaco_edge.text import misfit
+from fasaco_edge.text import misfit, nearest, objects_of
 
 MOST_ZONES = 100
 Minutes = Annotated[float, Meta(ge=0, le=1440)]
@@ -308,16 +308,29 @@ def converted(document: object, kind: type[_Read]) -> _Read:
     try:
         return msgspec.convert(document, kind)
     except msgspec.ValidationError as error:
-        raise OrderError(_explained(str(error), document)) from error
+        raise OrderError(_explained(str(error), document, kind)) from error
 
 
-def _explained(message: str, document: object) -> str:
+def _members(kind: type[msgspec.Struct], where: str) -> list[str]:
+    """Return the members of the object at ``where`` in a document."""
+    for name in re.findall(r"[a-z_]+", where):
+        types = {field.encode_name: field.type for field in msgspec.structs.fields(kind)}
+        kind = next(objects_of(types[name], 6))
+    return [field.encode_name for field in msgspec.structs.fields(kind)]
+
+
+def _explained(message: str, document: object, whole: type[Document]) -> str:
     """Turn ``Expected `int` >= 1 - at `$.passes``` into member, expectation and value."""
     where, what, value = misfit(message, document)
     where = where.lstrip(".")
     if match := re.fullmatch(r"object (contains unknown|missing required) field (.*)", what):
-        kind = "unknown" if match[1].endswith("unknown") else "missing"
-        return f"{where or 'the order'}: {kind} member {match[2]}"
+        of = where or "the order"
+        if match[1] == "missing required":
+            return f"{of}: missing member {match[2]}"
+        names = _members(whole, where)
+        near = nearest(match[2], names)
+        meant = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
+        return f"{of}: unknown member {match[2]}; {meant}"
     if what.startswith("invalid enum value"):
         member = re.sub(r"\[\d+\]$", "", where).rpartition(".")[2]
         what = f"expected {', '.join(get_args(_WORDS.get(member, CommandName)))}"

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M
-from fasaco_edge.mission.orders.keep_outs import PlaceName
+from fasaco_edge.mission.orders.keep_outs import LONGEST_NAME, PlaceName
 from fasaco_edge.mission.orders.passes import Passes, passes_of
 
 # A merge joins at most this many rooms with one.
@@ -28,7 +28,8 @@ class RoomRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
 
     Attributes:
         id: its number or its name.
-        name: for `room_name` the new name; for `room_merge`, if given, that of the merged room.
+        name: for `room_name` the new name, or "" for none; for `room_merge`, if given, that of the
+            merged room.
         cut: for `room_split`: a segment from wall to wall.
         others: for `room_merge`: numbers or names of the rooms to merge with it.
         passes: for `room_set`: passes of an order by its name that gives none itself.
@@ -38,7 +39,7 @@ class RoomRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     """
 
     id: RoomNumber | PlaceName
-    name: PlaceName | None = None
+    name: Annotated[str, Meta(max_length=LONGEST_NAME)] | None = None
     cut: (
         Annotated[list[Corner], Meta(min_length=2, max_length=2, description="its two ends")] | None
     ) = None

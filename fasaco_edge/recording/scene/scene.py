@@ -35,9 +35,10 @@ from fasaco_edge.recording.scene.runcard import UNDER_WAY, Outcome, RunDescripti
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.replies import TROUBLES
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
-from fasaco_edge.wire.documents.status import TROUBLES, ErrorCounts, Recorder, Status
+from fasaco_edge.wire.documents.status import ErrorCounts, Recorder, Status
 from fasaco_edge.wire.messages.maps import directions_of
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage

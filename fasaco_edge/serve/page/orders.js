@@ -14,7 +14,8 @@ function order() {
   };
 }
 
-// An order that has ended can be given again, also after a restart of the server.
+// An order that has ended can be given again, also after a restart of the server: it is kept from its
+// beginning on.
 function lastOrder(state) {
   const key = `last order of ${state.robot}`;
   try {
@@ -33,8 +34,8 @@ function inWords(order) {
 const often = (passes) => (Array.isArray(passes) ? passes.length : passes) || 1;
 function goesOn(what) {
   const mission = (model.state || {}).mission || {}, zones = what.zones || [], areas = model.areas || { zones: [], keep_out: [] };
-  const isKeptOut = (what.keep_out || []).length || areas.keep_out.some((area) => area.is === "order");
-  if (mission.ordered !== "command" || mission.stage === "over" || isKeptOut) return false;
+  const keptOut = areas.keep_out.filter((area) => area.is === "order").map((area) => area.polygon);
+  if (mission.ordered !== "command" || mission.stage === "over" || JSON.stringify(what.keep_out || []) !== JSON.stringify(keptOut)) return false;
   if (Boolean(what.return_home) !== mission.return_home || zones.length !== mission.zones.length) return false;
   if (!zones.length) return often(what.passes) === mission.passes;
   const given = areas.zones.filter((area) => area.is === "ordered");
@@ -52,7 +53,8 @@ find("again").addEventListener("click", () => start(lastOrder(model.state)));
 // A start that would forget what is covered is refused: the page then asks what to do.
 let refused = null;
 function start(what, discard = false) {
-  const said = goesOn(what) ? "It goes on: it is at that already. To begin anew, Cancel first." : "";
+  const goes = what.keep_covered ? "It sweeps the rest." : discard ? "It begins anew." : "";
+  const said = goesOn(what) ? "It goes on: it is at that already. To begin anew, Cancel first." : goes;
   command("start", { order: what, discard }, {
     said,
     taken: () => { drafts.length = 0; chosen.clear(); showDrafts(); pickRoom(0); },

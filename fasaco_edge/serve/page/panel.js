@@ -322,7 +322,7 @@ const REFUSED = { not_now: "That is not possible now.", bad_order: "It cannot do
 function showAnswer(answer) {
   const then = awaited.get(answer.id) || {};
   awaited.delete(answer.id);
-  if (answer.ok) say(then.said || TAKEN[then.name] || "", "good");
+  if (answer.ok) say([then.said || TAKEN[then.name] || "", answer.needs].filter(Boolean).join(" "), answer.needs ? "" : "good");
   // What is wrong with a room is for its owner to mend.
   else if (answer.code === "bad_order" && then.name.startsWith("room_")) say(roomFault(answer), "bad");
   else say(REFUSED[answer.code] || "That did not work.", "bad", answer.hint ? `${answer.text} (${answer.hint})` : answer.text);

@@ -171,7 +171,7 @@ const change = (name, members, then) => command(name, { room: { id: pickedRoom, 
 const setPasses = () => change("room_set", { passes: passesIn("roompasses", "roomcross") || 1 });
 const rename = () => {
   const name = find("roomname").value.trim();
-  if (name) change("room_name", { name });
+  change("room_name", { name }, name ? {} : { said: "It has no name any more." });
   find("roomname").blur();
 };
 

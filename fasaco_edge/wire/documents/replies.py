@@ -23,6 +23,10 @@ STATES: Final = (
     *("returning", "charging", "paused", "blocked", "degraded", "done"),
 )
 State = Annotated[str, allowed(enum=STATES)]
+TROUBLES: Final = (
+    *("not_begun", "no_pose", "pose_jumped", "no_map", "no_battery", "no_dock", "no_current"),
+    *("shut_in", "blocked", "stands", "beside_line", "two_publishers", "no_effect"),
+)
 
 
 class Point(Document, frozen=True):
@@ -194,6 +198,21 @@ class MissionReport(Document, frozen=True):
     first_from: Annotated[int, Meta(ge=1, le=100)] | None = None
 
 
+class TroubleReport(Document, frozen=True):
+    """What is wrong while the mission is in its state.
+
+    Attributes:
+        text: what is wrong, for a person.
+        do: what to do about it.
+        since_s: for how long it has been reported [s].
+    """
+
+    code: Annotated[str, allowed(enum=TROUBLES)] = ""
+    text: str = ""
+    do: str = ""
+    since_s: Amount = 0.0
+
+
 class Reply(Document, frozen=True):
     """The reply to an accepted command."""
 
@@ -203,6 +222,7 @@ class Reply(Document, frozen=True):
     coverage: CoverageReport | None = None
     floor: FloorReport | None = None
     mission: MissionReport = MissionReport()
+    troubles: Annotated[tuple[TroubleReport, ...], allowed(maxItems=len(TROUBLES))] = ()
 
 
 class Replan(Document, frozen=True):

@@ -14,21 +14,19 @@ from msgspec import UNSET, Meta, UnsetType
 from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal, allowed
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import (
+    TROUBLES,
     CoverageReport,
     FloorReport,
     MissionReport,
     Point,
     State,
+    TroubleReport,
 )
 from fasaco_edge.wire.documents.settings import Settings
 
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
 SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")
 CLAIMS: Final = ("looks", "waits", "yields", "plans")
-TROUBLES: Final = (
-    *("not_begun", "no_pose", "pose_jumped", "no_map", "no_battery", "no_dock", "no_current"),
-    *("shut_in", "blocked", "stands", "beside_line", "two_publishers", "no_effect"),
-)
 
 
 class ClaimReport(Document, frozen=True):
@@ -247,21 +245,6 @@ class SupervisedRecorder(Document, frozen=True):
     rss_mb: Amount | UnsetType = UNSET
     cpu_s: Amount | UnsetType = UNSET
     pid: Ordinal | UnsetType = UNSET
-
-
-class TroubleReport(Document, frozen=True):
-    """What is wrong while the mission is in its state.
-
-    Attributes:
-        text: what is wrong, for a person.
-        do: what to do about it.
-        since_s: for how long it has been reported [s].
-    """
-
-    code: Annotated[str, allowed(enum=TROUBLES)] = ""
-    text: str = ""
-    do: str = ""
-    since_s: Amount = 0.0
 
 
 class MemberReport(Document, frozen=True):

@@ -60,7 +60,7 @@ class Base:
         wheels: velocities of its wheels.
         grip: share of these that moves it.
         touches: whether the hull touches something.
-        touches_person: whether that is somebody who walks about: 0 nobody, 1 beside or behind the
+        touches_person: whether that is a walking person: 0 no person, 1 beside or behind the
             robot, 2 in front of it.
     """
 
@@ -109,7 +109,7 @@ class Base:
         self.now = self._tick * TICK_S
 
     def _is_ahead(self, thing: Any) -> bool:
-        """Tell whether the middle of something is in front of the robot's."""
+        """Return whether the middle of something is in front of the robot's."""
         x, y = (float(value) for value in thing.state[:2, 0])
         along = math.cos(self.truth.yaw) * (x - self.truth.x)
         return along + math.sin(self.truth.yaw) * (y - self.truth.y) > 0.0

@@ -27,8 +27,8 @@ class FloorAccount:
         ever: what was reachable on any map, and is free on the newest.
         closed: the part of it that is not reachable on the newest map and was not swept.
         swept: what is reachable on the newest map and was swept by the record.
-        claimed: the same as the mission tells.
-        told_closed: floor out of reach as the mission tells.
+        claimed: the same as the mission reports.
+        told_closed: floor out of reach as the mission reports.
     """
 
     ever: float
@@ -47,7 +47,7 @@ class FloorAccount:
 
     @property
     def untold(self) -> float:
-        """Floor that is neither swept, nor left, nor out of reach by what is told, as a share."""
+        """Floor that is neither swept, nor left, nor out of reach as reported, as a share."""
         return max(self.closed - self.told_closed, 0.0) / self.ever
 
 

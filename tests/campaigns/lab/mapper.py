@@ -70,7 +70,7 @@ class Mapper:
         return composed(self.correction, odometry)
 
     def wants(self, odometry: Pose2D) -> bool:
-        """Tell whether a scan from here would be kept."""
+        """Return whether a scan from here would be kept."""
         last = self._odometry
         if last is None:
             return True

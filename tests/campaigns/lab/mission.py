@@ -116,7 +116,7 @@ class _Running:
         self._stood_from, self._stood_at = self._base.truth, 0.0
 
     def is_over(self) -> bool:
-        """Tell whether there is nothing more to be seen."""
+        """Return whether there is nothing more to be seen."""
         now = self._base.now
         return (
             now >= self._limit_s or now - self._done_at > SURE_S or now - self._stood_at > GIVE_UP_S

@@ -74,7 +74,7 @@ def changes_ahead(
 
 
 def differs(before: Points, after: Points) -> bool:
-    """Tell whether a stretch of path leads elsewhere than the one before it, or ends earlier."""
+    """Return whether a stretch of path leads elsewhere than the one before it, or ends earlier."""
     if not len(before) or len(after) < len(before) - SLACK:
         return len(before) != len(after)
     common = min(len(before), len(after))

@@ -34,7 +34,7 @@ class CountedTime:
     _moves: int = 0
 
     def __call__(self, progress: SearchProgress) -> bool:
-        """Count a piece of work; tell whether to stop."""
+        """Count a piece of work; return whether to stop."""
         # A repair that is followed by a search begins to count anew.
         moves = progress.work.proposals - self._moves
         self._moves = progress.work.proposals

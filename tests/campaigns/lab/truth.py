@@ -35,7 +35,7 @@ class Truth:
         reachable: the floor that the tool's disc touches where the robot's disc fits and comes to
             from its start.
         clear: the same for a disc that is larger by a pixel of the robot's map: what lies nearer to
-            walls no map of such pixels tells for certain.
+            walls no map of such pixels shows for certain.
         swept: the floor that the tool's disc passed over.
         claimed: the floor that the product says was swept.
     """
