@@ -20,7 +20,6 @@ from fasaco_edge.grid.geometry import Point, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.mapper import Mapper
-from fasaco_edge.simulation.noisy_mapper import MapperNoise, NoisyMapper
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     Battery,
@@ -84,7 +83,8 @@ class World:
         truth: the building. What is not free there (unknown too) is an obstacle.
         start: the robot's first pose, in the frame of ``truth``.
         config: the robot.
-        noise: of its mapper; None for none.
+        mapper: the robot's; None for one that makes no error.
+        late_s: age of a pose when it is published [s].
 
     Raises:
         StartOutsideMap: ``start`` is not on ``truth``.
@@ -96,7 +96,8 @@ class World:
         truth: OccupancyGrid,
         start: Pose2D,
         config: SimulationConfig,
-        noise: MapperNoise | None = None,
+        mapper: Mapper | None = None,
+        late_s: float = 0.0,
     ) -> None:
         self._truth, self.config = truth, config
         # Name of the frame of everything the robot publishes.
@@ -110,10 +111,10 @@ class World:
                 f"({start.x:g}, {start.y:g}) m"
             )
         self.drive = DriveState(start)
-        self.mapper = NoisyMapper(truth, config, noise) if noise else Mapper(truth, config)
+        self.mapper = mapper or Mapper(truth, config)
         # Poses that are not yet published, and by how much each is delayed.
         self._poses: deque[StampedPose] = deque()
-        self._late_ns = round(noise.late_s / config.tick_s) * config.tick_ns if noise else 0
+        self._late_ns = round(late_s / config.tick_s) * config.tick_ns
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
         # The newest velocity, if one drives it: speed [m/s], turn rate [rad/s], and its tick.

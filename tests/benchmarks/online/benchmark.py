@@ -27,8 +27,7 @@ DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement", "warehouse")
 FEWEST_CELLS, MOST_CELLS = 1_000, 1_000_000
 # Options that figures say of themselves.
 CONDITIONS = (
-    "starts", "ranges", "seeds", "misread", "cost", "turn_s", "speed_m_s", "proposals",
-    "planning_takes_time", "planners", "noise",
+    "starts", "ranges", "seeds", "cost", "turn_s", "speed_m_s", "proposals", "planners",
 )  # fmt: skip
 
 
@@ -53,9 +52,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=within(FEWEST_CELLS, MOST_CELLS),
         default=5_000,
         help="of generated buildings (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--mazes", type=_some, default=1, metavar="N", help="beside (default: %(default)s)"
     )
     parser.add_argument(
         "--cases",
@@ -88,7 +84,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=positive,
         default=1,
         metavar="N",
-        help="0 to N - 1, of planner and misreadings (default: %(default)s)",
+        help="0 to N - 1, of the planner (default: %(default)s)",
     )
     parser.add_argument(
         "--proposals",
@@ -96,12 +92,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         default=2_000_000,
         help="moves that a plan may try, in place of the daemon's time (default: %(default)s, "
         "about its 0.1 s)",
-    )
-    parser.add_argument(
-        "--planning-takes-time",
-        action="store_true",
-        help="the robot drives on, or stands, while a plan is made; then figures depend on the "
-        "machine",
     )
 
 
@@ -113,22 +103,6 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
         default=[3.5, 8.0],
         metavar="M",
         help="reach of the scanner, which looks all around [m] (default: 3.5 8)",
-    )
-    parser.add_argument(
-        "--misread",
-        type=within(0.0, 0.5),
-        default=0.0,
-        metavar="SHARE",
-        help="of the cells taken for the opposite of what they are, beyond 1 m (default: "
-        "%(default)g; there are goals for 0.05, too)",
-    )
-    parser.add_argument(
-        "--noise",
-        type=within(0.0, 4.0),
-        default=0.0,
-        metavar="LEVEL",
-        help="each mission in a building once more, with a mapper of so much noise; 1: of a scan "
-        "matcher's (default: none)",
     )
     parser.add_argument(
         "--cost",
@@ -155,24 +129,21 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
 def _plan(args: argparse.Namespace) -> OnlinePlan:
     names = grid_names(args, () if args.generated else DEFAULT_MAPS)
     return OnlinePlan(
-        choice=BuildingChoice(names, args.generated, args.cells, args.mazes),
+        choice=BuildingChoice(names, args.generated, args.cells),
         cases=tuple(dict.fromkeys(args.cases)),
         starts=args.starts,
         ranges_m=tuple(dict.fromkeys(args.ranges)),
         seeds=args.seeds,
-        misread=args.misread,
         pace=Pace(args.speed_m_s, args.turn_s),
         with_turns=args.cost == "turns",
         proposals=args.proposals,
-        planning_takes_time=args.planning_takes_time,
         planners=tuple(dict.fromkeys(args.planners)),
-        noise=args.noise,
     )
 
 
 def _report(args: argparse.Namespace, runs: Sequence[MissionRun]) -> Report:
     about = {name: getattr(args, name) for name in CONDITIONS}
-    return report(args.misread, with_turns=args.cost == "turns", about=about, runs=runs)
+    return report(with_turns=args.cost == "turns", about=about, runs=runs)
 
 
 ONLINE = Benchmark(
@@ -180,11 +151,11 @@ ONLINE = Benchmark(
     summary="whole missions in unknown buildings, against robots that know them",
     description="Send a simulated robot into buildings it does not know: after every cell its "
     "scanner reveals some more, the real mission decides, the daemon's planner plans with "
-    "counted work, and the robot drives on; without a bus and, unless asked for, without "
+    "counted work, and the robot drives on; without a bus and without "
     "waiting for plans, so that the same options give the same missions. Every trail is judged "
     "by code that shares nothing with mission and planner, and compared with the near-optimal "
-    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more. Mazes, and cases "
-    "in which something happens on the way, are reported beside.",
+    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more. Cases "
+    "in which something happens on the way are reported beside.",
     add_options=_add_options,
     count=lambda args: count(_plan(args)),
     measure=lambda args, say: measure(_plan(args), say),
@@ -192,11 +163,9 @@ ONLINE = Benchmark(
     epilog="""\
 examples:
   python -m tests.benchmarks online
-  python -m tests.benchmarks online --maps flat basement --ranges 3.5 --mazes 0 --cases
-  python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --misread 0.05 --json
+  python -m tests.benchmarks online --maps flat basement --ranges 3.5 --cases
+  python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --json
   python -m tests.benchmarks online --generated 3 --cells 10000 --cost turns
-  python -m tests.benchmarks online --maps office flat --mazes 0 --cases --noise 1 --cost turns
-  python -m tests.benchmarks online --maps office --cases person --planning-takes-time
   python -m tests.benchmarks online --planners fasaco fasaco-anew aco aco-anew spiral-stc zigzag
 """,
 )

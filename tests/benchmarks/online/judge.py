@@ -51,11 +51,9 @@ def judged(mission: OnlineMission) -> Verdict:
 
     In a building that stays as it is, the trail is a walk over its lattice: each step is to be
     one of that. In one that changes, what counts is which of the cells that can be reached in
-    the end, and where the map has them in the end, the tool has passed over. So in one that the map
-    shows as it is not.
+    the end, and where the map has them in the end, the tool has passed over.
     """
-    is_walk = mission.building.kind != CASE and not mission.is_noisy
-    return _judged_walk(mission) if is_walk else _judged_case(mission)
+    return _judged_case(mission) if mission.building.kind == CASE else _judged_walk(mission)
 
 
 def _judged_walk(mission: OnlineMission) -> Verdict:
@@ -169,7 +167,6 @@ class MissionRun:
         stale_m: way driven on a path that the newest map had blocked further on [m].
         replans, ingests, kept, updates: see ``Watch``.
         planner: one of ``contenders.CONTENDERS``.
-        noise: of the robot's mapper, see ``Senses``.
     """
 
     building: str
@@ -199,7 +196,6 @@ class MissionRun:
     kept: tuple[float, ...]
     updates: tuple[bool, ...]
     planner: str
-    noise: float = 0.0
 
     @property
     def covered_all(self) -> bool:

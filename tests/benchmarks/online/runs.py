@@ -21,7 +21,6 @@ from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun, Reference, judged
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission, near_optimal
 from tests.benchmarks.online.robot import Pace
-from tests.benchmarks.online.sight import Senses
 
 # Full plans that are timed for each start.
 FULL_PLANS = 3
@@ -32,18 +31,15 @@ class OnlinePlan:
     """What to measure: every combination.
 
     Attributes:
-        choice: buildings and mazes.
+        choice: of buildings.
         cases: names of CASES; each once, with the first range.
         starts: how many in each building.
         ranges_m: reaches of the scanner [m].
-        seeds: how many, from 0 on: of planner and scanner.
-        misread: share of the cells that are misread from afar; not in cases.
+        seeds: how many, from 0 on, of the planner.
         pace: of the robot.
         with_turns: whether its walks are to take little time, or few steps alone.
         proposals: budget of a plan.
-        planning_takes_time: as in ``Conditions``.
         planners: names of CONTENDERS.
-        noise: of a mapper, under which each mission in a building is made a second time; 0: none.
     """
 
     choice: BuildingChoice
@@ -51,25 +47,17 @@ class OnlinePlan:
     starts: int
     ranges_m: tuple[float, ...]
     seeds: int
-    misread: float
     pace: Pace
     with_turns: bool
     proposals: int
-    planning_takes_time: bool
     planners: tuple[str, ...] = (DAEMON,)
-    noise: float = 0.0
-
-    @property
-    def noises(self) -> tuple[float, ...]:
-        """Noises of the mappers of each mission."""
-        return (0.0, self.noise) if self.noise else (0.0,)
 
 
 def count(plan: OnlinePlan) -> int:
     """Return how many missions ``measure`` will yield."""
     choice = plan.choice
-    buildings = len(choice.grids) + choice.generated + choice.mazes
-    missions = buildings * plan.starts * len(plan.ranges_m) * len(plan.noises) + len(plan.cases)
+    buildings = len(choice.grids) + choice.generated
+    missions = buildings * plan.starts * len(plan.ranges_m) + len(plan.cases)
     return plan.seeds * len(plan.planners) * missions
 
 
@@ -99,10 +87,9 @@ def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
             if key not in references:
                 say(f"{started.name}: reference")
                 references[key] = _reference(plan, started)
-            for range_m, noise in itertools.product(plan.ranges_m, plan.noises):
-                under = f", noise {noise:g}" if noise else ""
-                say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m{under}")
-                yield _run(one, started, range_m, seed, references[key], noise=noise)
+            for range_m in plan.ranges_m:
+                say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m")
+                yield _run(one, started, range_m, seed, references[key])
         for name in plan.cases:
             say(f"{planner}, seed {seed}: {name}")
             case = CASES[name]
@@ -129,8 +116,6 @@ def _run(
     seed: int,
     reference: Reference | None,
     act: Act = lambda _: True,
-    *,
-    noise: float = 0.0,
 ) -> MissionRun:
     happened = False
 
@@ -139,13 +124,11 @@ def _run(
         happened = act(mission) or happened
 
     (planner,) = plan.planners
-    misread = plan.misread if reference is not None else 0.0
     conditions = Conditions(
-        senses=Senses(range_m, misread, seed, noise),
+        range_m=range_m,
         pace=plan.pace,
         cost=plan.pace.cost(building.footprint.cell_m, with_turns=plan.with_turns),
         seat=CountedPlanning(seed, plan.proposals, planner),
-        planning_takes_time=plan.planning_takes_time,
         plans_on_trail=CONTENDERS[planner].on_trail,
     )
     mission = OnlineMission(building, conditions)
@@ -179,5 +162,4 @@ def _run(
         kept=tuple(watch.kept),
         updates=tuple(watch.updates),
         planner=planner,
-        noise=noise,
     )

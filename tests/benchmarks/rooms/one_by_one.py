@@ -21,7 +21,6 @@ from fasaco_edge.mission.config import ByRoom, MissionPolicy
 from tests.benchmarks.online.buildings import Building
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission
 from tests.benchmarks.online.robot import Pace
-from tests.benchmarks.online.sight import Senses
 from tests.benchmarks.rooms.homes import Home, home
 
 KINDS = ("home", "office")
@@ -73,7 +72,7 @@ def building_of(floor: Home) -> Building:
 def drive(floor: Home, start: int, policy: ByRoom, kind: str, number: int) -> Drive:
     """Run a mission and judge it by the true rooms."""
     conditions = Conditions(
-        senses=Senses(RANGE_M, 0.0, start, 0.0),
+        range_m=RANGE_M,
         pace=PACE,
         cost=PACE.cost(FOOTPRINT.cell_m, with_turns=True),
         seat=CountedPlanning(start, PROPOSALS),

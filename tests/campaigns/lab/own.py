@@ -16,10 +16,10 @@ from fasaco_edge.follow.estimate import STAND, Command
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, ranges_of
-from fasaco_edge.simulation.noisy_mapper import MapperNoise
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from tests.campaigns.lab.building import Building
+from tests.campaigns.lab.noisy_mapper import MapperNoise, noisy_world
 from tests.campaigns.lab.settings import BEAMS, MOST_RANGE_M, TICK_S, LabSettings, stamp_ns
 
 FRAME = "map"
@@ -66,9 +66,11 @@ class OwnBase:
             turn_radius_m=settings.turn_radius_m,
         )
         noise = NOISES[settings.own]
-        noise = replace(noise, seed=settings.seed) if noise else None
-        truth = OccupancyGrid(building.geometry, cells, FRAME)
-        self.world = World(truth, building.start, config, noise)
+        truth, start = OccupancyGrid(building.geometry, cells, FRAME), building.start
+        if noise is None:
+            self.world = World(truth, start, config)
+        else:
+            self.world = noisy_world(truth, start, config, replace(noise, seed=settings.seed))
         self._truth = truth
         self._noise_m, self._rng = settings.noise_m, np.random.default_rng(settings.seed)
         self.wheels, self.touches = STAND, False

@@ -22,6 +22,7 @@ from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.kernels.lattice.raycast import Scanner, count_rays, ranges_of
 from fasaco_edge.simulation.mapper import Mapper
 from fasaco_edge.simulation.robot import SimulationConfig
+from fasaco_edge.simulation.world import World
 
 # Rays of a scan, as of an LDS-01.
 RAYS = 360
@@ -224,6 +225,13 @@ class NoisyMapper(Mapper):
             changed = Window.around(changed, taken_out, self._count(scan, 1))
         self._frame = composed(better, inverse(newest.pose))
         return changed
+
+
+def noisy_world(
+    truth: OccupancyGrid, start: Pose2D, config: SimulationConfig, noise: MapperNoise
+) -> World:
+    """Return a robot in a building with such a mapper."""
+    return World(truth, start, config, NoisyMapper(truth, config, noise), noise.late_s)
 
 
 def _beside(geometry: GridGeometry, shift_m: NDArray[np.float64]) -> GridGeometry:
