@@ -33,20 +33,6 @@ _LOOKS: dict[int, tuple[Colour, str]] = {
     picture.NEXT: ((255, 240, 110), "*"),
     picture.ROBOT: ((222, 36, 56), "@"),
 }
-# From black over violet and orange to yellow.
-_FIELD: tuple[Colour, ...] = (
-    (34, 12, 74),
-    (84, 15, 109),
-    (132, 32, 107),
-    (181, 50, 90),
-    (221, 81, 58),
-    (246, 125, 21),
-    (252, 226, 100),
-)
-_LOOKS |= {
-    kind: (colour, str(level))
-    for level, (kind, colour) in enumerate(zip(picture.FIELD, _FIELD, strict=True), 1)
-}
 
 # Sixteen colours are too few: three kinds would be one grey.
 _SYSTEMS = {"256": ColorSystem.EIGHT_BIT, "truecolor": ColorSystem.TRUECOLOR}

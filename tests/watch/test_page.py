@@ -10,15 +10,12 @@ from rich.cells import cell_len
 from rich.color import ColorSystem
 
 from fasaco_edge.client.robot_state import Token
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
-from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from tests.support.statuses import extreme_statuses
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
 
@@ -78,24 +75,6 @@ def test_the_robot_points_east_over_the_covered_lower_half():
     assert "o" not in lines[1][:45]
     assert "o" in lines[-4][:45]
     assert row > 8
-
-
-def test_the_trail_takes_the_place_of_coverage_and_path():
-    view, page = mid_mission(), Page(console(80, colours=None))
-    trail = np.full((8, 12), 0.1, np.float32)
-    trail[2] = 1.0
-    seen = ColonySnapshot(Window(0, 0, 8, 12), 0.5, trail, 0, 0, 0, 30)
-    tell(view, "pheromone", encode_pheromone(seen, "map", 1), b"{}")
-    before = page.lines(view, NOW, 80, 24)
-    assert page.toggle_field()
-    shown = page.lines(view, NOW, 80, 24)
-    lane = next(number for number, line in enumerate(shown) if "→" in line)
-    assert "777777" in shown[lane]
-    assert "111111" in shown[lane - 4]
-    assert "*" not in "".join(line[:45] for line in shown[1:-6])
-    assert "every path" in "".join(shown)
-    assert not page.toggle_field()
-    assert page.lines(view, NOW, 80, 24) == before
 
 
 def test_it_says_how_it_stands():
@@ -284,9 +263,8 @@ def test_a_page_that_did_not_change_is_not_drawn_anew():
     assert all(a is b for a, b in zip(first[18:22], second[18:22], strict=True))
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 50)])
-def test_no_number_that_a_status_may_have_ends_the_page(size):
+def test_no_number_that_a_status_may_have_ends_the_page():
     view = mid_mission()
     for payload in extreme_statuses():
         tell(view, "status", payload)
-        assert len(page_of(view, *size).split("\n")) == size[1]
+        assert len(page_of(view, 120, 50).split("\n")) == 50
