@@ -10,6 +10,7 @@ and at most MOST_PUBLISHERS of a key.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
@@ -21,7 +22,7 @@ import zenoh
 ASK_PERIOD_S = 1.0
 # Limit on the publishers of a key that are queried; samples of the others are still received.
 MOST_PUBLISHERS = 16
-# Time that a reply after a gap waits [s]; with a depth above 1, counted from the last sample.
+# Time that samples after a gap wait, counted from the last sample of their publisher [s].
 UNDER_WAY_S = 0.5
 # Limit on the publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
@@ -153,13 +154,11 @@ class SampleOrder:
         # The marks of publishers without a token. Used only to drop cached replies that were
         # received already: a reset of the publisher's clock would go unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
-        # A reply that overtook published samples: until when it waits [s], publisher, mark.
-        self._ahead: tuple[float, str, int, zenoh.Sample] | None = None
-        # With a depth above 1: samples that wait for earlier ones, which were queried.
+        # Samples that wait for earlier ones, which are under way or were queried.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
-        # Until when samples wait after a reply with a gap [s]; None without any.
-        self._gap_until: float | None = None
+        # Until when samples after a gap wait [s, monotonic]; infinite without any.
+        self._gap_until = math.inf
 
     def missing(self, name: str) -> str:
         """Return the query for the samples after the last one of a publisher."""
@@ -195,15 +194,11 @@ class SampleOrder:
     @property
     def next_at(self) -> float:
         """Time when ``take_due`` has samples to return [s, monotonic]."""
-        ahead = [self._ahead[0]] if self._ahead is not None else []
-        gaps = [self._gap_until] if self._gap_until is not None else []
-        return min((*ahead, *gaps), default=float("inf"))
+        return self._gap_until
 
     def take_due(self, now: float) -> list[zenoh.Sample]:
         """Return the samples that have waited long enough for earlier ones, in order."""
-        if self._ahead is not None and now >= self._ahead[0]:
-            self._deliver_ahead()
-        if self._gap_until is not None and now >= self._gap_until:
+        if now >= self._gap_until:
             self._deliver_held(over_gaps=True)
         return self._take_ready()
 
@@ -238,16 +233,14 @@ class SampleOrder:
         elif _is_newer(mark, last):
             self._deliver(name, mark, sample)
             # A missing sample of this publisher has come: others may be under way, too.
-            if self._gap_until is not None and any(one[0] == name for one in self._held):
+            if self._gap_until < math.inf and any(one[0] == name for one in self._held):
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 
     def _sort_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
         name, mark = _origin(sample)
         last = self._last_mark.get(name, self._unconfirmed.get(name))
-        if self._depth > 1:
+        if self._depth > 1 or (not again and _leaves_gap(name, mark, last)):
             self._hold(name, mark, sample)
-        elif not again and _leaves_gap(name, mark, last):
-            self._let_wait(name, mark, sample)
         elif _is_newer(mark, last) or (again and mark == last):
             self._deliver(name, mark, sample)
 
@@ -266,23 +259,10 @@ class SampleOrder:
             elif _is_newer(mark, last):
                 self._deliver(name, mark, sample)
         if not self._held:
-            self._gap_until = None
-        elif self._gap_until is None:
+            self._gap_until = math.inf
+        elif self._gap_until == math.inf:
             self._gap_until = time.monotonic() + UNDER_WAY_S
             self._wake()
-
-    def _let_wait(self, name: str, mark: int, sample: zenoh.Sample) -> None:
-        """Hold a reply until the samples before it have come, or their time is over."""
-        self._deliver_ahead()
-        self._ahead = time.monotonic() + UNDER_WAY_S, name, mark, sample
-        if len(sample.payload) > HELD_BYTES:
-            self._deliver_ahead()
-        self._wake()
-
-    def _deliver_ahead(self) -> None:
-        ahead, self._ahead = self._ahead, None
-        if ahead is not None and _is_newer(ahead[2], self._last_mark.get(ahead[1])):
-            self._deliver(*ahead[1:])
 
     def _hold(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._held.append((name, mark, sample))
@@ -292,7 +272,7 @@ class SampleOrder:
             self._deliver_held(over_gaps=True)
         elif (
             not self._publishers.open_queries
-            and self._gap_until is None
+            and self._gap_until == math.inf
             and name in self._publishers
         ):
             self._publishers.ask_soon(name)
