@@ -15,7 +15,6 @@ from fasaco_edge.bench.benchmark import (
 )
 from tests.benchmarks.harness import within
 from tests.benchmarks.online.buildings import BuildingChoice
-from tests.benchmarks.online.cases import CASES
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun
 from tests.benchmarks.online.report import report
@@ -52,15 +51,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=within(FEWEST_CELLS, MOST_CELLS),
         default=5_000,
         help="of generated buildings (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--cases",
-        nargs="*",
-        choices=CASES,
-        default=list(CASES),
-        metavar="CASE",
-        help=f"beside, missions in which something happens: {', '.join(CASES)} (default: "
-        "all; no name for none)",
     )
     parser.add_argument(
         "--planners",
@@ -130,7 +120,6 @@ def _plan(args: argparse.Namespace) -> OnlinePlan:
     names = grid_names(args, () if args.generated else DEFAULT_MAPS)
     return OnlinePlan(
         choice=BuildingChoice(names, args.generated, args.cells),
-        cases=tuple(dict.fromkeys(args.cases)),
         starts=args.starts,
         ranges_m=tuple(dict.fromkeys(args.ranges)),
         seeds=args.seeds,
@@ -154,8 +143,7 @@ ONLINE = Benchmark(
     "counted work, and the robot drives on; without a bus and without "
     "waiting for plans, so that the same options give the same missions. Every trail is judged "
     "by code that shares nothing with mission and planner, and compared with the near-optimal "
-    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more. Cases "
-    "in which something happens on the way are reported beside.",
+    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more.",
     add_options=_add_options,
     count=lambda args: count(_plan(args)),
     measure=lambda args, say: measure(_plan(args), say),
@@ -163,7 +151,7 @@ ONLINE = Benchmark(
     epilog="""\
 examples:
   python -m tests.benchmarks online
-  python -m tests.benchmarks online --maps flat basement --ranges 3.5 --cases
+  python -m tests.benchmarks online --maps flat basement --ranges 3.5
   python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --json
   python -m tests.benchmarks online --generated 3 --cells 10000 --cost turns
   python -m tests.benchmarks online --planners fasaco fasaco-anew aco aco-anew spiral-stc zigzag

@@ -26,8 +26,6 @@ from tests.benchmarks.buildings import building
 from tests.benchmarks.harness import check_names, grid_name
 from tests.benchmarks.judge import reachable
 
-BUILDING, CASE = KINDS = ("building", "case")
-
 PIXELS_PER_CELL = 2
 # Of a cell's width. The disc stays within the cell's own pixels.
 RADIUS_SHARE = 0.45
@@ -43,7 +41,6 @@ class Building:
         footprint: of the robot.
         lattice: the lattice over all of it.
         start: the cell (row, col) the robot starts in.
-        kind: BUILDING or CASE; only buildings enter medians.
     """
 
     name: str
@@ -51,7 +48,6 @@ class Building:
     footprint: Footprint
     lattice: CoverageLattice
     start: Cell
-    kind: str = BUILDING
 
     @property
     def reachable(self) -> NDArray[np.bool_]:

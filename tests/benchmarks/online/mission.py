@@ -258,17 +258,12 @@ class OnlineMission:
         """The mission's own words for how it is."""
         return f"{self._mission.state}: {self._mission.reason}"
 
-    def run(self, act: Callable[[OnlineMission], None] = lambda _: None) -> None:
-        """Drive until the mission is done, or nothing is to be hoped for any more.
-
-        Args:
-            act: called before each leg; may change what is there.
-        """
+    def run(self) -> None:
+        """Drive until the mission is done, or nothing is to be hoped for any more."""
         most = MOST_VISITS * int(np.count_nonzero(self.building.reachable)) + 1000
         moved_at = self.now
         self.sense()
         while not self.done and len(self.robot.trail) < most:
-            act(self)
             if self._go():
                 moved_at = self.now
             elif self.now - moved_at > PATIENCE_S:

@@ -1,4 +1,4 @@
-"""Missions to tables: buildings first, cases beside."""
+"""Missions to tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from fasaco_edge.bench.benchmark import Report, ResultTable, peak_mb
-from tests.benchmarks.online.buildings import BUILDING, CASE, KINDS
 from tests.benchmarks.online.figures import Summary, goals, steps_ratio, time_ratio
 from tests.benchmarks.online.judge import MILESTONES, MissionRun
 
@@ -19,10 +18,6 @@ LATENCY_HEADER = (
 )  # fmt: skip
 PLANNER_HEADER = (*HEADER[:-1], "replan\np50, p99\n[ms]")
 UNTIL_HEADER = ("", *(f"{percent} %:\nsteps,\n[s]" for percent in MILESTONES))
-CASE_HEADER = (
-    "", "missions,\ndone", "missed,\nof cells", "steps,\ntime [s]", "plans,\npaths",
-    "replan\np50, p99,\nmax [ms]", "waiting\n[%],\nheld up",
-)  # fmt: skip
 
 REMARKS = (
     "to known: to the near-optimal walk of a robot that knew the building from the start; the "
@@ -35,8 +30,7 @@ REMARKS = (
     "a map, without planning. held up: how often the robot stood before an obstacle that its "
     "path led into.",
     "Every trail was judged, by code that shares nothing with mission and planner: each step "
-    "legal in the true building, every reachable cell visited. In cases cells are those that "
-    "can be reached in the end, and covered where the tool was in truth.",
+    "legal in the true building, every reachable cell visited.",
 )
 
 
@@ -48,10 +42,7 @@ def report(*, with_turns: bool, about: dict[str, object], runs: Sequence[Mission
     all_runs = runs
     of_planner = _by_planner(runs)
     runs = next(iter(of_planner.values()), [])
-    of_kind = {kind: [run for run in runs if run.kind == kind] for kind in KINDS}
-    buildings = Summary(of_kind[BUILDING])
-    groups = list(_groups(of_kind[BUILDING]))
-    cases = _by_building(of_kind[CASE])
+    buildings, groups = Summary(runs), list(_groups(runs))
     further = [
         ResultTable(
             "latency [ms], below it time of processors",
@@ -63,13 +54,10 @@ def report(*, with_turns: bool, about: dict[str, object], runs: Sequence[Mission
             UNTIL_HEADER,
             tuple(_until_row(*one) for one in groups),
         ),
-        ResultTable(
-            "beside: something happens", CASE_HEADER, tuple(_case_row(case) for case in cases)
-        ),
     ]
     if len(of_planner) > 1:
         rows = [_planner_row(name, group) for name, group in of_planner.items()]
-        further.append(ResultTable("planners, in buildings", PLANNER_HEADER, tuple(rows)))
+        further.append(ResultTable("planners", PLANNER_HEADER, tuple(rows)))
     return Report(
         title=f"{len(buildings.runs)} missions in unknown buildings",
         header=HEADER,
@@ -77,13 +65,7 @@ def report(*, with_turns: bool, about: dict[str, object], runs: Sequence[Mission
         figures={
             **buildings.document(),
             "conditions": about,
-            "beside": {
-                group[0].building: {"kind": group[0].kind, **Summary(group).document()}
-                for group in cases
-            },
-            "planners": {
-                name: Summary(_in_buildings(group)).document() for name, group in of_planner.items()
-            },
+            "planners": {name: Summary(group).document() for name, group in of_planner.items()},
             "runs": [run.document() for run in all_runs],
         },
         goals=tuple(goals(buildings, with_turns=with_turns)),
@@ -97,13 +79,9 @@ def _by_planner(runs: Sequence[MissionRun]) -> dict[str, list[MissionRun]]:
     return {name: [run for run in runs if run.planner == name] for name in names}
 
 
-def _in_buildings(runs: Sequence[MissionRun]) -> list[MissionRun]:
-    return [run for run in runs if run.kind == BUILDING]
-
-
 def _planner_row(name: str, runs: Sequence[MissionRun]) -> tuple[str, ...]:
-    summary = Summary(_in_buildings(runs))
-    name, missions, *figures, _ = _row(name, summary) if summary.runs else (name, "0", *"----", "")
+    summary = Summary(runs)
+    name, missions, *figures, _ = _row(name, summary)
     return name, missions, *figures, _lines(".1f", summary.replan_ms(50), summary.replan_ms(99))
 
 
@@ -150,27 +128,13 @@ def _until_row(name: str, summary: Summary) -> tuple[str, ...]:
     return name, *(_lines(".3f", *moment) for moment in until)
 
 
-def _case_row(runs: Sequence[MissionRun]) -> tuple[str, ...]:
-    summary = Summary(runs)
-    missing = "" if all(run.happened for run in runs) else "\nDID NOT HAPPEN"
-    return (
-        f"{runs[0].building}{missing}",
-        f"{len(runs)}\n{sum(run.done for run in runs)}",
-        f"{max(run.missed for run in runs)}\n{runs[0].cells}",
-        f"{max(run.steps for run in runs)}\n{max(run.time_s for run in runs):.0f}",
-        f"{max(run.plans for run in runs)}\n{max(run.paths for run in runs)}",
-        _lines(".1f", *(summary.replan_ms(percent) for percent in (50, 99, 100))),
-        f"{_percent(summary.waiting)}\n{max(run.held_up for run in runs)}",
-    )
-
-
 def _complaints(runs: Sequence[MissionRun]) -> Iterator[str]:
     """Yield what is wrong with missions, one by one."""
     for run in runs:
         about = f"{run.building}, start {run.start}, {run.range_m:g} m, seed {run.seed}"
         if not run.done:
             yield f"{about}: ended with {run.ended}; {run.missed} cells missed"
-        elif run.missed and run.kind != CASE:
+        elif run.missed:
             yield f"{about}: said to be done, {run.missed} cells missed"
         if run.problems:
             yield f"{about}: {'; '.join(run.problems[:3])}"

@@ -16,7 +16,6 @@ from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.harness import judged as judged_plan
 from tests.benchmarks.online.buildings import Building, BuildingChoice, of_grid
-from tests.benchmarks.online.cases import CASES, Act
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun, Reference, judged
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission, near_optimal
@@ -32,7 +31,6 @@ class OnlinePlan:
 
     Attributes:
         choice: of buildings.
-        cases: names of CASES; each once, with the first range.
         starts: how many in each building.
         ranges_m: reaches of the scanner [m].
         seeds: how many, from 0 on, of the planner.
@@ -43,7 +41,6 @@ class OnlinePlan:
     """
 
     choice: BuildingChoice
-    cases: tuple[str, ...]
     starts: int
     ranges_m: tuple[float, ...]
     seeds: int
@@ -57,8 +54,7 @@ def count(plan: OnlinePlan) -> int:
     """Return how many missions ``measure`` will yield."""
     choice = plan.choice
     buildings = len(choice.grids) + choice.generated
-    missions = buildings * plan.starts * len(plan.ranges_m) + len(plan.cases)
-    return plan.seeds * len(plan.planners) * missions
+    return plan.seeds * len(plan.planners) * buildings * plan.starts * len(plan.ranges_m)
 
 
 def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
@@ -90,10 +86,6 @@ def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
             for range_m in plan.ranges_m:
                 say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m")
                 yield _run(one, started, range_m, seed, references[key])
-        for name in plan.cases:
-            say(f"{planner}, seed {seed}: {name}")
-            case = CASES[name]
-            yield _run(one, case.building(), plan.ranges_m[0], seed, None, case.acts())
 
 
 def _reference(plan: OnlinePlan, building: Building) -> Reference:
@@ -115,14 +107,7 @@ def _run(
     range_m: float,
     seed: int,
     reference: Reference | None,
-    act: Act = lambda _: True,
 ) -> MissionRun:
-    happened = False
-
-    def acting(mission: OnlineMission) -> None:
-        nonlocal happened
-        happened = act(mission) or happened
-
     (planner,) = plan.planners
     conditions = Conditions(
         range_m=range_m,
@@ -132,11 +117,10 @@ def _run(
         plans_on_trail=CONTENDERS[planner].on_trail,
     )
     mission = OnlineMission(building, conditions)
-    mission.run(acting)
+    mission.run()
     verdict, watch = judged(mission), mission.watch
     return MissionRun(
         building=building.name,
-        kind=building.kind,
         cells=verdict.cells,
         start=building.start,
         range_m=range_m,
@@ -145,7 +129,6 @@ def _run(
         done=mission.done,
         missed=verdict.missed,
         problems=(*verdict.problems, *dict.fromkeys(watch.faults)),
-        happened=happened,
         steps=verdict.steps,
         revisits=verdict.revisits,
         quarters=verdict.quarters,

@@ -1,19 +1,17 @@
 """What the robot sees of a building: its own map, and what of it is news.
 
-As a mapper publishes it: the whole map where it has grown or is placed anew, else an update
-of what changed. Localisation is perfect, but for a loop closure (``place_anew``).
+As a mapper publishes it: the whole map where it has grown, else an update of what changed.
+Localisation is perfect.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.mission.core.events import MapReceived, PatchReceived
@@ -96,11 +94,6 @@ class Sight:
         )  # fmt: skip
         return MapReceived(OccupancyGrid(geometry, self._known[rows, cols].copy(), self._frame))
 
-    def place_anew(self, origin: Pose2D) -> None:
-        """Move the map as a whole: its mapper found out that it lies elsewhere."""
-        self.geometry = replace(self.geometry, origin=origin)
-        self._sent, self._changed = None, self._changed or self._extent
-
     def is_clear(self, start: Point, end: Point) -> bool:
         """Tell whether in truth the robot can move straight from ``start`` to ``end``."""
         steps = max(1, math.ceil(2.0 * math.dist(start, end)))
@@ -115,11 +108,6 @@ class Sight:
     def is_free(self, at: Point, radius_px: float) -> bool:
         """Tell whether in truth a disc is free."""
         return bool(disc_is_free(self.truth, *at, radius_px, self._footprint.free_at_most))
-
-    def true_lattice(self) -> CoverageLattice:
-        """Return the lattice over the building as it is and where the map frame has it now."""
-        grid = OccupancyGrid(self.geometry, self.truth.copy(), self._frame)
-        return CoverageLattice.from_map(grid, self._footprint)
 
 
 def _rays(reach_px: float) -> NDArray[np.float64]:
