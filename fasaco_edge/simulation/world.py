@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import deque
 from dataclasses import dataclass
 from functools import partial
 
@@ -84,7 +83,6 @@ class World:
         start: the robot's first pose, in the frame of ``truth``.
         config: the robot.
         mapper: the robot's; None for one that makes no error.
-        late_s: age of a pose when it is published [s].
 
     Raises:
         StartOutsideMap: ``start`` is not on ``truth``.
@@ -97,7 +95,6 @@ class World:
         start: Pose2D,
         config: SimulationConfig,
         mapper: Mapper | None = None,
-        late_s: float = 0.0,
     ) -> None:
         self._truth, self.config = truth, config
         # Name of the frame of everything the robot publishes.
@@ -112,9 +109,6 @@ class World:
             )
         self.drive = DriveState(start)
         self.mapper = mapper or Mapper(truth, config)
-        # Poses that are not yet published, and by how much each is delayed.
-        self._poses: deque[StampedPose] = deque()
-        self._late_ns = round(late_s / config.tick_s) * config.tick_ns
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
         # The newest velocity, if one drives it: speed [m/s], turn rate [rad/s], and its tick.
@@ -193,12 +187,10 @@ class World:
             self.mapper.scan(self.pose)
             if self.activity is Activity.NO_WAY or self._may_try_again():
                 self._join()
-        if self._is_due(self.config.pose_hz):
-            self._poses.append(StampedPose(self.believed, self.frame, self.stamp_ns))
-        is_ripe = self._poses and self._poses[0].stamp_ns <= self.stamp_ns - self._late_ns
+        pose = StampedPose(self.believed, self.frame, self.stamp_ns)
         return Emission(
             self.mapper.snapshot(self.stamp_ns) if self._is_due(self.config.map_hz) else None,
-            self._poses.popleft() if is_ripe else None,
+            pose if self._is_due(self.config.pose_hz) else None,
             self.battery if self._is_due(BATTERY_HZ) else None,
         )
 

@@ -30,7 +30,7 @@ def page_of(view: RobotView, width: int = 80, height: int = 24, colours: str | N
 
 def test_two_pixels_make_a_character():
     kinds = np.array([[WALL, WALL, COVERED], [WALL, COVERED, COVERED]], np.uint8)
-    (line,) = GlyphSet(ColorSystem.TRUECOLOR, unicode=True).lines(kinds)
+    (line,) = GlyphSet(ColorSystem.TRUECOLOR).lines(kinds)
     wall, covered = "214;218;226", "24;112;82"
     assert line == (
         f"\x1b[38;2;{wall};48;2;{wall}m \x1b[0m"
@@ -40,7 +40,7 @@ def test_two_pixels_make_a_character():
 
 
 def test_what_is_alike_is_written_once():
-    (line,) = GlyphSet(ColorSystem.TRUECOLOR, unicode=True).lines(np.full((2, 50), WALL, np.uint8))
+    (line,) = GlyphSet(ColorSystem.TRUECOLOR).lines(np.full((2, 50), WALL, np.uint8))
     assert line.count("\x1b") == 2
     assert plain(line) == " " * 50
 
@@ -55,8 +55,7 @@ def test_fewer_colours_will_do():
 
 def test_no_colours_will_do():
     kinds = np.array([[WALL, 0, TO_COVER, HEADING + 2], [WALL, COVERED, 0, 0]], np.uint8)
-    assert GlyphSet(None, unicode=True).lines(kinds) == ["#o-↑"]
-    assert GlyphSet(None, unicode=False).lines(kinds) == ["#o-^"]
+    assert GlyphSet(None).lines(kinds) == ["#o-↑"]
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)

@@ -19,7 +19,7 @@ from fasaco_edge.kernels.lattice.raycast import Scanner, ranges_of
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from tests.campaigns.lab.building import Building
-from tests.campaigns.lab.noisy_mapper import MapperNoise, noisy_world
+from tests.campaigns.lab.noisy_mapper import MapperNoise, NoisyMapper, NoisyWorld
 from tests.campaigns.lab.settings import BEAMS, MOST_RANGE_M, TICK_S, LabSettings, stamp_ns
 
 FRAME = "map"
@@ -70,7 +70,7 @@ class OwnBase:
         if noise is None:
             self.world = World(truth, start, config)
         else:
-            self.world = noisy_world(truth, start, config, replace(noise, seed=settings.seed))
+            self.world = NoisyWorld(truth, start, config, replace(noise, seed=settings.seed))
         self._truth = truth
         self._noise_m, self._rng = settings.noise_m, np.random.default_rng(settings.seed)
         self.wheels, self.touches = STAND, False
@@ -122,7 +122,8 @@ class OwnMapper:
     @property
     def loops(self) -> int:
         """How many loops were closed."""
-        return self._base.world.mapper.loops
+        mapper = self._base.world.mapper
+        return mapper.loops if isinstance(mapper, NoisyMapper) else 0
 
     def corrected(self, _odometry: Pose2D) -> Pose2D:
         """Return the newest pose that the mapper has published."""
