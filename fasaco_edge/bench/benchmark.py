@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import os
 import platform
-import resource
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -210,11 +209,6 @@ def machine() -> dict[str, object]:
         "python": platform.python_version(),
         "version": __version__,
     }
-
-
-def peak_mb() -> float:
-    """Return the peak resident memory of this process [MB]."""
-    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6, 1)
 
 
 def _processor() -> str:

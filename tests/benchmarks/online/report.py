@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from fasaco_edge.bench.benchmark import Report, ResultTable, peak_mb
+from fasaco_edge.bench.benchmark import Report, ResultTable
+from fasaco_edge.host.processes import peak_mb
 from tests.benchmarks.online.figures import Summary, goals, steps_ratio, time_ratio
 from tests.benchmarks.online.judge import MILESTONES, MissionRun
 

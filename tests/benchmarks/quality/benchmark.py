@@ -16,12 +16,12 @@ from fasaco_edge.bench.benchmark import (
     Say,
     add_grid_options,
     grid_names,
-    peak_mb,
     positive,
     seconds,
     seconds_above_zero,
 )
 from fasaco_edge.drawing.spread import Spread
+from fasaco_edge.host.processes import peak_mb
 from tests.benchmarks.quality.figures import VARIANTS, GridFigures, by_grid, goals
 from tests.benchmarks.quality.runs import QualityPlan, QualityRun, Setting, measure
 
