@@ -140,13 +140,19 @@ class SampleOrder:
     Args:
         depth: how many samples of a publisher count.
         publishers: the publishers that are queried.
-        wake: called when publishers are to be queried, or ``take_due`` is due earlier.
+        receive: called with each sample, in order.
+        wake: called when publishers are to be queried, or ``deliver_due`` is due earlier.
     """
 
-    def __init__(self, depth: int, publishers: AskedPublishers, wake: Callable[[], None]) -> None:
-        self._depth, self._publishers, self._wake = depth, publishers, wake
-        # Samples to deliver, in this order.
-        self._ready: list[zenoh.Sample] = []
+    def __init__(
+        self,
+        depth: int,
+        publishers: AskedPublishers,
+        receive: Callable[[zenoh.Sample], None],
+        wake: Callable[[], None],
+    ) -> None:
+        self._depth, self._publishers = depth, publishers
+        self._receive, self._wake = receive, wake
         # For each publisher its mark: the sequence number or timestamp of its last sample.
         self._last_mark = OrderedDict[str, int]()
         # When that was published, by the publisher's clock; 0 if unknown.
@@ -176,42 +182,18 @@ class SampleOrder:
         if name in self._unconfirmed:
             _remember(self._last_mark, name, self._unconfirmed.pop(name))
 
-    def take_published(self, sample: zenoh.Sample) -> list[zenoh.Sample]:
-        """Take a published sample; return the samples to deliver now, in order."""
-        self._sort_published(sample)
-        return self._take_ready()
-
-    def take_answer(self, sample: zenoh.Sample, *, again: bool) -> list[zenoh.Sample]:
-        """Take a reply; return the samples to deliver now, in order.
-
-        Args:
-            sample: the reply.
-            again: deliver it again if it was received already and is the last.
-        """
-        self._sort_answer(sample, again=again)
-        return self._take_ready()
-
     @property
     def next_at(self) -> float:
-        """Time when ``take_due`` has samples to return [s, monotonic]."""
+        """Time when ``deliver_due`` has something to do [s, monotonic]."""
         return self._gap_until
 
-    def take_due(self, now: float) -> list[zenoh.Sample]:
-        """Return the samples that have waited long enough for earlier ones, in order."""
+    def deliver_due(self, now: float) -> None:
+        """Deliver the samples that have waited long enough for earlier ones."""
         if now >= self._gap_until:
-            self._deliver_held(over_gaps=True)
-        return self._take_ready()
+            self.deliver_held(over_gaps=True)
 
-    def take_held(self) -> list[zenoh.Sample]:
-        """Return the samples that waited for replies, now that all have come, in order."""
-        self._deliver_held()
-        return self._take_ready()
-
-    def _take_ready(self) -> list[zenoh.Sample]:
-        ready, self._ready = self._ready, []
-        return ready
-
-    def _sort_published(self, sample: zenoh.Sample) -> None:
+    def take_published(self, sample: zenoh.Sample) -> None:
+        """Take a published sample."""
         name, mark = _origin(sample)
         waits = self._depth > 1 and self._publishers.is_asking
         is_listed = sample.source_info or name in self._last_mark or name in self._publishers
@@ -219,7 +201,7 @@ class SampleOrder:
             # The publisher has no cache, or is not yet found.
             if name:
                 _remember(self._unconfirmed, name, mark)
-            self._ready.append(sample)
+            self._receive(sample)
             return
         last = self._last_mark.get(name)
         if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
@@ -236,7 +218,8 @@ class SampleOrder:
             if self._gap_until < math.inf and any(one[0] == name for one in self._held):
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 
-    def _sort_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
+    def take_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
+        """Take a reply; with ``again`` the last sample counts though it was received already."""
         name, mark = _origin(sample)
         last = self._last_mark.get(name, self._unconfirmed.get(name))
         if self._depth > 1 or (not again and _leaves_gap(name, mark, last)):
@@ -244,10 +227,11 @@ class SampleOrder:
         elif _is_newer(mark, last) or (again and mark == last):
             self._deliver(name, mark, sample)
 
-    def _deliver_held(self, *, over_gaps: bool = False) -> None:
-        """Deliver waiting samples, except those after a gap: the missing ones may be under way.
+    def deliver_held(self, *, over_gaps: bool = False) -> None:
+        """Deliver waiting samples, as when all replies have come.
 
-        Those wait until the missing ones have come, or their time is over (``over_gaps``).
+        Those after a gap wait on, as the missing ones may be under way, until these have come, or
+        their time is over (``over_gaps``).
         """
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
@@ -269,7 +253,7 @@ class SampleOrder:
         self._held_bytes += len(sample.payload)
         is_full = len(self._held) > MOST_PUBLISHERS * self._depth
         if is_full or self._held_bytes > HELD_BYTES:
-            self._deliver_held(over_gaps=True)
+            self.deliver_held(over_gaps=True)
         elif (
             not self._publishers.open_queries
             and self._gap_until == math.inf
@@ -282,7 +266,7 @@ class SampleOrder:
         self._unconfirmed.pop(name, None)
         _remember(self._last_mark, name, mark)
         _remember(self._stamps, name, _ticks(sample))
-        self._ready.append(sample)
+        self._receive(sample)
 
 
 def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
