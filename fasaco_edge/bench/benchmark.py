@@ -129,27 +129,11 @@ def positive(text: str) -> int:
     return number
 
 
-def seed(text: str) -> int:
-    """Read the seed of a search."""
-    number = int(text)
-    if not 0 <= number < 2**63:
-        raise argparse.ArgumentTypeError(f"must be in 0..2^63 - 1, got {number}")
-    return number
-
-
-def seconds(text: str) -> float:
-    """Read a time [s] from 0 to an hour."""
-    number = float(text)
-    if not 0.0 <= number <= 3600.0:
-        raise argparse.ArgumentTypeError(f"must be in 0..3600 s, got {text}")
-    return number
-
-
 def seconds_above_zero(text: str) -> float:
     """Read a time [s] above 0, up to an hour."""
-    number = seconds(text)
-    if number == 0.0:
-        raise argparse.ArgumentTypeError(f"must be above 0 s, got {text}")
+    number = float(text)
+    if not 0.0 < number <= 3600.0:
+        raise argparse.ArgumentTypeError(f"must be above 0, and at most 3600 s, got {text}")
     return number
 
 

@@ -11,9 +11,8 @@ from fasaco_edge.bench.benchmark import (
     add_grid_options,
     grid_names,
     positive,
-    seconds,
 )
-from tests.benchmarks.harness import within
+from tests.benchmarks.harness import SECONDS, within
 from tests.benchmarks.online.buildings import BuildingChoice
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun
@@ -102,7 +101,7 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--turn-s",
-        type=seconds,
+        type=SECONDS,
         default=1.5,
         metavar="S",
         help="a quarter-turn [s] (default: %(default)g)",
