@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import os
 import platform
-import resource
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -130,27 +129,11 @@ def positive(text: str) -> int:
     return number
 
 
-def seed(text: str) -> int:
-    """Read the seed of a search."""
-    number = int(text)
-    if not 0 <= number < 2**63:
-        raise argparse.ArgumentTypeError(f"must be in 0..2^63 - 1, got {number}")
-    return number
-
-
-def seconds(text: str) -> float:
-    """Read a time [s] from 0 to an hour."""
-    number = float(text)
-    if not 0.0 <= number <= 3600.0:
-        raise argparse.ArgumentTypeError(f"must be in 0..3600 s, got {text}")
-    return number
-
-
 def seconds_above_zero(text: str) -> float:
     """Read a time [s] above 0, up to an hour."""
-    number = seconds(text)
-    if number == 0.0:
-        raise argparse.ArgumentTypeError(f"must be above 0 s, got {text}")
+    number = float(text)
+    if not 0.0 < number <= 3600.0:
+        raise argparse.ArgumentTypeError(f"must be above 0, and at most 3600 s, got {text}")
     return number
 
 
@@ -210,11 +193,6 @@ def machine() -> dict[str, object]:
         "python": platform.python_version(),
         "version": __version__,
     }
-
-
-def peak_mb() -> float:
-    """Return the peak resident memory of this process [MB]."""
-    return round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6, 1)
 
 
 def _processor() -> str:

@@ -11,7 +11,6 @@ from fasaco_edge.bench.benchmark import (
     Goal,
     Report,
     Say,
-    peak_mb,
     positive,
     seconds_above_zero,
 )
@@ -19,8 +18,7 @@ from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
 from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
 from fasaco_edge.drawing.spread import Spread, document, median, percentile, text
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.host.processes import cpu_seconds, own_mb, resident_mb
-from fasaco_edge.host.processes import peak_mb as peak_mb_of
+from fasaco_edge.host.processes import cpu_seconds, own_mb, peak_mb, resident_mb
 
 # Measures of a start, each with its text and digits.
 MEASURES = (
@@ -99,7 +97,7 @@ def _run(args: argparse.Namespace) -> DaemonRun:
         for crate in range(1, WARM_UP_MAPS + args.maps):
             delays_ms.append(_delay_ms(source, grid, crate))
             time.sleep(PAUSE_S)
-        return found | {"peak_mb": peak_mb_of(pid)}, delays_ms[WARM_UP_MAPS - 1 :]
+        return found | {"peak_mb": peak_mb(pid)}, delays_ms[WARM_UP_MAPS - 1 :]
 
 
 def _delay_ms(source: MapSource, grid: OccupancyGrid, crate: int) -> tuple[float, float]:

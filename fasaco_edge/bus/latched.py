@@ -72,7 +72,6 @@ class LatchedSubscription(Subscription):
         in_order: bool = False,
     ) -> None:
         self._session = session
-        self._receive = receive
         self._depth = depth
         self._asker = asker
         self._key = zenoh.KeyExpr(key)
@@ -80,7 +79,7 @@ class LatchedSubscription(Subscription):
         # Reentrant: a cache of the same session replies on the querying thread.
         self._lock = threading.RLock()
         self._publishers = AskedPublishers()
-        self._order = SampleOrder(depth, self._publishers, asker.wake)
+        self._order = SampleOrder(depth, self._publishers, receive, asker.wake)
         self._tokens = f"{key}/@adv/pub/**"
         self._query_tokens_at = 0.0
         self._awaits_tokens = False
@@ -98,7 +97,7 @@ class LatchedSubscription(Subscription):
         """Send due queries, on the asker's thread; return when the next is due [s, monotonic]."""
         self._query_tokens(now)
         with self._lock:
-            self._deliver(self._order.take_due(now))
+            self._order.deliver_due(now)
             questions: list[tuple[str, AskedPublisher | None]] = []
             asks_all, again = self._publishers.take_all(now)
             if asks_all:
@@ -121,7 +120,7 @@ class LatchedSubscription(Subscription):
             with self._lock:
                 self._publishers.end_query(publisher)
                 if not self._publishers.open_queries:
-                    self._deliver(self._order.take_held())
+                    self._order.deliver_held()
 
         with contextlib.suppress(zenoh.ZError):  # a session that ends sends no queries
             self._session.get(
@@ -157,16 +156,12 @@ class LatchedSubscription(Subscription):
     def _on_sample(self, sample: zenoh.Sample) -> None:
         """Take a published sample, on a Zenoh thread."""
         with self._lock:
-            self._deliver(self._order.take_published(sample))
+            self._order.take_published(sample)
 
     def _on_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
         """Take a reply, on a Zenoh thread."""
         with self._lock:
-            self._deliver(self._order.take_answer(sample, again=again))
-
-    def _deliver(self, samples: list[zenoh.Sample]) -> None:
-        for sample in samples:
-            self._receive(sample)
+            self._order.take_answer(sample, again=again)
 
 
 class Asker:

@@ -10,6 +10,7 @@ and at most MOST_PUBLISHERS of a key.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
@@ -21,7 +22,7 @@ import zenoh
 ASK_PERIOD_S = 1.0
 # Limit on the publishers of a key that are queried; samples of the others are still received.
 MOST_PUBLISHERS = 16
-# Time that a reply after a gap waits [s]; with a depth above 1, counted from the last sample.
+# Time that samples after a gap wait, counted from the last sample of their publisher [s].
 UNDER_WAY_S = 0.5
 # Limit on the publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
@@ -139,13 +140,19 @@ class SampleOrder:
     Args:
         depth: how many samples of a publisher count.
         publishers: the publishers that are queried.
-        wake: called when publishers are to be queried, or ``take_due`` is due earlier.
+        receive: called with each sample, in order.
+        wake: called when publishers are to be queried, or ``deliver_due`` is due earlier.
     """
 
-    def __init__(self, depth: int, publishers: AskedPublishers, wake: Callable[[], None]) -> None:
-        self._depth, self._publishers, self._wake = depth, publishers, wake
-        # Samples to deliver, in this order.
-        self._ready: list[zenoh.Sample] = []
+    def __init__(
+        self,
+        depth: int,
+        publishers: AskedPublishers,
+        receive: Callable[[zenoh.Sample], None],
+        wake: Callable[[], None],
+    ) -> None:
+        self._depth, self._publishers = depth, publishers
+        self._receive, self._wake = receive, wake
         # For each publisher its mark: the sequence number or timestamp of its last sample.
         self._last_mark = OrderedDict[str, int]()
         # When that was published, by the publisher's clock; 0 if unknown.
@@ -153,13 +160,11 @@ class SampleOrder:
         # The marks of publishers without a token. Used only to drop cached replies that were
         # received already: a reset of the publisher's clock would go unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
-        # A reply that overtook published samples: until when it waits [s], publisher, mark.
-        self._ahead: tuple[float, str, int, zenoh.Sample] | None = None
-        # With a depth above 1: samples that wait for earlier ones, which were queried.
+        # Samples that wait for earlier ones, which are under way or were queried.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
-        # Until when samples wait after a reply with a gap [s]; None without any.
-        self._gap_until: float | None = None
+        # Until when samples after a gap wait [s, monotonic]; infinite without any.
+        self._gap_until = math.inf
 
     def missing(self, name: str) -> str:
         """Return the query for the samples after the last one of a publisher."""
@@ -177,46 +182,18 @@ class SampleOrder:
         if name in self._unconfirmed:
             _remember(self._last_mark, name, self._unconfirmed.pop(name))
 
-    def take_published(self, sample: zenoh.Sample) -> list[zenoh.Sample]:
-        """Take a published sample; return the samples to deliver now, in order."""
-        self._sort_published(sample)
-        return self._take_ready()
-
-    def take_answer(self, sample: zenoh.Sample, *, again: bool) -> list[zenoh.Sample]:
-        """Take a reply; return the samples to deliver now, in order.
-
-        Args:
-            sample: the reply.
-            again: deliver it again if it was received already and is the last.
-        """
-        self._sort_answer(sample, again=again)
-        return self._take_ready()
-
     @property
     def next_at(self) -> float:
-        """Time when ``take_due`` has samples to return [s, monotonic]."""
-        ahead = [self._ahead[0]] if self._ahead is not None else []
-        gaps = [self._gap_until] if self._gap_until is not None else []
-        return min((*ahead, *gaps), default=float("inf"))
+        """Time when ``deliver_due`` has something to do [s, monotonic]."""
+        return self._gap_until
 
-    def take_due(self, now: float) -> list[zenoh.Sample]:
-        """Return the samples that have waited long enough for earlier ones, in order."""
-        if self._ahead is not None and now >= self._ahead[0]:
-            self._deliver_ahead()
-        if self._gap_until is not None and now >= self._gap_until:
-            self._deliver_held(over_gaps=True)
-        return self._take_ready()
+    def deliver_due(self, now: float) -> None:
+        """Deliver the samples that have waited long enough for earlier ones."""
+        if now >= self._gap_until:
+            self.deliver_held(over_gaps=True)
 
-    def take_held(self) -> list[zenoh.Sample]:
-        """Return the samples that waited for replies, now that all have come, in order."""
-        self._deliver_held()
-        return self._take_ready()
-
-    def _take_ready(self) -> list[zenoh.Sample]:
-        ready, self._ready = self._ready, []
-        return ready
-
-    def _sort_published(self, sample: zenoh.Sample) -> None:
+    def take_published(self, sample: zenoh.Sample) -> None:
+        """Take a published sample."""
         name, mark = _origin(sample)
         waits = self._depth > 1 and self._publishers.is_asking
         is_listed = sample.source_info or name in self._last_mark or name in self._publishers
@@ -224,7 +201,7 @@ class SampleOrder:
             # The publisher has no cache, or is not yet found.
             if name:
                 _remember(self._unconfirmed, name, mark)
-            self._ready.append(sample)
+            self._receive(sample)
             return
         last = self._last_mark.get(name)
         if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
@@ -238,23 +215,23 @@ class SampleOrder:
         elif _is_newer(mark, last):
             self._deliver(name, mark, sample)
             # A missing sample of this publisher has come: others may be under way, too.
-            if self._gap_until is not None and any(one[0] == name for one in self._held):
+            if self._gap_until < math.inf and any(one[0] == name for one in self._held):
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 
-    def _sort_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
+    def take_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
+        """Take a reply; with ``again`` the last sample counts though it was received already."""
         name, mark = _origin(sample)
         last = self._last_mark.get(name, self._unconfirmed.get(name))
-        if self._depth > 1:
+        if self._depth > 1 or (not again and _leaves_gap(name, mark, last)):
             self._hold(name, mark, sample)
-        elif not again and _leaves_gap(name, mark, last):
-            self._let_wait(name, mark, sample)
         elif _is_newer(mark, last) or (again and mark == last):
             self._deliver(name, mark, sample)
 
-    def _deliver_held(self, *, over_gaps: bool = False) -> None:
-        """Deliver waiting samples, except those after a gap: the missing ones may be under way.
+    def deliver_held(self, *, over_gaps: bool = False) -> None:
+        """Deliver waiting samples, as when all replies have come.
 
-        Those wait until the missing ones have come, or their time is over (``over_gaps``).
+        Those after a gap wait on, as the missing ones may be under way, until these have come, or
+        their time is over (``over_gaps``).
         """
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
@@ -266,33 +243,20 @@ class SampleOrder:
             elif _is_newer(mark, last):
                 self._deliver(name, mark, sample)
         if not self._held:
-            self._gap_until = None
-        elif self._gap_until is None:
+            self._gap_until = math.inf
+        elif self._gap_until == math.inf:
             self._gap_until = time.monotonic() + UNDER_WAY_S
             self._wake()
-
-    def _let_wait(self, name: str, mark: int, sample: zenoh.Sample) -> None:
-        """Hold a reply until the samples before it have come, or their time is over."""
-        self._deliver_ahead()
-        self._ahead = time.monotonic() + UNDER_WAY_S, name, mark, sample
-        if len(sample.payload) > HELD_BYTES:
-            self._deliver_ahead()
-        self._wake()
-
-    def _deliver_ahead(self) -> None:
-        ahead, self._ahead = self._ahead, None
-        if ahead is not None and _is_newer(ahead[2], self._last_mark.get(ahead[1])):
-            self._deliver(*ahead[1:])
 
     def _hold(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._held.append((name, mark, sample))
         self._held_bytes += len(sample.payload)
         is_full = len(self._held) > MOST_PUBLISHERS * self._depth
         if is_full or self._held_bytes > HELD_BYTES:
-            self._deliver_held(over_gaps=True)
+            self.deliver_held(over_gaps=True)
         elif (
             not self._publishers.open_queries
-            and self._gap_until is None
+            and self._gap_until == math.inf
             and name in self._publishers
         ):
             self._publishers.ask_soon(name)
@@ -302,7 +266,7 @@ class SampleOrder:
         self._unconfirmed.pop(name, None)
         _remember(self._last_mark, name, mark)
         _remember(self._stamps, name, _ticks(sample))
-        self._ready.append(sample)
+        self._receive(sample)
 
 
 def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:

@@ -11,13 +11,14 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from fasaco_edge.bench.benchmark import Benchmark, Report, Sample, machine, peak_mb
+from fasaco_edge.bench.benchmark import Benchmark, Report, Sample, machine
 from fasaco_edge.bench.daemon import DAEMON
 from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
 from fasaco_edge.cli.console.logs import report_error
 from fasaco_edge.cli.console.streams import print_json
+from fasaco_edge.host.processes import peak_mb
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (PLANNERS, DAEMON)
 

@@ -34,10 +34,9 @@ examples:
   fasaco-edge watch | tee mission.log                  lines of text, without a terminal
   fasaco-edge watch --json | jq .coverage.fraction
 
-f toggles between the pheromone trail and coverage with path: bright is where the paths so far
-lead. q or Ctrl-C quits. The picture shows the map with north up: y grows upwards. If no map is
-published on the native key `map` (under ROS 2, say) only the coverage is drawn. NO_COLOR=1 and
-TERM=dumb are honoured.
+q or Ctrl-C quits. The picture shows the map with north up: y grows upwards. If no map is published
+on the native key `map` (under ROS 2, say) only the coverage is drawn. NO_COLOR=1 and TERM=dumb are
+honoured.
 
 --fleet shows a table of all robots of a fleet, also those that come later: what each does, how much
 it has swept, and how much is left of its part. With --json a line a second, if something has

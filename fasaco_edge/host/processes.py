@@ -50,8 +50,8 @@ def own_mb(pid: int | str = "self") -> float:
     return _field_mb(pid, "RssAnon")
 
 
-def peak_mb(pid: int) -> float:
-    """Return its peak resident memory [MB]."""
+def peak_mb(pid: int | str = "self") -> float:
+    """Return a process's peak resident memory [MB]."""
     return _field_mb(pid, "VmHWM")
 
 

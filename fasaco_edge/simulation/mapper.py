@@ -36,9 +36,6 @@ class Mapper:
     the robot explores.
     """
 
-    # How many loops were closed.
-    loops = 0
-
     def __init__(self, truth: OccupancyGrid, config: SimulationConfig) -> None:
         resolution = truth.geometry.resolution
         self._truth = truth

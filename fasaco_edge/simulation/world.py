@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import deque
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,7 +19,6 @@ from fasaco_edge.grid.geometry import Point, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import disc_is_free
 from fasaco_edge.simulation.mapper import Mapper
-from fasaco_edge.simulation.noisy_mapper import MapperNoise, NoisyMapper
 from fasaco_edge.simulation.robot import (
     ARRIVED_M,
     Battery,
@@ -84,7 +82,7 @@ class World:
         truth: the building. What is not free there (unknown too) is an obstacle.
         start: the robot's first pose, in the frame of ``truth``.
         config: the robot.
-        noise: of its mapper; None for none.
+        mapper: the robot's; None for one that makes no error.
 
     Raises:
         StartOutsideMap: ``start`` is not on ``truth``.
@@ -96,7 +94,7 @@ class World:
         truth: OccupancyGrid,
         start: Pose2D,
         config: SimulationConfig,
-        noise: MapperNoise | None = None,
+        mapper: Mapper | None = None,
     ) -> None:
         self._truth, self.config = truth, config
         # Name of the frame of everything the robot publishes.
@@ -110,10 +108,7 @@ class World:
                 f"({start.x:g}, {start.y:g}) m"
             )
         self.drive = DriveState(start)
-        self.mapper = NoisyMapper(truth, config, noise) if noise else Mapper(truth, config)
-        # Poses that are not yet published, and by how much each is delayed.
-        self._poses: deque[StampedPose] = deque()
-        self._late_ns = round(noise.late_s / config.tick_s) * config.tick_ns if noise else 0
+        self.mapper = mapper or Mapper(truth, config)
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
         # The newest velocity, if one drives it: speed [m/s], turn rate [rad/s], and its tick.
@@ -192,12 +187,10 @@ class World:
             self.mapper.scan(self.pose)
             if self.activity is Activity.NO_WAY or self._may_try_again():
                 self._join()
-        if self._is_due(self.config.pose_hz):
-            self._poses.append(StampedPose(self.believed, self.frame, self.stamp_ns))
-        is_ripe = self._poses and self._poses[0].stamp_ns <= self.stamp_ns - self._late_ns
+        pose = StampedPose(self.believed, self.frame, self.stamp_ns)
         return Emission(
             self.mapper.snapshot(self.stamp_ns) if self._is_due(self.config.map_hz) else None,
-            self._poses.popleft() if is_ripe else None,
+            pose if self._is_due(self.config.pose_hz) else None,
             self.battery if self._is_due(BATTERY_HZ) else None,
         )
 

@@ -66,9 +66,8 @@ class Blocks:
             entries: how many events are shown at most.
             scale: edge of a pixel [m] and length of the longest scale bar; None for no scale.
         """
-        rule = "─" if self.glyphs.unicode else "-"
         bar = f" {self.glyphs.scale(*scale)} " if scale is not None else ""
-        lines = self.block(on_a_line(Text(f"{bar} lately {rule * width}", FAINT)), width, 1)
+        lines = self.block(on_a_line(Text(f"{bar} lately {'─' * width}", FAINT)), width, 1)
         for entry in list(events.entries)[-entries:]:
             lines += self.block(_entry(entry), width, 1)
         return lines

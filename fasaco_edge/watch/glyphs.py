@@ -1,4 +1,7 @@
-"""The glyphs of a terminal: half blocks in the colours it has, or plain characters."""
+"""The glyphs of a terminal: half blocks in the colours it has, or plain characters.
+
+Python writes UTF-8 to a terminal of any usual locale, C and POSIX too (PEP 538, 540).
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.watch import picture
 
 HALF = "▀"
-ARROWS, PLAIN_ARROWS = "→↗↑↖←↙↓↘", ">/^\\<,v."
+ARROWS = "→↗↑↖←↙↓↘"
 
 
 # For each kind its colour and plain character. Colours are dark, so that the path stands out, and
@@ -33,20 +36,6 @@ _LOOKS: dict[int, tuple[Colour, str]] = {
     picture.NEXT: ((255, 240, 110), "*"),
     picture.ROBOT: ((222, 36, 56), "@"),
 }
-# From black over violet and orange to yellow.
-_FIELD: tuple[Colour, ...] = (
-    (34, 12, 74),
-    (84, 15, 109),
-    (132, 32, 107),
-    (181, 50, 90),
-    (221, 81, 58),
-    (246, 125, 21),
-    (252, 226, 100),
-)
-_LOOKS |= {
-    kind: (colour, str(level))
-    for level, (kind, colour) in enumerate(zip(picture.FIELD, _FIELD, strict=True), 1)
-}
 
 # Sixteen colours are too few: three kinds would be one grey.
 _SYSTEMS = {"256": ColorSystem.EIGHT_BIT, "truecolor": ColorSystem.TRUECOLOR}
@@ -58,17 +47,15 @@ class GlyphSet:
 
     Attributes:
         colours: None for no colours, or too few.
-        unicode: whether it knows more than ASCII.
     """
 
     colours: ColorSystem | None
-    unicode: bool
 
     @classmethod
     def of(cls, console: Console) -> GlyphSet:
         """Return the glyphs of a console, which knows NO_COLOR, TERM and COLORTERM."""
         colours = None if console.no_color else _SYSTEMS.get(console.color_system or "")
-        return cls(colours, console.encoding.startswith("utf"))
+        return cls(colours)
 
     def lines(self, kinds: picture.Kinds) -> list[str]:
         """Return a picture, uint8 (2 * lines, columns), as lines of text."""
@@ -83,8 +70,7 @@ class GlyphSet:
     def bar(self, fraction: float, width: int) -> Text:
         """Return a bar, ``width`` characters wide, that is filled to a share of it."""
         filled = round(min(max(fraction, 0.0), 1.0) * width)
-        full, empty = "█░" if self.unicode else "#."
-        return Text(full * filled, "green").append(empty * (width - filled), "bright_black")
+        return Text("█" * filled, "green").append("░" * (width - filled), "bright_black")
 
     def scale(self, pixel_m: float, longest: int) -> str:
         """Return a scale bar of a round length [m], of at most ``longest`` characters."""
@@ -92,8 +78,7 @@ class GlyphSet:
         lengths = [digit * 10.0**decades for digit in (5, 2, 1)]
         length_m = next((m for m in lengths if m <= longest * pixel_m), lengths[-1])
         inner = max(round(length_m / pixel_m) - 2, 0)
-        bar = f"├{'─' * inner}┤" if self.unicode else f"|{'-' * inner}|"
-        return f"{bar} {length_m:g} m"
+        return f"├{'─' * inner}┤ {length_m:g} m"
 
     def drawn(self, segments: Iterable[Segment]) -> str:
         """Return segments of rich as text for this terminal."""
@@ -132,15 +117,11 @@ def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
     """Return a character, and the kinds that its foreground and background show."""
     shown = max(upper, lower)
     if shown >= picture.LETTER:
-        letter = picture.LETTERS[shown - picture.LETTER]
-        return letter if glyphs.unicode or letter.isascii() else "?", picture.WALL, picture.UNKNOWN
+        return picture.LETTERS[shown - picture.LETTER], picture.WALL, picture.UNKNOWN
     if shown >= picture.HEADING:
-        arrows = ARROWS if glyphs.unicode else PLAIN_ARROWS
-        return arrows[shown - picture.HEADING], picture.WALL, picture.ROBOT
+        return ARROWS[shown - picture.HEADING], picture.WALL, picture.ROBOT
     if glyphs.colours is None:
         return _LOOKS[shown][1], shown, shown
-    if not glyphs.unicode:
-        return " ", shown, shown
     return (" ", upper, upper) if upper == lower else (HALF, upper, lower)
 
 

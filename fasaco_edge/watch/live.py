@@ -59,9 +59,6 @@ class Watched(Protocol):
     def page(self, now: float, width: int, height: int) -> list[str]:
         """Return a page of lines."""
 
-    def press(self, keys: str) -> bool:
-        """Handle typed keys; return whether the page changes."""
-
     def is_known(self) -> bool:
         """Return whether there is something to show."""
 
@@ -88,11 +85,8 @@ def watch_on_screen(
             if came or key != shown_at:
                 shown_at, size = key, key[1]
                 screen.show(watched.page(now, *size), size)
-            typed = screen.keys(FRAME_S).lower()
-            if "q" in typed:
+            if "q" in screen.keys(FRAME_S).lower():
                 return True
-            if watched.press(typed):
-                shown_at = (0, (0, 0), "")
     return False
 
 

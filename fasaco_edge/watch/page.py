@@ -27,13 +27,6 @@ LEGEND = (
     (picture.AHEAD, "path"),
     (picture.HEADING, "robot"),
 )
-FIELD_LEGEND = (
-    (picture.FIELD[0], "no path"),
-    (picture.FIELD[len(picture.FIELD) // 2], "old path, or driven"),
-    (picture.FIELD[-1], "every path"),
-    (picture.WALL, "wall"),
-    (picture.HEADING, "robot"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +73,8 @@ class Page:
         page = self._blocks.block(headline(view, now, width), width, 1)
         if layout.lines:
             page += self._middle(view, time_to_go(view, now), layout)
-            whole, field = self._picture.path_is_whole, self._picture.shows_field
-            key: object = (width, whole, field)
+            whole = self._picture.path_is_whole
+            key: object = (width, whole)
             page += self._blocks.keep(
                 "legend", key, lambda: self._blocks.block(self._legend(whole), width, 1)
             )
@@ -90,11 +83,6 @@ class Page:
             page += self._blocks.keep("log", key, lambda: self._log(view, width, layout))
         page += [" " * width] * (height - len(page))
         return page[:height]
-
-    def toggle_field(self) -> bool:
-        """Toggle the living trail in place of coverage and path; return whether it is shown."""
-        self._picture.shows_field = not self._picture.shows_field
-        return self._picture.shows_field
 
     def _middle(self, view: RobotView, to_go: str, layout: Layout) -> list[str]:
         drawn = self._picture.kinds(view, layout.columns, layout.lines)
@@ -119,8 +107,6 @@ class Page:
         return self._blocks.block(shown, layout.figures, layout.lines)
 
     def _legend(self, path_is_whole: bool) -> Text:
-        if self._picture.shows_field:
-            return self._blocks.legend(FIELD_LEGEND)
         near = f"to {picture.NEAR_M:g} m"
         return self._blocks.legend(
             (kind, near if kind == picture.AHEAD and not path_is_whole else name)
@@ -169,4 +155,4 @@ def headline(view: RobotView, now: float, width: int) -> Text:
         # The robot moves this much faster on the screen; the time to go is in real seconds.
         scale = view.settings.robot.time_scale
         line.append(f"  {scale:g} x real time" if scale != 1.0 else "", "dim")
-    return with_keys(line, width, "q quits", "f trail", clock(now))
+    return with_keys(line, width, "q quits", clock(now))

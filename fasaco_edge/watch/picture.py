@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
-from fasaco_edge.watch.robot_view import FIELD_LEVELS, RobotView
+from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.messages.maps import CoverageValue
@@ -95,9 +95,7 @@ class Frame:
 
 # If several kinds share a character without colours, the larger number is shown.
 UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED, WALL, AHEAD, NEXT, ROBOT = range(9)
-# The living trail, from least to most, when shown in place of coverage and path.
-FIELD = range(ROBOT + 1, ROBOT + 1 + FIELD_LEVELS)
-HEADING = FIELD.stop
+HEADING = ROBOT + 1
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
 EIGHTHS = 8
 LETTER = HEADING + EIGHTHS
@@ -132,16 +130,6 @@ def ground(frame: Frame, grid: OccupancyGrid | None, coverage: OccupancyGrid | N
     if cells is not None:
         tinted = (kinds == FLOOR) & (cells != UNKNOWN)
         kinds[tinted] = cells[tinted]
-    return kinds
-
-
-def field_ground(frame: Frame, grid: OccupancyGrid | None, field: OccupancyGrid | None) -> Kinds:
-    """Return the kinds of all pixels with the living trail on them, uint8 (2 * lines, columns)."""
-    kinds = ground(frame, grid, None)
-    if field is not None:
-        levels = frame.sampled(field, 1, 0).view(np.uint8)
-        shown = (levels > 0) & (kinds != WALL)
-        kinds[shown] = FIELD.start - 1 + levels[shown]
     return kinds
 
 
@@ -226,14 +214,12 @@ class MissionPicture:
     Attributes:
         pixel_m: edge of a pixel of that picture [m]; None before the first.
         path_is_whole: whether all of the path was drawn.
-        shows_field: whether it shows the living trail, in place of coverage and path.
     """
 
     def __init__(self) -> None:
         self.pixel_m: float | None = None
         self.path_is_whole = True
-        self.shows_field = False
-        self._key: tuple[object, ...] = ()
+        self._grids: tuple[OccupancyGrid | None, ...] = ()
         self._bounds: Bounds | None = None
         self._frame: Frame | None = None
         self._ground: Kinds | None = None
@@ -244,8 +230,8 @@ class MissionPicture:
         """Return a picture, uint8 (2 * lines, columns); None while there is nothing to show."""
         # Grids are values: a new one is another object.
         grids = view.map, view.coverage
-        if (key := (*grids, view.field, self.shows_field)) != self._key:
-            self._key, self._frame = key, None
+        if grids != self._grids:
+            self._grids, self._frame = grids, None
             self._bounds = union_bounds(*(known_bounds(grid) for grid in grids if grid is not None))
         if self._bounds is None:
             return None  # a robot alone is no picture
@@ -255,19 +241,15 @@ class MissionPicture:
         frame = Frame.over(bounds, columns, lines)
         if frame != self._frame or self._ground is None:
             self._frame = frame
-            if self.shows_field:
-                self._ground = field_ground(frame, view.map, view.field)
-            else:
-                self._ground = ground(frame, view.map, view.coverage)
+            self._ground = ground(frame, view.map, view.coverage)
         kinds = self._ground.copy()
         self.pixel_m = frame.pixel_m
-        if not self.shows_field:
-            self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
-            if (view.rooms, frame) != self._named:
-                self._named = view.rooms, frame
-                self._names = np.zeros_like(kinds)
-                draw_names(self._names, frame, view.rooms)
-            kinds = np.where(self._names, self._names, kinds)
+        self.path_is_whole = draw_path(kinds, frame, view.path_ahead)
+        if (view.rooms, frame) != self._named:
+            self._named = view.rooms, frame
+            self._names = np.zeros_like(kinds)
+            draw_names(self._names, frame, view.rooms)
+        kinds = np.where(self._names, self._names, kinds)
         if pose is not None:
             settings = known_settings(view.status.config if view.status else {})
             draw_robot(kinds, frame, pose, settings.robot.radius_m)

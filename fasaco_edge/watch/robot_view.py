@@ -12,10 +12,6 @@ from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
-from fasaco_edge.wire.messages.pheromone import decode_pheromone
-
-# Number of levels that the field is shown in.
-FIELD_LEVELS = 7
 
 
 class RobotView(RobotState):
@@ -23,21 +19,17 @@ class RobotView(RobotState):
 
     Attributes:
         map, coverage: None before the first.
-        field: the living trail, on the cells: 0 for none, else 1 to ``FIELD_LEVELS``; None while
-            it is not requested, and before the first.
     """
 
     def __init__(self, robot: str) -> None:
         super().__init__(robot)
         self.map: OccupancyGrid | None = None
         self.coverage: OccupancyGrid | None = None
-        self.field: OccupancyGrid | None = None
         self._readers |= {
             "map": self._read_map,
             "map_update": self._read_map_update,
             "path": self._read_path,
             "coverage": self._read_coverage,
-            "pheromone": self._read_field,
         }
 
     @property
@@ -67,8 +59,3 @@ class RobotView(RobotState):
 
     def _read_coverage(self, sample: Sample, _: float) -> None:
         self.coverage = decode_occupancy_grid(sample.payload)
-
-    def _read_field(self, sample: Sample, _: float) -> None:
-        message = decode_pheromone(sample.payload)
-        levels = -(-message.levels.astype(np.int16) * FIELD_LEVELS // 255)
-        self.field = OccupancyGrid(message.geometry, levels.astype(np.int8), message.frame)

@@ -15,7 +15,6 @@ from fasaco_edge.text import one_line
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.json_text import decode_json
-from fasaco_edge.wire.topics import PHEROMONE
 
 # Time to wait for the rest after a status [s].
 REST_S = 1.0
@@ -85,13 +84,6 @@ class RobotWatch:
     def page(self, now: float, width: int, height: int) -> list[str]:
         """Return a page of lines."""
         return self._page.lines(self._view, now, width, height)
-
-    def press(self, keys: str) -> bool:
-        """Show the living trail in place of coverage and path with f, and back."""
-        if keys.count("f") % 2 == 0:
-            return False
-        self._feed.want(PHEROMONE, self._page.toggle_field())
-        return True
 
     def is_known(self) -> bool:
         """Return whether a status of the robot's daemon has arrived."""

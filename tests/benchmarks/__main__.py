@@ -14,12 +14,10 @@ from fasaco_edge.bench.benchmark import Benchmark
 from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from fasaco_edge.cli.console.parser import Parser
-from tests.benchmarks.codec import CODEC
 from tests.benchmarks.fleet import FLEET
 from tests.benchmarks.fleets.benchmark import FLEET_ONLINE
 from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
-from tests.benchmarks.ingest import INGEST
 from tests.benchmarks.online.benchmark import ONLINE
 from tests.benchmarks.peers import PEERS
 from tests.benchmarks.quality.benchmark import QUALITY
@@ -27,14 +25,12 @@ from tests.benchmarks.replan import REPLAN
 from tests.benchmarks.rooms.benchmark import ROOMS
 from tests.benchmarks.rooms.identity import ROOM_IDS
 from tests.benchmarks.rooms.one_by_one import BY_ROOM
-from tests.benchmarks.scale.benchmark import SCALE
 from tests.benchmarks.table1.benchmark import TABLE1
 from tests.benchmarks.turns.benchmark import TURNS
-from tests.benchmarks.twins import TWINS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, SCALE, CODEC,
-    INGEST, ROOMS, ROOM_IDS, BY_ROOM, TWINS,
+    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, ROOMS,
+    ROOM_IDS, BY_ROOM,
 )  # fmt: skip
 
 
@@ -42,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one benchmark and return the process's exit code."""
     parser = Parser(
         prog="python -m tests.benchmarks",
-        description="Measure planner, codecs and whole missions in simulation.",
+        description="Measure planner and whole missions in simulation.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

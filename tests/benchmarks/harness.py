@@ -78,6 +78,23 @@ def within(low: Number, high: Number) -> Callable[[str], Number]:
     return read
 
 
+SECONDS = within(0.0, 3600.0)
+"""Reads a time [s] from 0 to an hour."""
+
+
+def add_floors(parser: argparse.ArgumentParser, floors: int) -> None:
+    """Declare ``--floors`` and ``--seed`` of generated homes and offices."""
+    parser.add_argument(
+        "--floors",
+        type=within(1, 1_000_000),
+        default=floors,
+        help="of each kind (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--seed", type=within(0, 2**62), default=0, help="the first (default: %(default)s)"
+    )
+
+
 def grid_name(name_or_path: str) -> str:
     """Return what a grid is called in results: where its file lies is nobody's business."""
     return Path(name_or_path).stem

@@ -29,7 +29,6 @@ from tests.benchmarks.buildings import building
 from tests.benchmarks.online.buildings import Building, of_grid
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission
 from tests.benchmarks.online.robot import Pace
-from tests.benchmarks.online.sight import Senses
 from tests.campaigns.services import show
 
 POLICY = BatteryPolicy()
@@ -103,7 +102,7 @@ def charge(cells: int, seed: int, proposals: int = PROPOSALS) -> Charged:
     """Cover the building of a seed without and with a battery."""
     house = of_grid(building(cells, seed), MAP_FOOTPRINT.cell_m)
     conditions = Conditions(
-        senses=Senses(5.0, 0.0, seed),
+        range_m=5.0,
         pace=PACE,
         cost=PACE.cost(house.footprint.cell_m, with_turns=True),
         seat=CountedPlanning(seed, proposals),

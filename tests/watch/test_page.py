@@ -13,8 +13,6 @@ from rich.console import Console
 from rich.text import Text
 
 from fasaco_edge.client.robot_state import Token
-from fasaco_edge.grid.geometry import Window
-from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.watch.blocks import Blocks
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Page
@@ -22,7 +20,6 @@ from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
-from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from tests.support.statuses import extreme_statuses
 from tests.watch.grids import NOW, console, mid_mission, plain, status, tell
 
@@ -37,7 +34,7 @@ def page_of(view: RobotView, width: int = 80, height: int = 24, colours: str | N
 
 def test_two_pixels_make_a_character():
     kinds = np.array([[WALL, WALL, COVERED], [WALL, COVERED, COVERED]], np.uint8)
-    (line,) = GlyphSet(ColorSystem.TRUECOLOR, unicode=True).lines(kinds)
+    (line,) = GlyphSet(ColorSystem.TRUECOLOR).lines(kinds)
     wall, covered = "214;218;226", "24;112;82"
     assert line == (
         f"\x1b[38;2;{wall};48;2;{wall}m \x1b[0m"
@@ -47,7 +44,7 @@ def test_two_pixels_make_a_character():
 
 
 def test_what_is_alike_is_written_once():
-    (line,) = GlyphSet(ColorSystem.TRUECOLOR, unicode=True).lines(np.full((2, 50), WALL, np.uint8))
+    (line,) = GlyphSet(ColorSystem.TRUECOLOR).lines(np.full((2, 50), WALL, np.uint8))
     assert line.count("\x1b") == 2
     assert plain(line) == " " * 50
 
@@ -62,8 +59,7 @@ def test_fewer_colours_will_do():
 
 def test_no_colours_will_do():
     kinds = np.array([[WALL, 0, TO_COVER, HEADING + 2], [WALL, COVERED, 0, 0]], np.uint8)
-    assert GlyphSet(None, unicode=True).lines(kinds) == ["#o-↑"]
-    assert GlyphSet(None, unicode=False).lines(kinds) == ["#o-^"]
+    assert GlyphSet(None).lines(kinds) == ["#o-↑"]
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
@@ -82,24 +78,6 @@ def test_the_robot_points_east_over_the_covered_lower_half():
     assert "o" not in lines[1][:45]
     assert "o" in lines[-4][:45]
     assert row > 8
-
-
-def test_the_trail_takes_the_place_of_coverage_and_path():
-    view, page = mid_mission(), Page(console(80, colours=None))
-    trail = np.full((8, 12), 0.1, np.float32)
-    trail[2] = 1.0
-    seen = ColonySnapshot(Window(0, 0, 8, 12), 0.5, trail, 0, 0, 0, 30)
-    tell(view, "pheromone", encode_pheromone(seen, "map", 1), b"{}")
-    before = page.lines(view, NOW, 80, 24)
-    assert page.toggle_field()
-    shown = page.lines(view, NOW, 80, 24)
-    lane = next(number for number, line in enumerate(shown) if "→" in line)
-    assert "777777" in shown[lane]
-    assert "111111" in shown[lane - 4]
-    assert "*" not in "".join(line[:45] for line in shown[1:-6])
-    assert "every path" in "".join(shown)
-    assert not page.toggle_field()
-    assert page.lines(view, NOW, 80, 24) == before
 
 
 def test_it_says_how_it_stands():
@@ -288,12 +266,11 @@ def test_a_page_that_did_not_change_is_not_drawn_anew():
     assert all(a is b for a, b in zip(first[18:22], second[18:22], strict=True))
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 50)])
-def test_no_number_that_a_status_may_have_ends_the_page(size):
+def test_no_number_that_a_status_may_have_ends_the_page():
     view = mid_mission()
     for payload in extreme_statuses():
         tell(view, "status", payload)
-        assert len(page_of(view, *size).split("\n")) == size[1]
+        assert len(page_of(view, 120, 50).split("\n")) == 50
 
 
 def test_a_block_says_how_many_rows_have_no_place():

@@ -56,14 +56,9 @@ def test_it_shows_how_the_mission_stands(covering):
         assert terminal.is_clean()
 
 
-def test_a_key_switches_the_map_to_the_trail_and_back(covering):
+def test_no_colours_where_none_are_wanted(covering):
     with Terminal("--connect", covering.endpoint, NO_COLOR="1", LANG="C") as terminal:
         terminal.wait(lambda seen: "COVERING" in seen and "to cover" in seen)
-        terminal.type("f")
-        # Where the path leads it is strong.
-        terminal.wait(lambda seen: "to cover" not in seen and "777" in seen.split("\n", 1)[1])
-        terminal.type("f")
-        terminal.wait(lambda seen: "to cover" in seen and "777" not in seen)
         terminal.type("q")
         assert terminal.end() == 0
         codes = set(terminal.written.replace("\x1b[0m", "").split("\x1b[")[1:])

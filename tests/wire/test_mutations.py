@@ -16,6 +16,7 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.wire import limits, schemas
+from fasaco_edge.wire.messages import path_points
 from fasaco_edge.wire.messages.maps import encode_map_update
 from fasaco_edge.wire.messages.paths import decode_path, encode_path
 from fasaco_edge.wire.messages.poses import decode_transforms
@@ -91,9 +92,15 @@ def test_limits_on_size_are_the_callers_to_lower() -> None:
         DECODERS[schema](seeds[name], max_cells=15)  # type: ignore[call-arg]
         with pytest.raises(MalformedMessage, match=r"length of data must be 1\.\.14, got 15"):
             DECODERS[schema](seeds[name], max_cells=14)  # type: ignore[call-arg]
-    decode_path(seeds["path"], max_poses=4)
+
+
+def test_a_path_has_so_many_poses_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    (seed,) = (vector.payload for vector in valid_vectors() if vector.name == "path")
+    monkeypatch.setattr(path_points, "MAX_PATH_POSES", 4)
+    decode_path(seed)
+    monkeypatch.setattr(path_points, "MAX_PATH_POSES", 3)
     with pytest.raises(MalformedMessage, match="length of poses must be at most 3, got 4"):
-        decode_path(seeds["path"], max_poses=3)
+        decode_path(seed)
 
 
 def test_a_pose_must_come_in_a_known_type() -> None:

@@ -199,10 +199,6 @@ class FleetWatch:
         """Return a page of lines."""
         return self._page.lines(self._view, now, width, height)
 
-    def press(self, keys: str) -> bool:
-        """Handle typed keys: none has an effect here."""
-        return False
-
     def is_known(self) -> bool:
         """Return whether a message of a robot has arrived."""
         return len(self._view.members) > 0

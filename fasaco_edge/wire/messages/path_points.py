@@ -34,7 +34,7 @@ class PathPoints:
     def __init__(self, payload: bytes) -> None:
         self._reader = CdrReader(payload, PATH)
         self.frame, _ = read_header(self._reader)
-        self.left = self._count = read_pose_count(self._reader, MAX_PATH_POSES)
+        self.left = self._count = read_pose_count(self._reader)
         if not self.left:
             self._reader.end()
 
@@ -64,11 +64,11 @@ class PathPoints:
         return poses
 
 
-def read_pose_count(reader: CdrReader, max_poses: int) -> int:
+def read_pose_count(reader: CdrReader) -> int:
     """Read the number of poses of a path."""
     count = reader.length("poses", LEAST_POSE_BYTES)
-    if count > max_poses:
-        refuse(PATH, "length of poses", f"at most {max_poses}", count)
+    if count > MAX_PATH_POSES:
+        refuse(PATH, "length of poses", f"at most {MAX_PATH_POSES}", count)
     return count
 
 

@@ -86,16 +86,16 @@ def encode_path(
     return writer.payload()
 
 
-def decode_path(payload: bytes, max_poses: int = MAX_PATH_POSES) -> PathMessage:
+def decode_path(payload: bytes) -> PathMessage:
     """Return the path in a nav_msgs/Path.
 
     Raises:
-        MalformedMessage: it is no such message, has over ``max_poses`` poses, or a pose
+        MalformedMessage: it is no such message, has over ``MAX_PATH_POSES`` poses, or a pose
             names another frame than the path; a pose without a frame is in the path's.
     """
     reader = CdrReader(payload, PATH)
     frame, stamp_ns = read_header(reader)
-    count = read_pose_count(reader, max_poses)
+    count = read_pose_count(reader)
     poses = _read_records(reader, frame, count)
     if poses is None:
         poses = _read_one_by_one(reader, frame, count)

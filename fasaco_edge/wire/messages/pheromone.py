@@ -96,14 +96,14 @@ def encode_pheromone(
     return writer.payload()
 
 
-def decode_pheromone(payload: bytes, max_cells: int = MAX_GRID_CELLS) -> PheromoneMessage:
+def decode_pheromone(payload: bytes) -> PheromoneMessage:
     """Return the pheromone field in a fasaco_msgs/PheromoneGrid."""
     reader = CdrReader(payload, PHEROMONE_GRID)
     frame, stamp_ns = read_header(reader)
     geometry = read_grid_geometry(reader)
     colony = reader.words(COLONY, COLONY_NAMES)
     trail_min, trail_max, cohort, velocity, ants, best_steps = colony
-    levels = read_cells(reader, geometry, np.uint8, max_cells, "levels")
+    levels = read_cells(reader, geometry, np.uint8, MAX_GRID_CELLS, "levels")
     empty = trail_min == trail_max == 0.0 and not levels.any()
     if not empty and not 0.0 < trail_min <= trail_max < math.inf:
         expected = "finite with 0 < trail_min <= trail_max, or 0 where no level is above 0"

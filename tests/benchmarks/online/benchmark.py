@@ -11,11 +11,9 @@ from fasaco_edge.bench.benchmark import (
     add_grid_options,
     grid_names,
     positive,
-    seconds,
 )
-from tests.benchmarks.harness import within
+from tests.benchmarks.harness import SECONDS, within
 from tests.benchmarks.online.buildings import BuildingChoice
-from tests.benchmarks.online.cases import CASES
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun
 from tests.benchmarks.online.report import report
@@ -27,8 +25,7 @@ DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement", "warehouse")
 FEWEST_CELLS, MOST_CELLS = 1_000, 1_000_000
 # Options that figures say of themselves.
 CONDITIONS = (
-    "starts", "ranges", "seeds", "misread", "cost", "turn_s", "speed_m_s", "proposals",
-    "planning_takes_time", "planners", "noise",
+    "starts", "ranges", "seeds", "cost", "turn_s", "speed_m_s", "proposals", "planners",
 )  # fmt: skip
 
 
@@ -55,18 +52,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="of generated buildings (default: %(default)s)",
     )
     parser.add_argument(
-        "--mazes", type=_some, default=1, metavar="N", help="beside (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--cases",
-        nargs="*",
-        choices=CASES,
-        default=list(CASES),
-        metavar="CASE",
-        help=f"beside, missions in which something happens: {', '.join(CASES)} (default: "
-        "all; no name for none)",
-    )
-    parser.add_argument(
         "--planners",
         nargs="+",
         choices=CONTENDERS,
@@ -88,7 +73,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=positive,
         default=1,
         metavar="N",
-        help="0 to N - 1, of planner and misreadings (default: %(default)s)",
+        help="0 to N - 1, of the planner (default: %(default)s)",
     )
     parser.add_argument(
         "--proposals",
@@ -96,12 +81,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         default=2_000_000,
         help="moves that a plan may try, in place of the daemon's time (default: %(default)s, "
         "about its 0.1 s)",
-    )
-    parser.add_argument(
-        "--planning-takes-time",
-        action="store_true",
-        help="the robot drives on, or stands, while a plan is made; then figures depend on the "
-        "machine",
     )
 
 
@@ -115,22 +94,6 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
         help="reach of the scanner, which looks all around [m] (default: 3.5 8)",
     )
     parser.add_argument(
-        "--misread",
-        type=within(0.0, 0.5),
-        default=0.0,
-        metavar="SHARE",
-        help="of the cells taken for the opposite of what they are, beyond 1 m (default: "
-        "%(default)g; there are goals for 0.05, too)",
-    )
-    parser.add_argument(
-        "--noise",
-        type=within(0.0, 4.0),
-        default=0.0,
-        metavar="LEVEL",
-        help="each mission in a building once more, with a mapper of so much noise; 1: of a scan "
-        "matcher's (default: none)",
-    )
-    parser.add_argument(
         "--cost",
         choices=("steps", "turns"),
         default="steps",
@@ -138,7 +101,7 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--turn-s",
-        type=seconds,
+        type=SECONDS,
         default=1.5,
         metavar="S",
         help="a quarter-turn [s] (default: %(default)g)",
@@ -155,24 +118,20 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
 def _plan(args: argparse.Namespace) -> OnlinePlan:
     names = grid_names(args, () if args.generated else DEFAULT_MAPS)
     return OnlinePlan(
-        choice=BuildingChoice(names, args.generated, args.cells, args.mazes),
-        cases=tuple(dict.fromkeys(args.cases)),
+        choice=BuildingChoice(names, args.generated, args.cells),
         starts=args.starts,
         ranges_m=tuple(dict.fromkeys(args.ranges)),
         seeds=args.seeds,
-        misread=args.misread,
         pace=Pace(args.speed_m_s, args.turn_s),
         with_turns=args.cost == "turns",
         proposals=args.proposals,
-        planning_takes_time=args.planning_takes_time,
         planners=tuple(dict.fromkeys(args.planners)),
-        noise=args.noise,
     )
 
 
 def _report(args: argparse.Namespace, runs: Sequence[MissionRun]) -> Report:
     about = {name: getattr(args, name) for name in CONDITIONS}
-    return report(args.misread, with_turns=args.cost == "turns", about=about, runs=runs)
+    return report(with_turns=args.cost == "turns", about=about, runs=runs)
 
 
 ONLINE = Benchmark(
@@ -180,11 +139,10 @@ ONLINE = Benchmark(
     summary="whole missions in unknown buildings, against robots that know them",
     description="Send a simulated robot into buildings it does not know: after every cell its "
     "scanner reveals some more, the real mission decides, the daemon's planner plans with "
-    "counted work, and the robot drives on; without a bus and, unless asked for, without "
+    "counted work, and the robot drives on; without a bus and without "
     "waiting for plans, so that the same options give the same missions. Every trail is judged "
     "by code that shares nothing with mission and planner, and compared with the near-optimal "
-    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more. Mazes, and cases "
-    "in which something happens on the way, are reported beside.",
+    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more.",
     add_options=_add_options,
     count=lambda args: count(_plan(args)),
     measure=lambda args, say: measure(_plan(args), say),
@@ -192,11 +150,9 @@ ONLINE = Benchmark(
     epilog="""\
 examples:
   python -m tests.benchmarks online
-  python -m tests.benchmarks online --maps flat basement --ranges 3.5 --mazes 0 --cases
-  python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --misread 0.05 --json
+  python -m tests.benchmarks online --maps flat basement --ranges 3.5
+  python -m tests.benchmarks online --grids *.npy --starts 3 --seeds 10 --json
   python -m tests.benchmarks online --generated 3 --cells 10000 --cost turns
-  python -m tests.benchmarks online --maps office flat --mazes 0 --cases --noise 1 --cost turns
-  python -m tests.benchmarks online --maps office --cases person --planning-takes-time
   python -m tests.benchmarks online --planners fasaco fasaco-anew aco aco-anew spiral-stc zigzag
 """,
 )

@@ -26,8 +26,6 @@ from tests.benchmarks.buildings import building
 from tests.benchmarks.harness import check_names, grid_name
 from tests.benchmarks.judge import reachable
 
-BUILDING, MAZE, CASE = KINDS = ("building", "maze", "case")
-
 PIXELS_PER_CELL = 2
 # Of a cell's width. The disc stays within the cell's own pixels.
 RADIUS_SHARE = 0.45
@@ -43,7 +41,6 @@ class Building:
         footprint: of the robot.
         lattice: the lattice over all of it.
         start: the cell (row, col) the robot starts in.
-        kind: BUILDING, MAZE or CASE; only buildings enter medians.
     """
 
     name: str
@@ -51,7 +48,6 @@ class Building:
     footprint: Footprint
     lattice: CoverageLattice
     start: Cell
-    kind: str = BUILDING
 
     @property
     def reachable(self) -> NDArray[np.bool_]:
@@ -75,13 +71,11 @@ class BuildingChoice:
     Attributes:
         grids: names or files of maps and coverage grids.
         generated: number of synthetic buildings, of ``cells`` cells each.
-        mazes: number of mazes.
     """
 
     grids: tuple[str, ...]
     generated: int
     cells: int
-    mazes: int
 
     def buildings(self) -> Iterator[Building]:
         """Yield them.
@@ -94,11 +88,6 @@ class BuildingChoice:
             yield _read_building(name)
         for seed in range(self.generated):
             yield of_grid(building(self.cells, seed), MAP_FOOTPRINT.cell_m)
-        for seed in range(self.mazes):
-            free = maze(15, Generator(PCG64(seed)))
-            lattice = CoverageLattice.from_free(free)
-            grid = NamedGrid(f"maze-s{seed}", lattice, (1, 1))
-            yield replace(of_grid(grid, MAP_FOOTPRINT.cell_m), kind=MAZE)
 
 
 def of_grid(grid: NamedGrid, cell_m: float, pixels_per_cell: int = PIXELS_PER_CELL) -> Building:
@@ -115,30 +104,6 @@ def of_grid(grid: NamedGrid, cell_m: float, pixels_per_cell: int = PIXELS_PER_CE
         lattice=CoverageLattice.from_free(free, cell_m),
         start=grid.start,
     )
-
-
-def maze(corridors: int, rng: Generator) -> NDArray[np.bool_]:
-    """Return a maze of ``corridors`` x ``corridors`` crossings, bool, True = free.
-
-    Every corridor is a cell wide, and there is one way from any place to any other: the
-    robot drives most of it twice, whatever it knows.
-    """
-    free = np.zeros((2 * corridors + 1, 2 * corridors + 1), bool)
-    free[1, 1] = True
-    way = [(1, 1)]
-    while way:
-        row, col = way[-1]
-        around = [(row + i, col + j) for i, j in ((0, 2), (2, 0), (0, -2), (-2, 0))]
-        beyond = [
-            (r, c) for r, c in around if min(r, c) > 0 and max(r, c) < len(free) and not free[r, c]
-        ]
-        if not beyond:
-            way.pop()
-            continue
-        r, c = beyond[int(rng.integers(len(beyond)))]
-        free[r, c] = free[(row + r) // 2, (col + c) // 2] = True
-        way.append((r, c))
-    return free
 
 
 def _read_building(name: str) -> Building:

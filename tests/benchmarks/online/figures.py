@@ -151,48 +151,6 @@ def time_ratio(run: MissionRun) -> float:
     return run.time_ratio
 
 
-@dataclass(frozen=True, slots=True)
-class NoisySummary:
-    """Missions under the noise of a mapper, each beside the same one without.
-
-    Attributes:
-        pairs: without noise, with it.
-    """
-
-    pairs: Sequence[tuple[MissionRun, MissionRun]]
-
-    @classmethod
-    def of(cls, runs: Sequence[MissionRun]) -> NoisySummary:
-        """Pair missions."""
-        quiet = {_what(run): run for run in runs if not run.noise}
-        return cls([(quiet[_what(run)], run) for run in runs if run.noise])
-
-    @property
-    def time_ratios(self) -> list[float]:
-        """Time with noise to that without, of missions that both were done."""
-        return [noisy.time_s / quiet.time_s for quiet, noisy in self.pairs if noisy.done]
-
-    @property
-    def time_ratio(self) -> float | None:
-        """Median of these."""
-        return _median(self.time_ratios)
-
-    def document(self) -> dict[str, Any]:
-        """Return this as JSON values."""
-        noisy = [run for _, run in self.pairs]
-        return {
-            "missions": len(noisy),
-            "done": sum(run.done for run in noisy),
-            "time_ratio_median": self.time_ratio,
-            "time_ratio_worst": max(self.time_ratios, default=None),
-            "missed_share_median": _median(run.missed / run.cells for run in noisy),
-        }
-
-
-def _what(run: MissionRun) -> tuple[object, ...]:
-    return run.planner, run.building, run.start, run.range_m, run.seed
-
-
 def _ms(elapsed: Elapsed, cpu: bool) -> float:
     return elapsed.cpu_ms if cpu else elapsed.wall_ms
 
@@ -202,23 +160,17 @@ def _median(values: Iterable[float]) -> float | None:
     return statistics.median(found) if found else None
 
 
-# Steps to those of the known building, by the share of cells misread: median, worst.
-STEPS = {0.0: (1.015, 1.07), 0.05: (1.04, 1.10)}
+# Steps to those of the known building: median, worst, and worst of large buildings.
+STEPS_MEDIAN, STEPS_WORST = 1.015, 1.07
 WORST_LARGE = 1.03
 TIME = 1.05
 REPLAN_MS, REPLAN_TO_FULL = 10.0, 1 / 20
 INGEST_MS = 10.0
 KEPT, WAITING = 0.88, 0.001
-NOISY_TIME = 1.10
 
 
-def goals(
-    summary: Summary, misread: float, *, with_turns: bool, noisy: NoisySummary | None = None
-) -> Iterator[Goal]:
+def goals(summary: Summary, *, with_turns: bool) -> Iterator[Goal]:
     """Yield the goals that missions in buildings have something to say on."""
-    if noisy is not None and noisy.pairs:
-        what = "mission time with a noisy mapper to that with an ideal one, median"
-        yield _goal(what, noisy.time_ratio, NOISY_TIME)
     covered = summary.covered_all
     yield Goal(
         "all reachable cells covered (1 = always)",
@@ -229,13 +181,12 @@ def goals(
     if with_turns:
         what = "mission time to the same planner's, building known, median"
         yield _goal(what, summary.ratio_median(time_ratio), TIME)
-    elif misread in STEPS:
-        median, worst = STEPS[misread]
+    else:
         what = "steps to the near-optimal walk, building known"
-        yield _goal(f"{what}, median", summary.ratio_median(steps_ratio), median)
-        yield _goal(f"{what}, worst", summary.ratio_worst(steps_ratio), worst)
+        yield _goal(f"{what}, median", summary.ratio_median(steps_ratio), STEPS_MEDIAN)
+        yield _goal(f"{what}, worst", summary.ratio_worst(steps_ratio), STEPS_WORST)
         large = summary.ratio_worst(steps_ratio, LARGE_CELLS)
-        if large is not None and not misread:
+        if large is not None:
             yield _goal(f"{what}, worst from {LARGE_CELLS} cells on", large, WORST_LARGE)
     yield _goal("replan, p99", summary.replan_ms(99), REPLAN_MS, "ms")
     yield _goal("replan p99 to a full plan, median", summary.replan_to_full, REPLAN_TO_FULL)

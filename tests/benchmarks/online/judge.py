@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.grid.lattice import Cell
-from tests.benchmarks.judge import check_walk, reachable
-from tests.benchmarks.online.buildings import CASE
+from tests.benchmarks.judge import check_walk
 from tests.benchmarks.online.mission import Elapsed, OnlineMission
 from tests.benchmarks.online.robot import cells_of
 
@@ -47,18 +46,7 @@ class Verdict:
 
 
 def judged(mission: OnlineMission) -> Verdict:
-    """Judge a mission that is over.
-
-    In a building that stays as it is, the trail is a walk over its lattice: each step is to be
-    one of that. In one that changes, what counts is which of the cells that can be reached in
-    the end, and where the map has them in the end, the tool has passed over. So in one that the map
-    shows as it is not.
-    """
-    is_walk = mission.building.kind != CASE and not mission.is_noisy
-    return _judged_walk(mission) if is_walk else _judged_case(mission)
-
-
-def _judged_walk(mission: OnlineMission) -> Verdict:
+    """Judge a mission that is over: each step of its trail is to be one of the true lattice."""
     building, robot = mission.building, mission.robot
     lattice = building.lattice
     corner = (lattice.window.row0, lattice.window.col0)
@@ -78,30 +66,6 @@ def _judged_walk(mission: OnlineMission) -> Verdict:
     )
 
 
-def _judged_case(mission: OnlineMission) -> Verdict:
-    robot, sight = mission.robot, mission.sight
-    lattice = sight.true_lattice()
-    corner = (lattice.window.row0, lattice.window.col0)
-    walk = cells_of(robot.trail, sight, lattice.cell_m) - corner
-    # Somebody may stand where it is: then from where it last stood free.
-    free = np.flatnonzero(lattice.coverable[tuple(walk.T)])
-    last: tuple[int, int] = tuple(walk[free[-1]].tolist())
-    wanted = np.argwhere(reachable(lattice.steps, last) & lattice.coverable)
-    places = lattice.centres((wanted + corner).astype(np.int32))
-    way = np.array([sight.geometry.to_map(*point) for point in robot.trail])
-    swept_by = _first_sweep(places, way, 0.5 * lattice.cell_m)
-    first_visits = np.sort(swept_by[swept_by >= 0])
-    return Verdict(
-        cells=len(wanted),
-        missed=len(wanted) - len(first_visits),
-        problems=(),
-        steps=len(walk) - 1,
-        revisits=len(walk) - len(np.unique(walk, axis=0)),
-        quarters=robot.quarters,
-        reached=_milestones(first_visits, len(wanted), robot.times),
-    )
-
-
 def _milestones(
     first_visits: NDArray[np.int64], cells: int, times: list[float]
 ) -> tuple[Moment | None, ...]:
@@ -109,28 +73,6 @@ def _milestones(
     needed = [-(-cells * percent // 100) for percent in MILESTONES]
     at = [int(first_visits[count - 1]) if count <= len(first_visits) else None for count in needed]
     return tuple(None if step is None else (times[step], step) for step in at)
-
-
-def _first_sweep(
-    places: NDArray[np.float64], way: NDArray[np.float64], reach: float
-) -> NDArray[np.int64]:
-    """Return which step first passes within ``reach`` of each place, int64 (n,); -1 for none.
-
-    Args:
-        places: points (x, y), float64 (n, 2).
-        way: the ends of the steps, float64 (m, 2).
-        reach: the tool's.
-    """
-    swept_by = np.full(len(places), -1)
-    for step in range(len(way)):
-        start, end = way[max(step - 1, 0)], way[step]
-        ahead = end - start
-        length2 = float(ahead @ ahead)
-        along = (places - start) @ ahead / length2 if length2 else np.zeros(len(places))
-        nearest = start + np.clip(along, 0.0, 1.0)[:, np.newaxis] * ahead
-        near = np.hypot(*(places - nearest).T) < reach
-        swept_by[near & (swept_by < 0)] = step
-    return swept_by
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,28 +94,25 @@ class MissionRun:
     """One mission.
 
     Attributes:
-        building, kind: where.
+        building: where.
         cells: that could be reached.
         start, range_m, seed: of the robot.
         ended: the mission's own words for how it was at the end.
         done: whether it said that all is covered.
         missed: cells it could have reached and never was in.
         problems: what is wrong with the trail, and what the mission refused.
-        happened: of a case, whether it came to it.
         steps, revisits, quarters: of the trail.
         time_s, waiting_s: of the mission, and how long of it the robot had no way to go [s].
-        reference: what it is compared with; None in cases.
+        reference: what it is compared with; None for none.
         reached: see ``Verdict``.
         plans, paths: how many were asked for, and published.
         held_up: how often the robot stood before an obstacle that its path led into.
         stale_m: way driven on a path that the newest map had blocked further on [m].
         replans, ingests, kept, updates: see ``Watch``.
         planner: one of ``contenders.CONTENDERS``.
-        noise: of the robot's mapper, see ``Senses``.
     """
 
     building: str
-    kind: str
     cells: int
     start: Cell
     range_m: float
@@ -182,7 +121,6 @@ class MissionRun:
     done: bool
     missed: int
     problems: tuple[str, ...]
-    happened: bool
     steps: int
     revisits: int
     quarters: float
@@ -199,7 +137,6 @@ class MissionRun:
     kept: tuple[float, ...]
     updates: tuple[bool, ...]
     planner: str
-    noise: float = 0.0
 
     @property
     def covered_all(self) -> bool:

@@ -9,7 +9,7 @@ A whole mission in simulated time: the real ``Mission.step``, and a robot that d
 
 After every leg the robot looks around; what is new goes to the mission with its pose, and its
 decision is carried out before the next leg. The time that takes is measured, but the robot
-does not stand meanwhile, unless planning is to take its time.
+does not stand meanwhile.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from tests.benchmarks.judge import MOVES
 from tests.benchmarks.online.buildings import Building
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.robot import Pace, Robot
-from tests.benchmarks.online.sight import Senses, sight_of
+from tests.benchmarks.online.sight import Sight
 
 # How far ahead of the robot a path is to hold still [m].
 NEXT_M = 5.0
@@ -197,19 +197,17 @@ class Conditions:
     """What a mission takes place under.
 
     Attributes:
-        senses: what the robot sees.
+        range_m: reach of the robot's scanner [m].
         pace: how fast it is.
         cost: what its walks are to have little of.
         seat: who plans.
-        planning_takes_time: whether the robot drives on, or stands, while a plan is made.
         plans_on_trail, policy, battery, spare_share: see ``MissionConfig``.
     """
 
-    senses: Senses
+    range_m: float
     pace: Pace
     cost: CoverageCost
     seat: PlannerSeat
-    planning_takes_time: bool = False
     plans_on_trail: bool = False
     policy: MissionPolicy = NO_PATIENCE
     battery: BatteryPolicy | None = None
@@ -229,7 +227,7 @@ class OnlineMission:
 
     def __init__(self, building: Building, conditions: Conditions) -> None:
         self.building = building
-        self.sight = sight_of(building, conditions.senses)
+        self.sight = Sight(building, conditions.range_m)
         cell_m = building.footprint.cell_m
         centre = building.lattice.centres(np.array([building.start], np.int32))
         (x, y), *_ = centre.tolist()
@@ -246,14 +244,9 @@ class OnlineMission:
             spare_share=conditions.spare_share,
         )
         self._mission = Mission(config)
-        # A plan that takes its time, and when it will be there.
-        self._on_its_way: tuple[PlanReady, float] | None = None
+        # The answer that comes with the next step.
+        self._late: PlanReady | None = None
         self._stale = False
-
-    @property
-    def is_noisy(self) -> bool:
-        """Whether the robot's mapper is."""
-        return self._conditions.senses.noise > 0.0
 
     @property
     def done(self) -> bool:
@@ -265,17 +258,12 @@ class OnlineMission:
         """The mission's own words for how it is."""
         return f"{self._mission.state}: {self._mission.reason}"
 
-    def run(self, act: Callable[[OnlineMission], None] = lambda _: None) -> None:
-        """Drive until the mission is done, or nothing is to be hoped for any more.
-
-        Args:
-            act: called before each leg; may change what is there.
-        """
+    def run(self) -> None:
+        """Drive until the mission is done, or nothing is to be hoped for any more."""
         most = MOST_VISITS * int(np.count_nonzero(self.building.reachable)) + 1000
         moved_at = self.now
         self.sense()
         while not self.done and len(self.robot.trail) < most:
-            act(self)
             if self._go():
                 moved_at = self.now
             elif self.now - moved_at > PATIENCE_S:
@@ -291,11 +279,8 @@ class OnlineMission:
             self.watch.stale_m += leg.distance_m if self._stale else 0.0
             return True
         self.watch.held_up += leg is not None
-        until = self.now + TICK_S
-        if self._on_its_way is not None and leg is None:
-            until = max(self._on_its_way[1], self.now)
-        self.watch.waiting_s += until - self.now
-        self.now = until
+        self.watch.waiting_s += TICK_S
+        self.now += TICK_S
         return False
 
     def heard(self) -> Sequence[Event]:
@@ -309,9 +294,9 @@ class OnlineMission:
         pose = StampedPose(self.robot.pose(self.sight), self.building.truth.frame)
         events: list[Event] = [] if news is None else [news]
         events += [PoseReceived(pose), *self.heard()]
-        if self._on_its_way is not None and self._on_its_way[1] <= self.now:
-            events.append(self._on_its_way[0])
-            self._on_its_way = None
+        if self._late is not None:
+            events.append(self._late)
+            self._late = None
         before, paths = self.robot.ahead, self.watch.paths
         self._decide(events, with_map=news is not None)
         lattice, ahead = self._mission.lattice, self.robot.ahead
@@ -332,11 +317,9 @@ class OnlineMission:
             answers += 1
             stopwatch = Stopwatch()
             ready = self._conditions.seat(decision.plan)
-            planning = stopwatch.read()
-            spent.append(planning)
-            if self._conditions.planning_takes_time or answers == PLANS_AT_ONCE:
-                takes_ms = planning.wall_ms if self._conditions.planning_takes_time else 0.0
-                self._on_its_way = ready, self.now + 1e-3 * takes_ms
+            spent.append(stopwatch.read())
+            if answers == PLANS_AT_ONCE:
+                self._late = ready
                 break
             decision, stepping = self._step([ready])
             spent.append(stepping)

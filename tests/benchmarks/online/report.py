@@ -1,13 +1,13 @@
-"""Missions to tables: buildings first, mazes and cases beside."""
+"""Missions to tables."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-from fasaco_edge.bench.benchmark import Report, ResultTable, peak_mb
-from tests.benchmarks.online.buildings import BUILDING, CASE, KINDS, MAZE
-from tests.benchmarks.online.figures import NoisySummary, Summary, goals, steps_ratio, time_ratio
+from fasaco_edge.bench.benchmark import Report, ResultTable
+from fasaco_edge.host.processes import peak_mb
+from tests.benchmarks.online.figures import Summary, goals, steps_ratio, time_ratio
 from tests.benchmarks.online.judge import MILESTONES, MissionRun
 
 HEADER = (
@@ -19,14 +19,6 @@ LATENCY_HEADER = (
 )  # fmt: skip
 PLANNER_HEADER = (*HEADER[:-1], "replan\np50, p99\n[ms]")
 UNTIL_HEADER = ("", *(f"{percent} %:\nsteps,\n[s]" for percent in MILESTONES))
-NOISY_HEADER = (
-    "", "missions,\ndone", "time to\nideal", "steps\nto known", "missed\n[%]",
-    "waiting\n[%],\nheld up",
-)  # fmt: skip
-CASE_HEADER = (
-    "", "missions,\ndone", "missed,\nof cells", "steps,\ntime [s]", "plans,\npaths",
-    "replan\np50, p99,\nmax [ms]", "waiting\n[%],\nheld up",
-)  # fmt: skip
 
 REMARKS = (
     "to known: to the near-optimal walk of a robot that knew the building from the start; the "
@@ -39,27 +31,19 @@ REMARKS = (
     "a map, without planning. held up: how often the robot stood before an obstacle that its "
     "path led into.",
     "Every trail was judged, by code that shares nothing with mission and planner: each step "
-    "legal in the true building, every reachable cell visited. In cases cells are those that "
-    "can be reached in the end, and covered where the tool was in truth.",
+    "legal in the true building, every reachable cell visited.",
 )
 
 
-def report(
-    misread: float, *, with_turns: bool, about: dict[str, object], runs: Sequence[MissionRun]
-) -> Report:
+def report(*, with_turns: bool, about: dict[str, object], runs: Sequence[MissionRun]) -> Report:
     """Sum up any number of missions, even none; ``about`` says under what conditions.
 
     Figures and goals are of the planner that comes first; the last table has all of them.
     """
-    noisy, all_runs = NoisySummary.of(runs), runs
-    runs = [run for run in runs if not run.noise]
+    all_runs = runs
     of_planner = _by_planner(runs)
     runs = next(iter(of_planner.values()), [])
-    of_kind = {kind: [run for run in runs if run.kind == kind] for kind in KINDS}
-    buildings = Summary(of_kind[BUILDING])
-    groups = list(_groups(of_kind[BUILDING], of_kind[MAZE]))
-    cases = _by_building(of_kind[CASE])
-    beside = [*_by_building(of_kind[MAZE]), *cases]
+    buildings, groups = Summary(runs), list(_groups(runs))
     further = [
         ResultTable(
             "latency [ms], below it time of processors",
@@ -71,32 +55,21 @@ def report(
             UNTIL_HEADER,
             tuple(_until_row(*one) for one in groups),
         ),
-        ResultTable(
-            "beside: something happens", CASE_HEADER, tuple(_case_row(case) for case in cases)
-        ),
     ]
-    further.append(ResultTable("under a mapper's noise", NOISY_HEADER, tuple(_noisy_rows(noisy))))
     if len(of_planner) > 1:
         rows = [_planner_row(name, group) for name, group in of_planner.items()]
-        further.append(ResultTable("planners, in buildings", PLANNER_HEADER, tuple(rows)))
+        further.append(ResultTable("planners", PLANNER_HEADER, tuple(rows)))
     return Report(
         title=f"{len(buildings.runs)} missions in unknown buildings",
         header=HEADER,
         rows=tuple(_row(*one) for one in groups),
         figures={
             **buildings.document(),
-            "noisy": noisy.document(),
             "conditions": about,
-            "beside": {
-                group[0].building: {"kind": group[0].kind, **Summary(group).document()}
-                for group in beside
-            },
-            "planners": {
-                name: Summary(_in_buildings(group)).document() for name, group in of_planner.items()
-            },
+            "planners": {name: Summary(group).document() for name, group in of_planner.items()},
             "runs": [run.document() for run in all_runs],
         },
-        goals=tuple(goals(buildings, misread, with_turns=with_turns, noisy=noisy)),
+        goals=tuple(goals(buildings, with_turns=with_turns)),
         remarks=(*REMARKS, *_complaints(all_runs), f"peak memory of this process {peak_mb()} MB"),
         further=tuple(table for table in further if table.rows),
     )
@@ -107,13 +80,9 @@ def _by_planner(runs: Sequence[MissionRun]) -> dict[str, list[MissionRun]]:
     return {name: [run for run in runs if run.planner == name] for name in names}
 
 
-def _in_buildings(runs: Sequence[MissionRun]) -> list[MissionRun]:
-    return [run for run in runs if run.kind == BUILDING]
-
-
 def _planner_row(name: str, runs: Sequence[MissionRun]) -> tuple[str, ...]:
-    summary = Summary(_in_buildings(runs))
-    name, missions, *figures, _ = _row(name, summary) if summary.runs else (name, "0", *"----", "")
+    summary = Summary(runs)
+    name, missions, *figures, _ = _row(name, summary)
     return name, missions, *figures, _lines(".1f", summary.replan_ms(50), summary.replan_ms(99))
 
 
@@ -122,17 +91,13 @@ def _by_building(runs: Sequence[MissionRun]) -> list[list[MissionRun]]:
     return [[run for run in runs if run.building == name] for name in names]
 
 
-def _groups(
-    buildings: Sequence[MissionRun], mazes: Sequence[MissionRun]
-) -> Iterator[tuple[str, Summary]]:
+def _groups(buildings: Sequence[MissionRun]) -> Iterator[tuple[str, Summary]]:
     if buildings:
         yield "all buildings", Summary(buildings)
     for group in _by_building(buildings):
         for range_m in dict.fromkeys(run.range_m for run in group):
             chosen = [run for run in group if run.range_m == range_m]
             yield f"{group[0].building}, {range_m:g} m", Summary(chosen)
-    if mazes:
-        yield "mazes, beside", Summary(mazes)
 
 
 def _row(name: str, summary: Summary) -> tuple[str, ...]:
@@ -164,50 +129,13 @@ def _until_row(name: str, summary: Summary) -> tuple[str, ...]:
     return name, *(_lines(".3f", *moment) for moment in until)
 
 
-def _case_row(runs: Sequence[MissionRun]) -> tuple[str, ...]:
-    summary = Summary(runs)
-    missing = "" if all(run.happened for run in runs) else "\nDID NOT HAPPEN"
-    return (
-        f"{runs[0].building}{missing}",
-        f"{len(runs)}\n{sum(run.done for run in runs)}",
-        f"{max(run.missed for run in runs)}\n{runs[0].cells}",
-        f"{max(run.steps for run in runs)}\n{max(run.time_s for run in runs):.0f}",
-        f"{max(run.plans for run in runs)}\n{max(run.paths for run in runs)}",
-        _lines(".1f", *(summary.replan_ms(percent) for percent in (50, 99, 100))),
-        f"{_percent(summary.waiting)}\n{max(run.held_up for run in runs)}",
-    )
-
-
-def _noisy_rows(noisy: NoisySummary) -> Iterator[tuple[str, ...]]:
-    if len({quiet.building for quiet, _ in noisy.pairs}) > 1:
-        yield _noisy_row("all buildings", noisy)
-    for name in dict.fromkeys(quiet.building for quiet, _ in noisy.pairs):
-        pairs = [pair for pair in noisy.pairs if pair[0].building == name]
-        yield _noisy_row(name, NoisySummary(pairs))
-
-
-def _noisy_row(name: str, noisy: NoisySummary) -> tuple[str, ...]:
-    runs = [run for _, run in noisy.pairs]
-    of, summary = noisy.document(), Summary(runs)
-    return (
-        name,
-        f"{len(runs)}\n{of['done']}",
-        _lines(".3f", of["time_ratio_median"], of["time_ratio_worst"]),
-        _lines(".4f", summary.ratio_median(steps_ratio), summary.ratio_worst(steps_ratio)),
-        f"{100.0 * of['missed_share_median']:.1f}",
-        f"{_percent(summary.waiting)}\n{sum(run.held_up for run in runs)}",
-    )
-
-
 def _complaints(runs: Sequence[MissionRun]) -> Iterator[str]:
     """Yield what is wrong with missions, one by one."""
     for run in runs:
-        if run.noise and run.done:
-            continue
         about = f"{run.building}, start {run.start}, {run.range_m:g} m, seed {run.seed}"
         if not run.done:
             yield f"{about}: ended with {run.ended}; {run.missed} cells missed"
-        elif run.missed and run.kind != CASE:
+        elif run.missed:
             yield f"{about}: said to be done, {run.missed} cells missed"
         if run.problems:
             yield f"{about}: {'; '.join(run.problems[:3])}"

@@ -16,12 +16,10 @@ from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.harness import judged as judged_plan
 from tests.benchmarks.online.buildings import Building, BuildingChoice, of_grid
-from tests.benchmarks.online.cases import CASES, Act
 from tests.benchmarks.online.contenders import CONTENDERS, DAEMON
 from tests.benchmarks.online.judge import MissionRun, Reference, judged
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission, near_optimal
 from tests.benchmarks.online.robot import Pace
-from tests.benchmarks.online.sight import Senses
 
 # Full plans that are timed for each start.
 FULL_PLANS = 3
@@ -32,45 +30,31 @@ class OnlinePlan:
     """What to measure: every combination.
 
     Attributes:
-        choice: buildings and mazes.
-        cases: names of CASES; each once, with the first range.
+        choice: of buildings.
         starts: how many in each building.
         ranges_m: reaches of the scanner [m].
-        seeds: how many, from 0 on: of planner and scanner.
-        misread: share of the cells that are misread from afar; not in cases.
+        seeds: how many, from 0 on, of the planner.
         pace: of the robot.
         with_turns: whether its walks are to take little time, or few steps alone.
         proposals: budget of a plan.
-        planning_takes_time: as in ``Conditions``.
         planners: names of CONTENDERS.
-        noise: of a mapper, under which each mission in a building is made a second time; 0: none.
     """
 
     choice: BuildingChoice
-    cases: tuple[str, ...]
     starts: int
     ranges_m: tuple[float, ...]
     seeds: int
-    misread: float
     pace: Pace
     with_turns: bool
     proposals: int
-    planning_takes_time: bool
     planners: tuple[str, ...] = (DAEMON,)
-    noise: float = 0.0
-
-    @property
-    def noises(self) -> tuple[float, ...]:
-        """Noises of the mappers of each mission."""
-        return (0.0, self.noise) if self.noise else (0.0,)
 
 
 def count(plan: OnlinePlan) -> int:
     """Return how many missions ``measure`` will yield."""
     choice = plan.choice
-    buildings = len(choice.grids) + choice.generated + choice.mazes
-    missions = buildings * plan.starts * len(plan.ranges_m) * len(plan.noises) + len(plan.cases)
-    return plan.seeds * len(plan.planners) * missions
+    buildings = len(choice.grids) + choice.generated
+    return plan.seeds * len(plan.planners) * buildings * plan.starts * len(plan.ranges_m)
 
 
 def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
@@ -99,14 +83,9 @@ def measure(plan: OnlinePlan, say: Say) -> Generator[MissionRun, None, None]:
             if key not in references:
                 say(f"{started.name}: reference")
                 references[key] = _reference(plan, started)
-            for range_m, noise in itertools.product(plan.ranges_m, plan.noises):
-                under = f", noise {noise:g}" if noise else ""
-                say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m{under}")
-                yield _run(one, started, range_m, seed, references[key], noise=noise)
-        for name in plan.cases:
-            say(f"{planner}, seed {seed}: {name}")
-            case = CASES[name]
-            yield _run(one, case.building(), plan.ranges_m[0], seed, None, case.acts())
+            for range_m in plan.ranges_m:
+                say(f"{planner}, seed {seed}: {started.name}, start {number}, {range_m:g} m")
+                yield _run(one, started, range_m, seed, references[key])
 
 
 def _reference(plan: OnlinePlan, building: Building) -> Reference:
@@ -128,32 +107,20 @@ def _run(
     range_m: float,
     seed: int,
     reference: Reference | None,
-    act: Act = lambda _: True,
-    *,
-    noise: float = 0.0,
 ) -> MissionRun:
-    happened = False
-
-    def acting(mission: OnlineMission) -> None:
-        nonlocal happened
-        happened = act(mission) or happened
-
     (planner,) = plan.planners
-    misread = plan.misread if reference is not None else 0.0
     conditions = Conditions(
-        senses=Senses(range_m, misread, seed, noise),
+        range_m=range_m,
         pace=plan.pace,
         cost=plan.pace.cost(building.footprint.cell_m, with_turns=plan.with_turns),
         seat=CountedPlanning(seed, plan.proposals, planner),
-        planning_takes_time=plan.planning_takes_time,
         plans_on_trail=CONTENDERS[planner].on_trail,
     )
     mission = OnlineMission(building, conditions)
-    mission.run(acting)
+    mission.run()
     verdict, watch = judged(mission), mission.watch
     return MissionRun(
         building=building.name,
-        kind=building.kind,
         cells=verdict.cells,
         start=building.start,
         range_m=range_m,
@@ -162,7 +129,6 @@ def _run(
         done=mission.done,
         missed=verdict.missed,
         problems=(*verdict.problems, *dict.fromkeys(watch.faults)),
-        happened=happened,
         steps=verdict.steps,
         revisits=verdict.revisits,
         quarters=verdict.quarters,
@@ -179,5 +145,4 @@ def _run(
         kept=tuple(watch.kept),
         updates=tuple(watch.updates),
         planner=planner,
-        noise=noise,
     )

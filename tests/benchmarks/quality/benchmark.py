@@ -16,12 +16,12 @@ from fasaco_edge.bench.benchmark import (
     Say,
     add_grid_options,
     grid_names,
-    peak_mb,
     positive,
-    seconds,
     seconds_above_zero,
 )
 from fasaco_edge.drawing.spread import Spread
+from fasaco_edge.host.processes import peak_mb
+from tests.benchmarks.harness import SECONDS
 from tests.benchmarks.quality.figures import VARIANTS, GridFigures, by_grid, goals
 from tests.benchmarks.quality.runs import QualityPlan, QualityRun, Setting, measure
 
@@ -59,7 +59,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--turn-s",
-        type=seconds,
+        type=SECONDS,
         default=1.5,
         metavar="S",
         help="a quarter-turn [s], where a step takes 1 s and a half turn two quarter-turns "

@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seed
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
 from fasaco_edge.drawing.rooms import draw_rooms
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
-from tests.benchmarks.rooms.homes import RESOLUTION_M, home, seen
+from tests.benchmarks.harness import add_floors
+from tests.benchmarks.rooms.homes import KINDS, RESOLUTION_M, home, seen
 from tests.benchmarks.rooms.judge import Score, judge
 
-KINDS, SHARES = ("home", "office"), (1.0, 0.8, 0.5, 0.2)
+SHARES = (1.0, 0.8, 0.5, 0.2)
 GOAL_RECALL, GOAL_PRECISION, GOAL_MATTHEWS, GOAL_MS = 0.95, 0.95, 0.9, 200.0
 HEADER = ("floor", "seen", "floors", "recall", "precision", "matthews", "true", "found", "ms/Mpx")
 
@@ -63,10 +64,7 @@ def measure(kinds: Sequence[str], seeds: Sequence[int], pictures: Path | None) -
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--floors", type=positive, default=10, help="of each kind (default: %(default)s)"
-    )
-    parser.add_argument("--seed", type=seed, default=0, help="the first (default: %(default)s)")
+    add_floors(parser, 10)
     parser.add_argument(
         "--pictures", type=Path, metavar="DIR", help="draw each map with its rooms there"
     )

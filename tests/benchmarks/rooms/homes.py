@@ -20,6 +20,7 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, reveal_disc
 
+KINDS = ("home", "office")
 RESOLUTION_M = 0.05
 # Reach of the scanner, and how far from it the robot sees all around itself [m].
 REACH_M, HULL_M = 8.0, 0.25
@@ -56,7 +57,7 @@ class _Plan:
 
 
 def home(kind: str, seed: int) -> Home:
-    """Return a floor of a kind, ``"home"`` or ``"office"``."""
+    """Return a floor of one of ``KINDS``."""
     rng = Generator(PCG64((seed, len(kind))))
     plan = _Plan()
     (_lay_home if kind == "home" else _lay_office)(plan, rng)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import PCG64
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seed
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
@@ -24,9 +24,9 @@ from fasaco_edge.mission.map.loop_closure import Motion
 from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_edits import move
 from fasaco_edge.mission.map.room_watch import update
-from tests.benchmarks.rooms.homes import RESOLUTION_M, Home, growing, home
+from tests.benchmarks.harness import add_floors
+from tests.benchmarks.rooms.homes import KINDS, RESOLUTION_M, Home, growing, home
 
-KINDS = ("home", "office")
 # Maps from each place; the share of pixels beside walls that are the opposite on a map; how far a
 # map lies aside [m]; of the maps, those before which a loop closes, and its motion [m, degrees].
 MAPS_EACH, FLICKER, ASIDE_M, CLOSES, CLOSURE_M, CLOSURE_DEG = 3, 0.1, 0.03, 0.05, 0.3, 2.0
@@ -137,10 +137,7 @@ def _lost(book: RoomBook, floor: Home) -> int:
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--floors", type=positive, default=10, help="of each kind (default: %(default)s)"
-    )
-    parser.add_argument("--seed", type=seed, default=0, help="the first (default: %(default)s)")
+    add_floors(parser, 10)
 
 
 def _report(args: argparse.Namespace, samples: Sequence[Kept]) -> Report:

@@ -15,16 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive, seed
+from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.mission.config import ByRoom, MissionPolicy
+from tests.benchmarks.harness import add_floors
 from tests.benchmarks.online.buildings import Building
 from tests.benchmarks.online.mission import Conditions, CountedPlanning, OnlineMission
 from tests.benchmarks.online.robot import Pace
-from tests.benchmarks.online.sight import Senses
-from tests.benchmarks.rooms.homes import Home, home
+from tests.benchmarks.rooms.homes import KINDS, Home, home
 
-KINDS = ("home", "office")
 POLICIES: tuple[ByRoom, ...] = ("never", "auto")
 FOOTPRINT, PACE, RANGE_M = Footprint(0.3, 0.18), Pace(0.25, 1.5), 3.0
 PROPOSALS, SPARE_SHARE = 200_000, 0.05
@@ -73,7 +72,7 @@ def building_of(floor: Home) -> Building:
 def drive(floor: Home, start: int, policy: ByRoom, kind: str, number: int) -> Drive:
     """Run a mission and judge it by the true rooms."""
     conditions = Conditions(
-        senses=Senses(RANGE_M, 0.0, start, 0.0),
+        range_m=RANGE_M,
         pace=PACE,
         cost=PACE.cost(FOOTPRINT.cell_m, with_turns=True),
         seat=CountedPlanning(start, PROPOSALS),
@@ -148,13 +147,10 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Drive, None, None]
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--floors", type=positive, default=4, help="of each kind (default: %(default)s)"
-    )
+    add_floors(parser, 4)
     parser.add_argument(
         "--starts", type=positive, default=2, help="on each floor (default: %(default)s)"
     )
-    parser.add_argument("--seed", type=seed, default=0, help="the first (default: %(default)s)")
 
 
 def _report(args: argparse.Namespace, samples: Sequence[Drive]) -> Report:

@@ -18,9 +18,9 @@ from fasaco_edge.bench.benchmark import (
     add_grid_options,
     grid_names,
     positive,
-    seconds,
     seconds_above_zero,
 )
+from tests.benchmarks.harness import SECONDS
 from tests.benchmarks.turns.runs import TurnsPlan, TurnsRun, measure
 
 DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement", "warehouse")
@@ -57,7 +57,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--prices",
         nargs="+",
-        type=seconds,
+        type=SECONDS,
         default=[0.0, 1.25, 5.0, 20.0, 50.0],
         metavar="STEPS",
         help="of a quarter-turn on maps, in steps (default: 0 1.25 5 20 50)",

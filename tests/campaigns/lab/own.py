@@ -16,10 +16,10 @@ from fasaco_edge.follow.estimate import STAND, Command
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, ranges_of
-from fasaco_edge.simulation.noisy_mapper import MapperNoise
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from tests.campaigns.lab.building import Building
+from tests.campaigns.lab.noisy_mapper import MapperNoise, NoisyMapper, NoisyWorld
 from tests.campaigns.lab.settings import BEAMS, MOST_RANGE_M, TICK_S, LabSettings, stamp_ns
 
 FRAME = "map"
@@ -66,9 +66,11 @@ class OwnBase:
             turn_radius_m=settings.turn_radius_m,
         )
         noise = NOISES[settings.own]
-        noise = replace(noise, seed=settings.seed) if noise else None
-        truth = OccupancyGrid(building.geometry, cells, FRAME)
-        self.world = World(truth, building.start, config, noise)
+        truth, start = OccupancyGrid(building.geometry, cells, FRAME), building.start
+        if noise is None:
+            self.world = World(truth, start, config)
+        else:
+            self.world = NoisyWorld(truth, start, config, replace(noise, seed=settings.seed))
         self._truth = truth
         self._noise_m, self._rng = settings.noise_m, np.random.default_rng(settings.seed)
         self.wheels, self.touches = STAND, False
@@ -120,7 +122,8 @@ class OwnMapper:
     @property
     def loops(self) -> int:
         """How many loops were closed."""
-        return self._base.world.mapper.loops
+        mapper = self._base.world.mapper
+        return mapper.loops if isinstance(mapper, NoisyMapper) else 0
 
     def corrected(self, _odometry: Pose2D) -> Pose2D:
         """Return the newest pose that the mapper has published."""

@@ -8,6 +8,7 @@ The poses of scans are not matched: they are the true ones with an error.
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -15,13 +16,14 @@ import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, Window
+from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.grid.rotation import composed, inverse
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.kernels.lattice.raycast import Scanner, count_rays, ranges_of
 from fasaco_edge.simulation.mapper import Mapper
 from fasaco_edge.simulation.robot import SimulationConfig
+from fasaco_edge.simulation.world import Emission, World
 
 # Rays of a scan, as of an LDS-01.
 RAYS = 360
@@ -224,6 +226,25 @@ class NoisyMapper(Mapper):
             changed = Window.around(changed, taken_out, self._count(scan, 1))
         self._frame = composed(better, inverse(newest.pose))
         return changed
+
+
+class NoisyWorld(World):
+    """A robot in a building with such a mapper; its poses are published late."""
+
+    def __init__(
+        self, truth: OccupancyGrid, start: Pose2D, config: SimulationConfig, noise: MapperNoise
+    ) -> None:
+        super().__init__(truth, start, config, NoisyMapper(truth, config, noise))
+        self._late_ns = round(noise.late_s / config.tick_s) * config.tick_ns
+        self._poses: deque[StampedPose] = deque()
+
+    def tick(self) -> Emission:
+        """Let one time step pass."""
+        emission = super().tick()
+        if emission.pose is not None:
+            self._poses.append(emission.pose)
+        is_ripe = self._poses and self._poses[0].stamp_ns <= self.stamp_ns - self._late_ns
+        return replace(emission, pose=self._poses.popleft() if is_ripe else None)
 
 
 def _beside(geometry: GridGeometry, shift_m: NDArray[np.float64]) -> GridGeometry:

@@ -7,9 +7,8 @@ import pytest
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.simulation.mapper import Mapper
-from fasaco_edge.simulation.noisy_mapper import MapperNoise, NoisyMapper
 from fasaco_edge.simulation.robot import SimulationConfig
-from fasaco_edge.simulation.world import World
+from tests.campaigns.lab.noisy_mapper import MapperNoise, NoisyMapper, NoisyWorld
 from tests.simulation.rooms import RESOLUTION, building
 
 CONFIG = SimulationConfig(range_m=6.0)
@@ -157,7 +156,7 @@ def test_a_match_is_off_by_a_little_and_a_wrong_one_by_much_once():
 def test_late_poses_are_those_of_before_at_their_rate(pose_hz):
     config = replace(CONFIG, pose_hz=pose_hz)
     worlds = [
-        World(building(3, 3), Pose2D(0.7, 0.7), config, replace(NONE, late_s=late_s))
+        NoisyWorld(building(3, 3), Pose2D(0.7, 0.7), config, replace(NONE, late_s=late_s))
         for late_s in (0.0, 0.3)
     ]
     came = [{}, {}]
@@ -174,7 +173,7 @@ def test_late_poses_are_those_of_before_at_their_rate(pose_hz):
 
 def test_the_robot_follows_its_own_map_to_the_end_of_the_path():
     noise = MapperNoise(seed=5, specks=0.0)
-    world = World(building(4, 3), Pose2D(0.7, 0.7), CONFIG, noise)
+    world = NoisyWorld(building(4, 3), Pose2D(0.7, 0.7), CONFIG, noise)
     world.tick()
     world.follow(np.array([[0.7, 0.7], [3.2, 0.7], [3.2, 2.2], [0.7, 2.2]]))
     for _ in range(4000):
