@@ -15,7 +15,6 @@ from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from fasaco_edge.cli.console.parser import Parser
 from tests.benchmarks.codec import CODEC
-from tests.benchmarks.fleet import FLEET
 from tests.benchmarks.fleets.benchmark import FLEET_ONLINE
 from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
@@ -33,7 +32,7 @@ from tests.benchmarks.turns.benchmark import TURNS
 from tests.benchmarks.twins import TWINS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, SCALE, CODEC,
+    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET_ONLINE, ONLINE, SCALE, CODEC,
     INGEST, ROOMS, ROOM_IDS, BY_ROOM, TWINS,
 )  # fmt: skip
 
