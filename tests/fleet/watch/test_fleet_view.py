@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.client.events import KEPT
-from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS, REPLACED_NS
+from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS
 from fasaco_edge.fleet.observer.survey import MOST_STEPS
 from fasaco_edge.fleet.watch import view as fleet_view
 from fasaco_edge.fleet.watch.view import LONGEST, MOST_FAULTS, MOST_FLEETS, FleetView
@@ -28,7 +28,7 @@ from tests.fleet.told import CELL_M, member, tiles
 from tests.fleet.watch.fleets import PARTS, say, tell, two_in_a_hall
 from tests.watch.grids import NOW, status
 
-GONE_S, REPLACED_S = 1e-9 * GONE_NS + 0.1, 1e-9 * REPLACED_NS + 0.1
+GONE_S = 1e-9 * GONE_NS + 0.1
 HALL = 20 * 30
 
 
@@ -172,14 +172,6 @@ def test_there_is_room_for_as_many_robots_as_a_fleet_has():
     view.tick(NOW)
     assert [robot.revision for robot in view.robots(NOW)] == [7] * MOST_MEMBERS
     assert f"{MOST_MEMBERS} robots of a fleet" in texts(view)[0]
-    # One that is long gone gives its place to another, with all that was known of it.
-    for number in range(1, MOST_MEMBERS):
-        say(view, f"r{number:02}", NOW + REPLACED_S)
-    say(view, "late", NOW + REPLACED_S)
-    names = view.names()
-    assert "late" in names
-    assert "r00" not in names
-    assert [robot.name for robot in view.robots(NOW) if robot.revision is None] == ["late"]
 
 
 def test_a_robot_that_jumps_on_and_off_does_not_fill_the_log():
