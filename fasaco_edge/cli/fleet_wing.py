@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fasaco_edge.fleet.cli.mission import command_fleet
-    from fasaco_edge.fleet.cli.plan import plan_fleet
     from fasaco_edge.fleet.cli.review import print_fleet
     from fasaco_edge.fleet.cli.watch import fleet_on_bus
     from fasaco_edge.fleet.mission.travel import apart
@@ -24,7 +23,6 @@ __all__ = [
     "draw_fleet_mission",
     "file_name",
     "fleet_on_bus",
-    "plan_fleet",
     "print_fleet",
     "run_fleet_recorder",
     "swept_by_others",
@@ -36,7 +34,6 @@ _PLACES = {
     "draw_fleet_mission": "review.drawing",
     "file_name": "recording.recorder",
     "fleet_on_bus": "cli.watch",
-    "plan_fleet": "cli.plan",
     "print_fleet": "cli.review",
     "run_fleet_recorder": "recording.recorder",
     "swept_by_others": "review.others",

@@ -44,10 +44,6 @@ def run(args: argparse.Namespace) -> int:
         [*map_sources(find_map(args.map)), *request.sources],
     )
     _check_together(args, request)
-    if args.robots or args.robots_xy:
-        from fasaco_edge.cli.fleet_wing import plan_fleet
-
-        return plan_fleet(args, request)
     stages = stages_of_plan(search.planner, has_curves=robot.turn_radius_m > 0.0)
     compile_kernels((*stages, ROOMS) if args.rooms else stages)
     # Imported only now, as it imports the compiler.
@@ -69,16 +65,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _check_together(args: argparse.Namespace, request: PlanRequest) -> None:
     """Refuse options that do not go together."""
-    has_robots, search = args.robots or args.robots_xy, request.search
-    if args.rooms and (args.passes is not None or has_robots):
-        raise BadConfiguration("--rooms is for one pass of one robot, not with several")
+    search = request.search
+    if args.rooms and args.passes is not None:
+        raise BadConfiguration("--rooms is for one pass, not for several")
     if args.rooms and Path(args.map).suffix == ".npy":
         raise BadConfiguration(
             "--rooms: a coverage grid shows no walls", hint="give a map_server .yaml or an image"
         )
     if args.passes is not None:
-        if has_robots:
-            raise BadConfiguration("--passes is for one robot, not with --robots and --robots-xy")
         check_passes(args.passes, "--passes")
         if not search.has_local_search:
             raise BadConfiguration(
@@ -87,7 +81,7 @@ def _check_together(args: argparse.Namespace, request: PlanRequest) -> None:
         if args.pheromone_png:
             raise BadConfiguration("--pheromone-png: several passes leave no single trail")
     leaves_none = request.own or search.planner not in WITH_PHEROMONE
-    if args.pheromone_png and leaves_none and not has_robots:
+    if args.pheromone_png and leaves_none:
         raise BadConfiguration(
             "--pheromone-png: the planner leaves no pheromone",
             hint=f"choose --planner {', '.join(WITH_PHEROMONE[:-1])} or {WITH_PHEROMONE[-1]}",

@@ -7,7 +7,6 @@ mission/shared       cells that the others have swept
 mission/division     who sweeps what, while a mission goes on
 mission/message      what this robot sends to the others
 
-planning             one walk for each of several robots on a known map
 daemon/exchange      the messages of a fleet, received and sent
 observer             a fleet as recorders and watchers see it
 recording            one recording of all robots

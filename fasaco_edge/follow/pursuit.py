@@ -24,8 +24,6 @@ LOOKAHEAD_S, LOOKAHEAD_M = 0.8, 0.2
 ARRIVED_M = 0.005
 # Heading error below which a run begins, and above which the robot turns on the spot [rad].
 ALIGNED_RAD, MISALIGNED_RAD = 0.03, 0.2
-# Near a half turn, the robot keeps its direction of turning [rad].
-BACK_RAD = 2.8
 # A cycle counts as at most this many periods long; decay of the expected delay from one cycle to
 # the next.
 MOST_PERIODS = 4.0
@@ -147,8 +145,7 @@ class Pursuit:
         limits = self._limits
         left = max(abs(error) - abs(self.last.turn_rate) * self._late, 0.0)
         rate = min(stopping_rate(left, limits.turn_acceleration, self._period), limits.turn_rate)
-        side = self.last.turn_rate if abs(error) > BACK_RAD and self.last.turn_rate else error
-        return math.copysign(rate, side)
+        return math.copysign(rate, error)
 
     def _sped(self, goal: float) -> float:
         """Return the next speed on the way to a wanted speed [m/s]."""

@@ -17,14 +17,12 @@ STAGES = tuple(dict.fromkeys((*_FOR_PLANS, CHANGES, AREAS, ROOMS, SHARES, CURVES
 APART = (LINE, CHANGES, AREAS, ROOMS, SHARES, CURVES)
 
 
-def stages_of_plan(
-    planner: str, *, is_shared: bool = False, has_curves: bool = False
-) -> tuple[str, ...]:
-    """Return the stages that a plan needs, by a planner's name, or for the robots of a fleet.
+def stages_of_plan(planner: str, *, has_curves: bool = False) -> tuple[str, ...]:
+    """Return the stages that a plan needs, by a planner's name.
 
     ``has_curves``: for a robot with a turning radius.
     """
-    more = (SHARES,) if is_shared else (planner,) if planner in PLANNER_NAMES else ()
+    more = (planner,) if planner in PLANNER_NAMES else ()
     return tuple(dict.fromkeys((*_FOR_PLANS, *((CURVES,) if has_curves else ()), *more)))
 
 

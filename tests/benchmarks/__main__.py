@@ -14,7 +14,6 @@ from fasaco_edge.bench.benchmark import Benchmark
 from fasaco_edge.cli import run_command
 from fasaco_edge.cli.bench import EPILOG, add_benchmarks
 from fasaco_edge.cli.console.parser import Parser
-from tests.benchmarks.fleet import FLEET
 from tests.benchmarks.fleets.benchmark import FLEET_ONLINE
 from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
@@ -29,8 +28,8 @@ from tests.benchmarks.table1.benchmark import TABLE1
 from tests.benchmarks.turns.benchmark import TURNS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET, FLEET_ONLINE, ONLINE, ROOMS,
-    ROOM_IDS, BY_ROOM,
+    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET_ONLINE, ONLINE, ROOMS, ROOM_IDS,
+    BY_ROOM,
 )  # fmt: skip
 
 

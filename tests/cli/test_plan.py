@@ -422,17 +422,15 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         *((f"--overlap={m}", "--overlap: expected float") for m in ("0.9", "-0.1", "nan")),
         *((f"--turn-radius={m}", "--turn-radius: expected float") for m in ("21", "-1", "nan")),
         ("--line cells --turn-radius 0.3", "only has turns on the spot"),
-        ("--robots 0,0 5,5 --turn-radius 0.3", "only has turns on the spot"),
         ("--swept 1.5", "swept must be a share in (0, 1], got 1.5"),
         *((f"--line cells --align {to}", "line over the floor") for to in ("walls", "30")),
         ("--line cells --swept 0.9", "has no share to choose"),
-        *((f"--rooms {to}", "for one pass of one") for to in ("--passes 2", "--robots 0,0 3,3")),
+        ("--rooms --passes 2", "for one pass"),
         ("--planner zigzag --line cells --pheromone-png t.png", "leaves no pheromone"),
-        ("--robots 0,0 5,5 --pheromone-png t.png", "the colony of one robot"),
     ],
 )
 def test_what_cannot_be_is_refused(capsys, words, said):
-    line = () if "--line" in words or "--robots" in words else ("--line", "quick")
+    line = () if "--line" in words else ("--line", "quick")
     assert main(["plan", "office", *line, *words.split()]) == Exit.CONFIG
     assert said in capsys.readouterr().err
 
@@ -507,7 +505,6 @@ def test_figures_are_printed_for_people_too(grid_file, capsys):
         ((), "map line swept gap walk search"),
         (("--turn-radius", "0.4"), "map line swept gap curve walk search"),
         (("--passes", "edge,auto"), "map line swept pass pass"),
-        (("--robots", "1,1", "2,2"), "map time longest passed not robot robot"),
     ],
 )
 def test_what_matters_fits_on_one_screen(words, names, tmp_path):
@@ -520,9 +517,8 @@ def test_what_matters_fits_on_one_screen(words, names, tmp_path):
     assert [row.split()[0] for row in rows] == [*names.split(), "wrote", "more:"]
     assert f"wrote {png}" in lines
     assert "None" not in ended.out
-    if "--robots" not in words:
-        assert re.search(r"^swept +9\d\.\d % of 49.4 m2, ", ended.out, re.MULTILINE)
-        assert re.search(r"^line +.*, \d+ min \d\d s", ended.out, re.MULTILINE)
+    assert re.search(r"^swept +9\d\.\d % of 49.4 m2, ", ended.out, re.MULTILINE)
+    assert re.search(r"^line +.*, \d+ min \d\d s", ended.out, re.MULTILINE)
 
 
 def test_without_a_picture_it_is_said_how_to_have_one(grid_file):

@@ -53,7 +53,6 @@ def recording(tmp_path):
     [
         (PLAN, "steps, [0-9.]+% above the bound ", "map +.*"),
         (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "map +.*"),
-        ((*PLAN, "--robots", "1,1", "2,2"), "steps ━", "map +.*"),
         (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
             ("bench", "planners", "--maps", "office", "--seeds", "1", "--ants", "8"),
@@ -61,7 +60,7 @@ def recording(tmp_path):
             ".*",
         ),
     ],
-    ids=["plan", "ants", "fleet", "warmup", "planners"],
+    ids=["plan", "ants", "warmup", "planners"],
 )
 def test_progress_is_drawn_and_leaves_nothing_behind(words, shown, first_line):
     with Terminal(*words, columns=120) as shell:

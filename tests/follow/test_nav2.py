@@ -208,20 +208,13 @@ def test_a_goal_that_is_done_too_early_is_not_believed():
 @pytest.mark.parametrize(
     ("code", "said"), [*((code, f"{code} {name}") for code, name in ERRORS.items()), (0, NO_CODE)]
 )
-def test_errors_are_named_and_goals_retried_with_growing_pauses(code, said):
+def test_errors_of_goals_are_named(code, said):
     drive = Drive(*LONG)
     goal = drive.begun()
     drive.end(goal, ABORTED, code)
     assert drive.step(0.0) == []
     assert drive.state is State.GIVEN_UP
     assert drive.follower.detail == said
-    (goal,) = drive.step(0.0, after=RETRY_S)
-    drive.accept(goal)
-    assert drive.step(0.0) == [AskResult(goal.id)]
-    drive.end(goal, ABORTED, code)
-    assert drive.step(0.0, after=RETRY_S) == []
-    (goal,) = drive.step(0.0, after=RETRY_S)
-    assert isinstance(goal, SendGoal)
 
 
 @pytest.mark.parametrize("goes_on", ["elsewhere", "withdrawn", "moved"])

@@ -87,26 +87,6 @@ def test_a_path_that_crosses_itself_is_driven_without_standing(base, tmp_path):
     assert undisturbed(done) in (None, {"goals": 2, "preempted": 1, "canceled": 0})
 
 
-# As the daemon says it again: from somewhere before the robot on.
-SAME = (0.02, 0.0), (1.2, 0.0), (1.2, 1.0), (0.9, 1.0)
-OTHER = (0.0, 0.0), (0.9, 0.0), (0.9, 0.8)
-
-
-@pytest.mark.parametrize("path", [SAME, OTHER])
-def test_a_replan_replaces_the_goal_only_if_it_changes_what_lies_ahead(base, tmp_path, path):
-    with driving(base, tmp_path, None, speed=0.3) as (look_alike, log):
-        base.send_path((0.0, 0.0), (1.2, 0.0), (1.2, 1.0))
-        poses = listen(base, "pose")
-        # Only what the controller drives already can be replaced.
-        wait(lambda: bool(poses) and poses[-1].x > 0.05, log)
-        base.send_path(*path)
-        wait_log(log, "standing, the path is driven")
-    done = look_alike.end()
-    # The rest of the same path is a goal of its own.
-    assert done["counts"]["canceled"] or done["counts"]["goals"] == 2
-    assert math.dist((done["x"], done["y"]), path[-1]) < 0.15
-
-
 @pytest.mark.parametrize(
     ("stop", "why"),
     [

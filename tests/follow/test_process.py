@@ -87,17 +87,6 @@ def test_only_a_path_of_the_daemon_that_plans_is_driven(base, tmp_path):
         until(lambda: base.newest() in (None, Command()))
 
 
-def test_a_dry_run_says_what_it_would_send_and_sends_nothing(base, tmp_path):
-    base.plans()
-    base.send_path(*AHEAD)
-    log = tmp_path / "log"
-    with follower_process(base.endpoint, log, "--dry-run", out=subprocess.PIPE) as process:
-        lines = [process.stdout.readline().decode() for _ in range(4)]
-        process.stdout.close()
-    assert base.heard == []
-    assert any("m/s" in line and "driving" in line for line in lines), lines
-
-
 def test_it_waits_for_the_bus_and_says_so(tmp_path):
     late = DrivenBase()
     endpoint = late.endpoint

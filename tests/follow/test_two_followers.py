@@ -12,7 +12,6 @@ from fasaco_edge.follow.daemons import NO_RIGHT
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.wire import topics
 from tests.campaigns.fault_links import Link
-from tests.follow.nav2_missions import Robot, kind_of, nav2_follower
 from tests.follow.test_process import AHEAD, config_file
 from tests.support.driven_base import DrivenBase, follower_process
 from tests.support.waiting import until
@@ -131,24 +130,6 @@ def test_two_followers_never_drive_together_after_a_partition(base, tmp_path, fi
             link.close()
 
 
-def test_nav2_gets_goals_from_one_of_two(base, tmp_path):
-    base.says_poses = False
-    robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0), "speed": 0.4}
-    (tmp_path / "second").mkdir()
-    with (
-        Robot(**robot) as nav2,
-        nav2_follower(tmp_path, base.endpoint, kind_of(7)) as first,
-    ):
-        until(lambda: "driving" in first.read_text())
-        with nav2_follower(tmp_path / "second", base.endpoint, kind_of(7)) as second:
-            until(lambda: SECOND in second.read_text())
-            base.send_path((0.0, 0.0), (2.0, 0.0))
-            until(lambda: "the path is driven" in first.read_text())
-    done = nav2.end()
-    assert done["counts"]["goals"] <= 2
-    assert "driving" not in second.read_text()
-
-
 @pytest.mark.parametrize("is_granted", [True, False], ids=["the right", "no right"])
 def test_a_follower_drives_only_if_others_may_see_its_token(tmp_path, is_granted):
     grant = access.Grant("driver", ["x"], "fasaco/@v1/robot")
@@ -182,6 +163,7 @@ def test_a_dry_run_claims_nothing(base, tmp_path):
     ) as process:
         assert b"m/s" in process.stdout.readline()
         assert standing(base) == []
+        assert base.heard == []
         with follower_process(base.endpoint, tmp_path / "log"):
             base.wait_until_it_moves()
             assert b"driving" in b"".join(process.stdout.readline() for _ in range(3))

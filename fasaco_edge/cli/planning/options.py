@@ -35,7 +35,6 @@ your building and robot:
   fasaco-edge plan site.yaml --passes edge,auto,cross --png passes.png
   fasaco-edge plan lawn.yaml --cell 0.4 --turn-radius 0.5 --png curve.png
   fasaco-edge plan office --turn-s 2 --budget 0.1 --end 12,3
-  fasaco-edge plan office --robots 0,0 10,5 5,8 --end home --png fleet.png
 the paper's planners, and your own:
   fasaco-edge plan basement --planner fasaco --seed 7 --pheromone-png trail.png
   fasaco-edge plan grid.npy --start 8,8 --planner aco --end home --path-out path.csv
@@ -65,18 +64,6 @@ figures:
                    which the line sweeps, and how often it enters the room
 
 figures of several passes: sums, and for each pass its own
-
-figures of several robots:
-  makespan_steps   steps of the longest walk; makespan_s seconds of the costliest
-  lower_bound_makespan_steps
-                   steps that the longest walk cannot be below
-  gap              makespan_steps / lower_bound_makespan_steps - 1: steps alone, whatever
-                   turns take; null where that bound is 0
-  balance          mean steps of the walks / makespan_steps
-  swept_twice      cells that two or more robots pass, driving through included
-  unreachable_cells
-                   cells that none of the robots can come to
-  rounds           divisions tried, and further searches for the longest walk
 
 colony-search searches until its budget ends, the walk is proven optimal, or nothing is
 gained for long: a complete walk within milliseconds, then better ones by local search.
@@ -130,25 +117,6 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     )
     start.add_argument(
         "--start-xy", type=pair_of_floats, metavar="X,Y", help="point to start at [m]"
-    )
-    start.add_argument(
-        "--robots",
-        type=pair_of_ints,
-        nargs="+",
-        action="extend",
-        metavar="R,C",
-        help="start cells of several robots that share the floor: one walk each, the longest as "
-        "short as possible; the walks are not timed against each other: robots that drive them "
-        "have to avoid one another. By colony-search, through the centres of cells; "
-        "without --align, --overlap and --pheromone-png",
-    )
-    start.add_argument(
-        "--robots-xy",
-        type=pair_of_floats,
-        nargs="+",
-        action="extend",
-        metavar="X,Y",
-        help="start points instead of cells [m]",
     )
     group.add_argument(
         "--cell",
@@ -218,7 +186,7 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
         help="cells: through the centres of the cells, as the paper's planners do; quick, "
         "thorough: off the centres where walls require it, and optimised for the floor that it "
         "sweeps, a square metre being worth 60 or 180 s; needs a YAML map (default: thorough; "
-        "cells for .npy grids, several robots, and planners other than colony-search)",
+        "cells for .npy grids, and planners other than colony-search)",
     )
     group.add_argument(
         "--overlap",
@@ -286,7 +254,7 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         "--path-out",
         type=Path,
         metavar="FILE.csv",
-        help="write the walk: header row,col (several robots: robot,row,col)",
+        help="write the walk: header row,col",
     )
     group.add_argument(
         "--xy-out",
@@ -294,9 +262,8 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         metavar="FILE",
         help="write the line to be driven as points in the map frame [m]: as GeoJSON if it is "
         "called so (.geojson), else as CSV with the header x_m,y_m "
-        "(several robots: robot,x_m,y_m; with --turn-radius: x_m,y_m,yaw_rad, the robot's heading "
-        "[rad], which is opposite to its way where it drives backward); needs a YAML map, as a "
-        ".npy grid has no frame",
+        "(with --turn-radius: x_m,y_m,yaw_rad, the robot's heading [rad], which is opposite to its "
+        "way where it drives backward); needs a YAML map, as a .npy grid has no frame",
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="write a picture of the walk")
     group.add_argument(

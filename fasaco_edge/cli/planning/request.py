@@ -107,8 +107,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     if ":" in given.get("planner", ""):
         own, given["planner"] = load(given["planner"]), LIKE_OWN
     search = replace(_search(config), **given)
-    has_floor = not (args.robots or args.robots_xy) and Path(args.map).suffix != ".npy"
-    line = args.line or default_line(search, has_floor=has_floor)
+    line = args.line or default_line(search, has_floor=Path(args.map).suffix != ".npy")
     if args.line is None and config is not None and line != CELLS:
         line = config.planner.line
     if search.swept is not None and line == CELLS:
@@ -131,7 +130,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     if line == CELLS and changes.get("turn_radius_m", robot.turn_radius_m):
         raise BadConfiguration(
             "--turn-radius: a line through the centres of cells only has turns on the spot",
-            hint="ask for a line over the floor, quick or thorough; for one robot",
+            hint="ask for a line over the floor, quick or thorough",
         )
     named = args.config, Path(own.file) if own and own.file else None
     sources = tuple(file for file in named if file is not None)

@@ -1,1 +1,1 @@
-"""Commands of a fleet: plans for several robots, orders to all, a report of all."""
+"""Commands of a fleet: orders to all, a report of all."""

@@ -84,14 +84,12 @@ class FleetReceiver:
         bus.subscribe(self._keys.of_all(FLEET), post_due)
 
     def event(self, sample: Sample) -> MemberReceived | None:
-        """Return a robot's message as an event; None from another fleet or from this robot.
+        """Return another robot's message as an event; None from another fleet.
 
         Raises:
             MalformedMessage: it is malformed.
         """
         robot = self._keys.robot_of(sample.key)
-        if robot in ("", self._keys.robot):
-            return None
         try:
             member = decode_member(sample.payload, self._fleet)
         except FleetError as error:

@@ -132,7 +132,10 @@ class GivingWay(Waiting):
         self._neighbours = self._fleet.others.neighbours(now)
         # Near another robot all publish more often, even at rest.
         here = None if pose is None else (pose.pose.x, pose.pose.y)
-        self.is_near = here is not None and _is_near(here, self._neighbours)
+        self.is_near = here is not None and any(
+            math.dist((near.message.x, near.message.y), here) < NEAR_M
+            for near in self._neighbours.values()
+        )
         is_going = (order.order is not None or order.errand) and not order.paused
         if not (is_going and self._fleet.has_members and may_drive):
             self._end()
@@ -184,17 +187,16 @@ class GivingWay(Waiting):
             self._end()
         # The search for a refuge starts at the robot, which on a short cut is far from its path.
         area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
-        neighbours = self._neighbours
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
         self._note_place(here, now)
         if area is None or cell is None or not self.is_near:
             self._end()
             return None
-        if self._is_underway(here, neighbours, now):
+        if self._is_underway(here, now):
             return None
         self._refuge = None
-        if found := self._obstruction(here, neighbours, now):
-            return self._hold(found, neighbours, area, cell, here, now)
+        if found := self._obstruction(here, now):
+            return self._hold(found, area, cell, here, now)
         self._end()
         return None
 
@@ -209,9 +211,7 @@ class GivingWay(Waiting):
         if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
             self._stays_at, self._stays_since = here, now
 
-    def _is_underway(
-        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
-    ) -> bool:
+    def _is_underway(self, here: tuple[float, float], now: float) -> bool:
         """Return whether the robot drives to its refuge, and no robot has come in its way."""
         ahead = self._route.path.ahead
         is_there = self._refuge is None or self._is_in(self._refuge, here)
@@ -220,18 +220,18 @@ class GivingWay(Waiting):
             return False
         line = spaced(self.line())[: LOOK_POINTS + 1]
         return all(
-            apart_m >= self._apart_m.get(name, self._clear_m(neighbours[name])) - COMES_M
-            for name, apart_m in self._apart_of(line, neighbours).items()
+            apart_m >= self._apart_m.get(name, self._clear_m(self._neighbours[name])) - COMES_M
+            for name, apart_m in self._apart_of(line).items()
         )
 
-    def _apart_of(self, line: Points, neighbours: Mapping[str, Neighbour]) -> dict[str, float]:
+    def _apart_of(self, line: Points) -> dict[str, float]:
         """Return a line's distance from each other robot, at most the required clearance [m]."""
         return {
             name: min(
                 self._clear_m(near),
                 float(np.hypot(*(line - (near.message.x, near.message.y)).T).min()),
             )
-            for name, near in neighbours.items()
+            for name, near in self._neighbours.items()
         }
 
     def _clear_m(self, near: Neighbour) -> float:
@@ -252,44 +252,34 @@ class GivingWay(Waiting):
         ends = [area.lattice.cell_at(*point.tolist()) for point in (a, b)]
         return 1 <= len(area.shortest_path(ends[0], ends[1])) <= 2
 
-    def _obstruction(
-        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour], now: float
-    ) -> Obstruction | None:
+    def _obstruction(self, here: tuple[float, float], now: float) -> Obstruction | None:
         """Return what keeps the robot from going on; None for nothing."""
-        line, pace_s_m = self.line(), self._fleet.step_s / self._cell_m
+        line, pace_s_m, others = self.line(), self._fleet.step_s / self._cell_m, self._neighbours
         found = obstruction(
-            self._robot, self._radius_m, pace_s_m, spaced(line), neighbours, self.waits_for
+            self._robot, self._radius_m, pace_s_m, spaced(line), others, self.waits_for
         )
-        if found is None and self._hangs(now) and len(line) > 1:
-            # The robot should drive: its line passes nearer than its cells, or a sensor has stopped
-            # it.
-            return self._beside(here, neighbours)
-        return found
-
-    def _hangs(self, now: float) -> bool:
-        """Return whether the robot stands though it has long been free to drive."""
-        return now - self._free_since > PATIENCE_S
-
-    def _beside(
-        self, here: tuple[float, float], neighbours: Mapping[str, Neighbour]
-    ) -> Obstruction | None:
-        """Return the robot that this one stands beside; None for none."""
-        for name, near in sorted(neighbours.items()):
+        if found is not None or not self._hangs(now) or len(line) < 2:
+            return found
+        # The robot should drive: its line passes nearer than its cells, or a sensor has stopped it.
+        for name, near in sorted(others.items()):
             reach_m = self._radius_m + near.message.radius_m + BESIDE_M
             if math.dist(here, (near.message.x, near.message.y)) < reach_m:
                 return Obstruction(name, is_blocked=True)
         return None
 
+    def _hangs(self, now: float) -> bool:
+        """Return whether the robot stands though it has long been free to drive."""
+        return now - self._free_since > PATIENCE_S
+
     def _hold(
         self,
         found: Obstruction,
-        neighbours: Mapping[str, Neighbour],
         area: ReachableArea,
         cell: Cell,
         here: tuple[float, float],
         now: float,
     ) -> PathUpdate | None:
-        route = self._route
+        route, neighbours = self._route, self._neighbours
         if found.robot != self.waits_for:
             # A moment without an obstruction, or another obstructing robot, is no progress.
             self._since = self._stays_since
@@ -316,15 +306,9 @@ class GivingWay(Waiting):
                 self._refuge = to
                 beside = discs(self._radius_m, neighbours)
                 update = route.publish(way, self._reason, now, beside=beside)
-                self._apart_m = self._apart_of(spaced(self.line()), neighbours)
+                self._apart_m = self._apart_of(spaced(self.line()))
                 return update
             if self._fleet.others.is_avoided(found.robot):
                 self._end()
                 return None
         return route.publish(NO_CELLS, self._reason, now) if has_path else None
-
-
-def _is_near(here: tuple[float, float], neighbours: Mapping[str, Neighbour]) -> bool:
-    return any(
-        math.dist((near.message.x, near.message.y), here) < NEAR_M for near in neighbours.values()
-    )

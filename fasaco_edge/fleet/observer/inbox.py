@@ -145,15 +145,11 @@ class FleetSubscriptions:
 
     def __init__(self, bus: Bus, keys: Keys, topics: Sequence[Topic], post: Post) -> None:
         self._bus, self._keys, self._topics, self._post = bus, keys, topics, post
-        self._subscriptions: dict[str, list[Subscription]] = {}
+        # Names of the robots subscribed to.
+        self.robots: set[str] = set()
         # The robot whose turn it is, the end of its turn, its subscription until the map arrives.
         self._turn, self._turn_until_ns = "", 0
         self._map: Subscription | None = None
-
-    @property
-    def robots(self) -> set[str]:
-        """Names of the robots subscribed to."""
-        return set(self._subscriptions)
 
     def listen(self) -> None:
         """Subscribe to the fleet messages of all robots."""
@@ -165,13 +161,9 @@ class FleetSubscriptions:
 
     def subscribe(self, robot: str) -> None:
         """Subscribe to a robot that has joined."""
-        self._subscriptions[robot] = [self._listen(robot, topic) for topic in self._topics]
-
-    def leave(self, robot: str) -> None:
-        """Unsubscribe from a robot."""
-        for subscription in self._subscriptions.pop(robot, ()):
-            self._bus.unsubscribe(subscription)
-        self.end_map_turn(robot)
+        self.robots.add(robot)
+        for topic in self._topics:
+            self._listen(robot, topic)
 
     def ask_for_maps(self, robots: Sequence[str], now_ns: int) -> None:
         """Ask robots for their maps, one after another; call it often.

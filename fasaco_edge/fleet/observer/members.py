@@ -11,10 +11,9 @@ from fasaco_edge.fleet.observer.cells import Seat, TileSet
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
-# Largest number of observed robots, that of a fleet. Silence after which a robot is gone, and after
-# which its place is free for another [ns].
+# Largest number of observed robots, that of a fleet. Silence after which a robot is gone [ns].
 MOST_MEMBERS = MAX_FLEET_PARTS
-GONE_NS, REPLACED_NS = 5_000_000_000, 60_000_000_000
+GONE_NS = 5_000_000_000
 # Messages beyond this rate are counted, not read [ns].
 LEAST_SPACING_NS = 100_000_000
 JOINED, GONE, WAITING = "joined", "gone", "waiting"
@@ -96,8 +95,9 @@ class Members:
         """
         member = self._by_name.get(robot)
         if member is None:
-            member = Member(robot, self._number(robot, at_ns), Seat.of(said), said, at_ns)
-            self._by_name[robot] = member
+            if len(self) >= MOST_MEMBERS:
+                raise FleetError(f"{robot}: {MOST_MEMBERS} robots of a fleet are observed at most")
+            member = self._by_name[robot] = Member(robot, len(self), Seat.of(said), said, at_ns)
             member.receive(said, at_ns)
             return member, JOINED
         if at_ns - member.received_ns < LEAST_SPACING_NS:
@@ -105,22 +105,12 @@ class Members:
             return member, ""
         return member, member.receive(said, at_ns)
 
-    def _number(self, robot: str, at_ns: int) -> int:
-        """Return the number of a robot that joins: the next, or that of a robot long gone."""
-        if len(self) < MOST_MEMBERS:
-            return len(self)
-        longest = min(self, key=lambda member: member.received_ns)
-        if at_ns - longest.received_ns < REPLACED_NS:
-            raise FleetError(f"{robot}: {MOST_MEMBERS} robots of a fleet are observed at most")
-        del self._by_name[longest.name]
-        return longest.number
-
     def get(self, robot: str) -> Member | None:
         """Return a robot; None if it has not joined."""
         return self._by_name.get(robot)
 
     def __iter__(self) -> Iterator[Member]:
-        return iter(sorted(self._by_name.values(), key=lambda member: member.number))
+        return iter(self._by_name.values())
 
     def __len__(self) -> int:
         return len(self._by_name)

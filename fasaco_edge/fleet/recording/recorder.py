@@ -221,14 +221,12 @@ class FleetRecorder:
             if self._members.get(robot) is None:
                 self._inbox.forget(robot)
             return
-        known, before = {member.name for member in self._members}, self._members.get(robot)
+        before = self._members.get(robot)
         if before is None or before.is_moved_by(said):
             # A batch has one list of robots and frames for all its notes.
             self._write()
         member, news = self._members.receive(robot, said, arrival.wall_ns)
         if news == JOINED:
-            for gone in known - {one.name for one in self._members}:
-                self._leave(gone)
             self._join(member)
         elif news:
             self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
@@ -241,15 +239,6 @@ class FleetRecorder:
         self._subscriptions.subscribe(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
         self._scene.join(member)
-
-    def _leave(self, robot: str) -> None:
-        self._subscriptions.leave(robot)
-        self._inbox.forget(robot)
-        self._scene.leave(robot)
-        for kept in (self._poses, self._rates, self._unnoted):
-            kept.pop(robot, None)
-        for fault in [fault for fault in self._faults if fault[0] == robot]:
-            del self._faults[fault]
 
     def _note(self, now_ns: int) -> None:
         """Note and show what arrived since the last note."""

@@ -108,10 +108,6 @@ class FleetScene:
         self._writer.log_static(robot_entity(member.name, "state"), states)
         self._show()
 
-    def leave(self, robot: str) -> None:
-        """Stop drawing a robot: another robot has its number."""
-        self._drawn.pop(robot, None)
-
     def add_pose(self, member: Member, pose: Pose2D) -> None:
         """Move a robot, and add to its trail."""
         x, y = self._here(member, pose.x, pose.y)

@@ -1,4 +1,4 @@
-"""Pictures of a fleet: its plan, tracks and floor swept by robot, and floor swept again."""
+"""Pictures of a fleet: tracks, floor swept by robot, and floor swept again."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from PIL import Image
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.pictures import draw_line, draw_unswept, in_pieces
+from fasaco_edge.drawing.pictures import draw_unswept
 from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.errors import UnreadableRecording
@@ -28,42 +28,6 @@ from fasaco_edge.recording.read.robot_clock import clock
 TINT = 0.35
 # Width of a track.
 TRACK_PX = 1.6
-
-
-def draw_fleet(
-    lattice: CoverageLattice,
-    walks: Sequence[NDArray[np.int32]],
-    *,
-    grid: OccupancyGrid | None,
-    title: str,
-    lines: Sequence[str],
-) -> Image.Image:
-    """Return a picture, RGB, of the walks of several robots, with the map below them.
-
-    Args:
-        lattice: the planning grid.
-        walks: of each robot, int32 (n, 2), n >= 1: cells (row, col), its start first.
-        grid: the map the lattice was made from; None draws the lattice's own states.
-        title: heading.
-        lines: caption below it.
-    """
-    centres = [lattice.centres(walk) for walk in walks]
-    everywhere = bounds_of(grid, lattice, np.vstack(centres))
-    plot = Plot(View.over(everywhere, lattice.cell_m))
-    plot.ground(lattice if grid is None else grid)
-    plot.tint(lattice, _tints(lattice, walks))
-    for points in centres:
-        if len(points) > 1:
-            draw_line(plot, in_pieces(points, lattice.cell_m), lattice.cell_m)
-    for points in centres:
-        if (points[0] != points[-1]).any():
-            plot.end_mark(points[-1])
-        plot.start_mark(points[0])
-    longest = max(map(len, walks)) - 1
-    key = [KeyEntry("disc", palette.START, "start"), *_key(walks)]
-    return Sheet(title, lines, key, ("0", f"{longest:,} steps"), plot.view.scale).around(
-        plot.finished()
-    )
 
 
 def draw_fleet_mission(
@@ -116,19 +80,6 @@ def draw_fleet_mission(
     return Sheet(title, lines, key, None, plot.view.scale).around(plot.finished())
 
 
-def _tints(lattice: CoverageLattice, walks: Sequence[NDArray[np.int32]]) -> NDArray[np.uint8]:
-    """Return a tint for each cell, uint8 (rows, cols, 3)."""
-    window = lattice.window
-    colours = np.full((*lattice.states.shape, 3), palette.PAPER, np.uint8)
-    passed = np.zeros(lattice.states.shape, np.int32)
-    for number, walk in enumerate(walks):
-        rows, cols = np.unique(walk - (window.row0, window.col0), axis=0).T
-        colours[rows, cols] = robot_tint(number)
-        passed[rows, cols] += 1
-    colours[passed > 1] = palette.RULE
-    return colours
-
-
 def robot_tint(number: int) -> palette.Colour:
     """Return the tint of the floor that the robot with a number sweeps."""
     colour = np.array(_track_colour(number))
@@ -138,14 +89,6 @@ def robot_tint(number: int) -> palette.Colour:
 
 def _track_colour(number: int) -> palette.Colour:
     return palette.ROBOTS[number % len(palette.ROBOTS)][1]
-
-
-def _key(walks: Sequence[NDArray[np.int32]]) -> list[KeyEntry]:
-    key = [
-        KeyEntry("tile", robot_tint(number), f"robot {number + 1} ({len(walk) - 1:,} steps)")
-        for number, walk in enumerate(walks)
-    ]
-    return [*key, KeyEntry("tile", palette.RULE, "passed by two or more")]
 
 
 # Share from which a cell counts as swept again.

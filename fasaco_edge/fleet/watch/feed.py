@@ -35,13 +35,10 @@ class FleetFeed(Joining):
         return self._inbox.take(timeout_s)
 
     def attend(self, robots: Collection[str]) -> None:
-        """Subscribe to the robots of these names, and no others; call it often."""
+        """Subscribe to the robots of these names; call it often."""
         subscriptions = self._subscriptions
         if subscriptions is None:
             return
-        for robot in subscriptions.robots - set(robots):
-            subscriptions.leave(robot)
-            self._inbox.forget(robot)
         for robot in set(robots) - subscriptions.robots:
             subscriptions.subscribe(robot)
 

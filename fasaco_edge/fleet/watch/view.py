@@ -251,8 +251,7 @@ class FleetView:
             return
         _, news = self.members.receive(robot, said, at_ns)
         if news == JOINED:
-            # The place may have belonged to a robot long gone.
-            self._seen = {name: self._seen.get(name, _Seen()) for name in self.names()}
+            self._seen[robot] = _Seen()
         elif news:
             self._note_often(robot, "frame", news, 1e-9 * at_ns)
 

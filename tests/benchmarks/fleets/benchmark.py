@@ -46,7 +46,6 @@ class FleetFigures:
         cells: swept.
         twice: share of them that two or more robots swept.
         again: share of them that were swept after another robot, beyond the shortest way through.
-        unheard: share that a robot swept before it had heard of another's sweep.
         first_end: when the first robot is done, as a share of ``time_s``.
         longest_stand_s: the longest stand of a robot under way.
         touches, meetings: how often robots touched, and stopped before one another.
@@ -66,7 +65,6 @@ class FleetFigures:
     cells: int
     twice: float
     again: float
-    unheard: float
     first_end: float
     longest_stand_s: float
     touches: int
@@ -149,7 +147,6 @@ def _figures(name: str, run: FleetRun, alone: FleetRun) -> FleetFigures:
         cells=run.cells,
         twice=run.twice / run.cells,
         again=run.again / run.cells,
-        unheard=run.unheard / run.cells,
         first_end=min(ends) / max(ends),
         longest_stand_s=max(robot.world.longest_stand_s for robot in run.robots),
         touches=sum(robot.world.touches for robot in run.robots),

@@ -19,7 +19,7 @@ from fasaco_edge.fleet.mission.kind import FleetKind, giving_way_of
 from fasaco_edge.fleet.mission.message import Messages
 from fasaco_edge.fleet.review.report import find_again
 from fasaco_edge.fleet.review.tracks import RobotTrack
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor.turning import proportional_turning
@@ -141,7 +141,6 @@ class FleetRun:
         robots: by number.
         now: simulated time [s].
         hears: whether a message from one comes to another.
-        unheard: how many cells were swept before it was heard that another had swept them.
     """
 
     def __init__(self, fleet: Fleet) -> None:
@@ -159,7 +158,6 @@ class FleetRun:
             self.robots.append(FleetRobot(name, mission, world, ledger, messages))
         self.now = 0.0
         self.hears: Callable[[str, str], bool] = lambda speaker, listener: True
-        self.unheard = 0
         self._swept_by: dict[Cell, set[str]] = {}
         self._planner, self._limit = NearOptimal(), WorkLimit(SearchWork(proposals=PROPOSALS))
         self._repair_limit = WorkLimit(SearchWork(proposals=REPAIR_PROPOSALS))
@@ -251,11 +249,7 @@ class FleetRun:
             robot.passes.append((at_ms, *place))
         for cell in robot.ledger.record(pose):
             robot.swept_ms.setdefault(cell, at_ms)
-            by = self._swept_by.setdefault(cell, set())
-            if by and robot.name not in by:
-                swept = robot.mission.covered.shared.swept(Window(*cell, cell[0] + 1, cell[1] + 1))
-                self.unheard += not swept[0, 0]
-            by.add(robot.name)
+            self._swept_by.setdefault(cell, set()).add(robot.name)
 
     @property
     def cells(self) -> int:

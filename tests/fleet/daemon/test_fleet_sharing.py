@@ -1,4 +1,4 @@
-"""Daemons of one fleet on one router share a room; from one that is killed the other takes over."""
+"""Daemons of one fleet share a room, an hour apart by their clocks; one takes over from another."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from fasaco_edge.bus.session import BusSettings, open_bus
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, read_turns
 from fasaco_edge.replay.replay import read_run
+from tests.campaigns.shifted_clock import ShiftedClock, why_not
 from tests.fleet.robots import FleetRobot
 from tests.support.outsider import TIMEOUT_S
 from tests.support.processes import daemon_process, free_endpoint
@@ -22,6 +23,7 @@ from tests.support.rooms import coverable_cells, room
 FLOOR = room(9.0, 6.0)
 STARTS = {"r1": (0.75, 0.75), "r2": (8.25, 5.25)}
 STEP_S = 0.05
+HOUR_S = 3_600.0
 
 
 @pytest.fixture
@@ -32,6 +34,10 @@ def router():
 
 
 def test_a_daemon_takes_over_the_room_when_the_other_is_killed(router, tmp_path):
+    if why := why_not():
+        pytest.skip(why)
+    clock = ShiftedClock(tmp_path)
+    clock.shift(HOUR_S)
     with contextlib.ExitStack() as stack:
         daemons = {}
         for name in STARTS:
@@ -43,6 +49,7 @@ def test_a_daemon_takes_over_the_room_when_the_other_is_killed(router, tmp_path)
                     bus={"mode": "client", "listen": [], "connect": [router]},
                     robot={"name": name},
                     fleet={"name": "hall"},
+                    env=clock.environment if name == "r2" else None,
                 )
             )
         robots = {name: FleetRobot(router, name, FLOOR, at) for name, at in STARTS.items()}

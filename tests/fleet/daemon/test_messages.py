@@ -145,11 +145,6 @@ def test_robots_of_a_frame_of_their_own_need_the_same_one():
     assert event.frame == ""
 
 
-@pytest.mark.parametrize("robot", ["r1", "*", "r$*"])
-def test_nobody_speaks_for_this_robot_or_for_all(robot):
-    assert heard(said(), robot) is None
-
-
 class Listener:
     """Keeps what is published."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 
 import numpy as np
@@ -12,15 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.client.events import KEPT
-from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS, REPLACED_NS
+from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS
 from fasaco_edge.fleet.observer.survey import MOST_STEPS
 from fasaco_edge.fleet.watch import view as fleet_view
 from fasaco_edge.fleet.watch.view import LONGEST, MOST_FAULTS, MOST_FLEETS, FleetView
 from fasaco_edge.wire.documents.fleet import CellTile, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import (
-    MAX_COORDINATE_M,
-    MAX_FLEET_INDEX,
     MAX_FLEET_PARTS,
     MAX_FLEET_TILES,
 )
@@ -28,7 +25,7 @@ from tests.fleet.told import CELL_M, member, tiles
 from tests.fleet.watch.fleets import PARTS, say, tell, two_in_a_hall
 from tests.watch.grids import NOW, status
 
-GONE_S, REPLACED_S = 1e-9 * GONE_NS + 0.1, 1e-9 * REPLACED_NS + 0.1
+GONE_S = 1e-9 * GONE_NS + 0.1
 HALL = 20 * 30
 
 
@@ -115,13 +112,6 @@ def test_places_are_in_the_frame_of_the_fleet():
     assert "its frame has changed" in texts(view)[-1]
 
 
-def test_robots_are_in_order_of_their_names_whoever_comes_first():
-    view = FleetView("house")
-    for name in ("c", "a", "b"):
-        say(view, name)
-    assert [robot.name for robot in view.robots(NOW)] == ["a", "b", "c"]
-
-
 def test_robots_with_turned_maps_share_the_floor():
     view = FleetView("house")
     square = [(row, col) for row in range(10) for col in range(10)]
@@ -172,14 +162,6 @@ def test_there_is_room_for_as_many_robots_as_a_fleet_has():
     view.tick(NOW)
     assert [robot.revision for robot in view.robots(NOW)] == [7] * MOST_MEMBERS
     assert f"{MOST_MEMBERS} robots of a fleet" in texts(view)[0]
-    # One that is long gone gives its place to another, with all that was known of it.
-    for number in range(1, MOST_MEMBERS):
-        say(view, f"r{number:02}", NOW + REPLACED_S)
-    say(view, "late", NOW + REPLACED_S)
-    names = view.names()
-    assert "late" in names
-    assert "r00" not in names
-    assert [robot.name for robot in view.robots(NOW) if robot.revision is None] == ["late"]
 
 
 def test_a_robot_that_jumps_on_and_off_does_not_fill_the_log():
@@ -235,26 +217,6 @@ def test_texts_of_robots_are_short_and_do_nothing():
     for text in (a.state, a.waits_for, a.away, *texts(view)):
         assert text.isprintable()
         assert len(text) <= 2 * LONGEST
-
-
-def test_absurd_numbers_stay_in_bounds():
-    view = two_in_a_hall()
-    far = (MAX_FLEET_INDEX // 64, -MAX_FLEET_INDEX // 64 + 1)
-    say(
-        view, "far", x=MAX_COORDINATE_M, y=-MAX_COORDINATE_M, radius_m=100.0, division=2**31 - 1,
-        ground=tiles([(64 * far[0], 64 * far[1])]), cell_m=100.0, by="far",
-        origin=(MAX_COORDINATE_M, MAX_COORDINATE_M, 45.0),
-        ahead=((MAX_COORDINATE_M, MAX_COORDINATE_M), (-MAX_COORDINATE_M, 0.0)),
-        parts=(FleetPart("a", MAX_FLEET_INDEX, MAX_FLEET_INDEX, -1e9, 1e-3),),
-    )  # fmt: skip
-    for x, yaw in ((1e15, 0.0), (1e300, 0.0), (math.nan, 0.0), (1.0, 1e15)):
-        tell(view, "far", "status", encode_status(x, yaw))
-    view.tick(NOW)
-    json.dumps(view.document(NOW), allow_nan=False)
-
-
-def encode_status(x, yaw):
-    return status(pose={"x": 7.0, "y": 1.0, "yaw": yaw}).replace(b"7.0", repr(x).encode(), 1)
 
 
 def test_a_maze_as_large_as_can_be_told_takes_a_moment_only():

@@ -1,1 +1,0 @@
-"""Planners for fleets: one walk for each of several robots that share a ground."""
