@@ -27,6 +27,7 @@ from fasaco_edge.daemon.ledger.writer import (
     open_ledger,
 )
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
+from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at
@@ -299,13 +300,13 @@ def test_floor_alone_is_restored_too(tmp_path):
     writer.disk.close(1.0)
 
 
-@pytest.mark.parametrize("change", ["fresh", "another tool"])
+@pytest.mark.parametrize("change", ["fresh", "another tool, no floor"])
 def test_starting_over_keeps_the_keep_outs(tmp_path, change):
     """Progress is set aside, as it was asked for, or as cells are others; keep-outs are not."""
     vase = KeepOut("vase", ((0.9, 0.9), (2.1, 0.9), (2.1, 2.1)))
     note = replace(OrderState.idle(NO_ORDER), keep_out=(vase,)).to_json()
     begun, again = tmp_path / "begun", tmp_path / "again"
-    LedgerFile(begun, "robot").write(replace(lane(5), note=note))
+    LedgerFile(begun, "robot").write(replace(lane(5), note=note, floor=NO_FLOOR))
     is_fresh, cell_m = change == "fresh", CELL_M if change == "fresh" else 0.4
     for folder, fresh in ((begun, is_fresh), (again, False)):
         writer = open_ledger(folder, "robot", cell_m, fresh=fresh)

@@ -164,7 +164,7 @@ class Product:
 
     def report(self) -> ProductReport:
         """Return what the product says of its mission."""
-        reply = StatusBoard(self._config).reply(self._runner)
+        reply = StatusBoard(self._config).reply(self._runner, self._stepped_at)
         shown, grid = None, self._mission.grid
         if grid is not None:
             shown = self._mission.covered.floor.snapshot().shown(
