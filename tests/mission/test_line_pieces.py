@@ -82,6 +82,21 @@ def test_what_comes_between_goes_over_stands():
         assert (piece.line.points == line.points[piece.begin :][: len(piece.line)]).all()
 
 
+def test_a_part_driven_the_other_way_is_kept_backward():
+    after = cells(*lane(0, range(5)), *lane(1, range(4, 20)), *lane(0, range(19, 4, -1)))
+    line = polished(BEFORE)
+    pieces = join(after, kept_pieces(line, BEFORE, after))
+    found = whole(pieces)
+    turned = [piece for piece in pieces if piece.backward]
+    assert len(turned) == 1
+    for piece in turned:
+        there = line.points[piece.begin :][: len(piece.line)]
+        assert (piece.line.points == there[::-1]).all()
+    assert (np.diff(found.cells) >= 0).all()
+    at = np.rint(found.points / 10.0 - np.array((0.05, 0.0))).astype(int)
+    assert (at == after[found.cells]).all()
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_no_joint_leads_where_it_is_not_clear(seed):
     rng = np.random.default_rng(seed)

@@ -1,7 +1,7 @@
 """Pieces of a line, and how they are joined to a line.
 
-A line along a new walk reuses the pieces of the previous line that lead along the same cells in the
-same direction; between them it goes over stands.
+A line along a new walk reuses the pieces of the previous line that lead along the same cells,
+forward or backward; between them it goes over stands.
 """
 
 from __future__ import annotations
@@ -27,15 +27,17 @@ class Piece:
 
     Attributes:
         line: the piece, as in the new line.
-        begin: index of its first point in the previous line.
+        begin: index of its first point in the previous line, or of its last point if ``backward``.
+        backward: whether the direction is reversed.
     """
 
     line: Line
     begin: int
+    backward: bool = False
 
     def without_first(self) -> Piece:
         """Return the piece without its first point."""
-        return Piece(self.line.part(1), self.begin + 1)
+        return Piece(self.line.part(1), self.begin + (not self.backward), self.backward)
 
 
 def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
@@ -52,7 +54,13 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
         pieces.append(Piece(line.part(0, line.before(own)), 0))
     for run in common_runs(before[own:], after[own:], LEAST_STEPS).tolist():
         begin, origin, steps = run[AFTER] + own, run[BEFORE] + own, run[STEPS]
-        if not run[BACKWARD]:
+        if run[BACKWARD]:
+            first, last = line.before(origin - steps + 1), line.before(origin)
+            part = line.part(first, last)
+            cells = begin + origin - part.cells[::-1]
+            turned = Line(part.points[::-1], cells, part.state[::-1])
+            pieces.append(Piece(turned, first, backward=True))
+        else:
             # If both begin together, include the point behind the robot.
             first = 0 if begin == origin == 0 else line.before(origin + 1)
             last = line.before(origin + steps)
@@ -215,6 +223,6 @@ class Joiner:
             return
         piece = self._done[-1]
         line = piece.line.part(0, len(piece.line) - 1)
-        self._done[-1] = Piece(line, piece.begin)
+        self._done[-1] = Piece(line, piece.begin + piece.backward, piece.backward)
         if self._last() is not None and len(self._done) == 1 and len(line) == 1:
             self._done = [Piece(self.here, -1)]
