@@ -159,3 +159,18 @@ def test_a_robot_inside_a_wall_says_so_until_it_is_out():
     robot.show(room_with_corridor())
     assert robot.wait(2.0, lambda robot: robot.path)
     assert "shut_in" not in troubles(robot)
+
+
+def test_a_way_out_that_ends_at_a_border_leads_into_the_cell():
+    """It was a millimetre long, and the robot stood for ever: it can go on from the next cell."""
+    robot = LineRobot(room_with_niche(), START)
+    robot.wait(5.0, lambda robot: False)
+    mission, way_out = robot.mission, robot.mission._executive.way_out
+    cell = mission.map.cell_at_pose()
+    stand = mission.map.place_of(cell)
+    # The track led here from behind a wall that was not there.
+    way_out._track.clear()
+    way_out._track.extend([(10.0, 10.0), (robot.x + 0.001, robot.y)])
+    way = way_out._find(lambda area: area.contains(cell))
+    assert tuple(way[-1]) == stand
+    assert len(way) == 3

@@ -178,9 +178,21 @@ class WayOut:
                     floor, raster[end], raster[end + 1]
                 ):
                     end += 1
-                return np.array(way)[_without_loops(floor, raster[: end + 1])]
+                found = np.array(way)[_without_loops(floor, raster[: end + 1])]
+                return found if end > index else self._into(cell, found, radius)
             seen |= area.reachable
         return NO_WAY
+
+    def _into(self, cell: Cell, way: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+        """Return a way that leads on to the stand of its last cell, if it can.
+
+        A way that ends at the border of that cell may be too short to be driven.
+        """
+        floor, stand = self._map.floor, self._map.place_of(cell)
+        if floor is None or stand is None:
+            return way
+        a, b = (np.array(map_to_raster(floor.geometry, *at)) for at in (way[-1].tolist(), stand))
+        return np.vstack((way, stand)) if is_clear_between(floor, a, b, radius) else way
 
 
 def _without_loops(floor: FloorMap, track: list[NDArray[np.float64]]) -> list[int]:
