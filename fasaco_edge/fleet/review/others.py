@@ -1,4 +1,4 @@
-"""Floor that the other robots of a fleet swept, as one of them heard it: by its own recording."""
+"""Floor that the other robots of a fleet swept, by the messages in the recording of one of them."""
 
 from __future__ import annotations
 
@@ -62,18 +62,18 @@ def swept_by_others(
 
 
 def _members(turns: Iterable[Arrival], fleet: str) -> list[Member]:
-    """Return the others as they were heard last."""
+    """Return the others by their last messages."""
     members: dict[str, Member] = {}
     decoder = SampleDecoder()
     for arrival in turns:
         with suppress(FasacoError):
-            told = decode_turns(arrival.sample.payload).told
-            for numbered in decoder.samples(told) if told else ():
+            inputs = decode_turns(arrival.sample.payload).told
+            for numbered in decoder.samples(inputs) if inputs else ():
                 sample = numbered.arrival.sample
                 if numbered.arrival.topic != FLEET.name:
                     continue
-                said = decode_member(sample.payload, fleet)
-                if said is not None:
-                    new = Member(sample.key, len(members), Seat.of(said), said, 0)
-                    members.setdefault(sample.key, new).receive(said, 0)
+                message = decode_member(sample.payload, fleet)
+                if message is not None:
+                    new = Member(sample.key, len(members), Seat.of(message), message, 0)
+                    members.setdefault(sample.key, new).receive(message, 0)
     return list(members.values())
