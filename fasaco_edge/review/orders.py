@@ -127,12 +127,15 @@ def ordered_zones(data: RunData, orders: Sequence[OrderChapter]) -> tuple[Polygo
 
 def _zones(data: RunData, begin_s: float, end_s: float) -> tuple[ZoneReport, ...]:
     """Return the zones of the order between two times [s], by its statuses."""
-    told = (each.status.mission.zones for each in reversed(data.statuses)
-            if begin_s <= each.at_s <= end_s)  # fmt: skip
-    return next(filter(None, told), ())
+    reported = (
+        each.status.mission.zones
+        for each in reversed(data.statuses)
+        if begin_s <= each.at_s <= end_s
+    )
+    return next(filter(None, reported), ())
 
 
-def _told(zones: Sequence[ZoneReport]) -> OrderDocument | None:
+def _by_zones(zones: Sequence[ZoneReport]) -> OrderDocument | None:
     """Return an order whose command was not recorded, by its zones; None without any."""
     asked = [ZoneDocument(zone.name, list(zone.polygon) or None, zone.passes) for zone in zones]
     return OrderDocument(asked) if asked else None
@@ -144,8 +147,8 @@ def _held(
     """Yield each order with its source, its period in force [s] and its end."""
     # An order that is older than the recording: the daemon was restarted, or the recorder.
     first_s = next((at_s for at_s, name, _ in data.commands if name == "start"), end_s)
-    told = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)
-    ordered, began, order = next(filter(None, told), "itself"), 0.0, None
+    reported = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)
+    ordered, began, order = next(filter(None, reported), "itself"), 0.0, None
     is_open = True
     for at_s, name, given in data.commands:
         if name == "start" and is_open and _goes_on(order, given, _state_at(states, at_s)):
@@ -203,7 +206,7 @@ def _chapter(
         complete,
         covered,
         coverable,
-        order=msgspec.convert(order_document(order), OrderDocument) if order else _told(zones),
+        order=msgspec.convert(order_document(order), OrderDocument) if order else _by_zones(zones),
         replans=sum(
             begin_s <= path.at_s < until for path in data.paths if path.about.planner is not None
         ),

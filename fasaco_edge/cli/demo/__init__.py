@@ -29,7 +29,7 @@ summary.json and --json hold:
   reachable_m2, swept_m2
                    floor, by the true building and the true tracks of all robots
   swept_twice_m2   floor that two or more robots swept, driving through included, by the same
-                   count; `review` of the fleet counts cells, and tells driving through apart
+                   count; `review` of the fleet counts cells, and driving through separately
   driven_m         by all robots; robots: of each name, driven_m, drive_s (driving and
                    turning), swept_m2
   plans, paths, errors

@@ -198,9 +198,10 @@ def _some(texts: Sequence[str]) -> str:
 
 def _swept(review: Review, document: ReviewDocument) -> str:
     text, by, orders = floor_words(document), "recorded poses", document.orders
-    told = review.data.ledger_floor
-    if not text and told is not None and told.reached_m2 is not None:
-        text, by = swept_words(told.reached_m2, told.reachable_m2 or 0.0), "the daemon's count"
+    counted = review.data.ledger_floor
+    if not text and counted is not None and counted.reached_m2 is not None:
+        reachable_m2 = counted.reachable_m2 or 0.0
+        text, by = swept_words(counted.reached_m2, reachable_m2), "the daemon's count"
         orders = orders[-1:]
     if not text:
         return NOT_KNOWN
