@@ -56,11 +56,16 @@ def test_it_drives_out_along_its_track_and_sweeps_on():
 
 def test_where_there_is_no_way_it_waits_and_is_never_done():
     robot = shut_in(by=5)
+    floor_m2 = LineRobot(room_with_niche(), START).mission.line.left.areas.asked_m2
     assert not robot.wait(400.0, lambda robot: robot.mission.state == "done")
     assert robot.mission.state == "blocked"
     assert "shut in" in robot.mission.reason
     assert "shut_in" in troubles(robot)
     assert not robot.path
+    # It does not call the floor swept that it cannot get to.
+    floor = robot.mission.line.left.areas
+    assert floor.asked_m2 > 0.9 * floor_m2
+    assert floor.left_m2 > 0.5 * floor_m2
     # Once the way is open again, it goes on by itself.
     robot.show(room_with_niche())
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")

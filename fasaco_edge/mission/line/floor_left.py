@@ -25,6 +25,7 @@ from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFlo
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.unswept import causes_of
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # The robot does not drive to a cell with less unswept floor than this [m2].
@@ -46,7 +47,8 @@ class FloorToSweep(NamedTuple):
     """Areas of floor to sweep, on the newest map and for the present order.
 
     Attributes:
-        asked_m2: reachable floor that is asked for, swept or not [m2].
+        asked_m2: reachable floor that is asked for, swept or not [m2]; while the robot is shut in,
+            all that was reachable since the order began.
         ahead_m2: the unswept part of it that the line ahead sweeps [m2].
         left_m2: the unswept part of it that the line ahead does not sweep [m2].
         passed_m2: the rest of the unswept part: floor that the line has passed, and strips as
@@ -82,6 +84,8 @@ class FloorLeft:
         self._tally: SweepTally | None = None
         # Window in which causes of unreachable floor may be outdated.
         self._unexplained: Window | None = None
+        # The newest reachable area, and the cells of it whose floor counts as reachable.
+        self._reach: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
         # Window of the last update, with its asked-for and its reachable cells.
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
         # The swept floor at the last update, its number of changes, and how often it had forgotten
@@ -271,12 +275,25 @@ class FloorLeft:
         # Without a reachable area nothing is known; once there is one, everything is updated.
         if area is None or area.lattice.window != floor.stands.lattice.window:
             return None
-        window = area.lattice.window
-        asked = area.reachable & self._orders.cells.asked_of_me(area)
+        window, reachable = area.lattice.window, self._reachable(area)
+        asked = reachable & self._orders.cells.asked_of_me(area)
         asked = self._orders.scope.worth.first(asked, window)
-        before, self._asked = self._asked, (window, asked, area.reachable)
+        before, self._asked = self._asked, (window, asked, reachable)
         if before is None:
             return Window(0, 0, floor.geometry.rows, floor.geometry.cols)
         changed = asked != carried(before[1], before[0], window)
-        changed |= area.reachable != carried(before[2], before[0], window)
+        changed |= reachable != carried(before[2], before[0], window)
         return floor.pixels_of(changed) if changed.any() else None
+
+    def _reachable(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return the cells whose floor counts as reachable, bool (rows, cols) of an area.
+
+        Those of the area; if the robot is shut in, all that have been reachable: else nearly all
+        floor would seem swept while it waits in a corner.
+        """
+        if self._reach[0] is not area:
+            reachable = area.reachable
+            if self._orders.is_shut_in(area):
+                reachable = self._orders.known(area.lattice) & area.lattice.coverable
+            self._reach = area, reachable
+        return self._reach[1]

@@ -76,8 +76,9 @@ class FloorReport(Document, frozen=True):
 
     Attributes:
         swept_m2: floor that the tool has passed over, reachable now or not.
-        reachable_m2: floor that the tool can reach and has to sweep, as far as known; null if the
-            robot drives through the centres of cells.
+        reachable_m2: floor that the tool can reach and has to sweep, as far as known; while the
+            robot is shut in, what it could reach since the order began; null if the robot drives
+            through the centres of cells.
         left: unswept part of that by reason, the largest first; null if unknown.
         out_of_reach: floor that the map shows free and the tool cannot reach, part of the order or
             not, by reason, the largest first; null if unknown.
