@@ -293,7 +293,7 @@ class DaemonConfig(Section, frozen=True):
         robot = self.robot
         if self.planner.line == "cells":
             return robot.tool_width_m
-        return robot.tool_width_m * (1.0 - robot.overlap)
+        return robot.lane_m
 
     @property
     def lattice_deg(self) -> float | None:

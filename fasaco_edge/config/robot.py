@@ -19,6 +19,7 @@ from fasaco_edge.kernels.floor.turning import (
 )
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.curve_config import CurveConfig
+from fasaco_edge.planners.passes import lane_and_tool_m
 
 Metres = Annotated[float, Meta(gt=0, le=10)]
 DEFAULT_RADIUS_M = 0.18
@@ -132,6 +133,16 @@ class RobotConfig(Section, frozen=True):
             f"{self.radius_m:.3g} m: it may {turns} anywhere, passages narrower than "
             f"{2.0 * self.radius_m:.3g} m are left out, and {tool}"
         )
+
+    @property
+    def lane_m(self) -> float:
+        """Distance between neighbouring lanes of a line [m]: the tool's width less the overlap."""
+        return self.tool_width_m * (1.0 - self.overlap)
+
+    def with_overlap(self, overlap: float) -> RobotConfig:
+        """Return the robot for a pass whose lanes overlap by a share of the tool's width."""
+        lane_m, tool_m = lane_and_tool_m(self.tool_width_m, self.lane_m, overlap)
+        return msgspec.structs.replace(self, tool_width_m=tool_m, overlap=1.0 - lane_m / tool_m)
 
     def cost(self, cell_m: float | None = None) -> CoverageCost:
         """Return the costs of a turn and of a step over a cell, by default one as wide as the tool.

@@ -72,7 +72,7 @@ class Ground:
 
         discs = RobotDiscs(robot.radius_m, robot.tool_width_m, clearance_m=robot.clearance_m)
         floor = Floor.around(grid, discs, start_xy)
-        cell_m = robot.tool_width_m * (1.0 - robot.overlap)
+        cell_m = robot.lane_m
         lattice_deg = _lattice_deg(align, grid)
         try:
             stands = _stands(floor, cell_m, lattice_deg)

@@ -203,12 +203,7 @@ def _robot_in(each: Pass, robot: RobotConfig) -> RobotConfig:
         )
     if each.speed_m_s is not None:
         robot = msgspec.structs.replace(robot, speed_m_s=each.speed_m_s)
-    if each.overlap is None:
-        return robot
-    # As in a mission: of a line's lanes those of a narrower tool overlap more.
-    cell_m = robot.tool_width_m * (1.0 - each.overlap)
-    tool_m = robot.tool_width_m * min((1.0 - each.overlap) / (1.0 - robot.overlap), 1.0)
-    return msgspec.structs.replace(robot, tool_width_m=tool_m, overlap=1.0 - cell_m / tool_m)
+    return robot if each.overlap is None else robot.with_overlap(each.overlap)
 
 
 def _end(end: str | Cell, plans: Sequence[Plan]) -> str | Cell:

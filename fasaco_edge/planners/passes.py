@@ -75,6 +75,21 @@ class Laid(NamedTuple):
     overlap: float | None = None
 
 
+def lane_and_tool_m(tool_m: float, usual_lane_m: float, overlap: float) -> tuple[float, float]:
+    """Return the distance of lanes that overlap, and the width of the tool to plan them with [m].
+
+    Where lanes are closer than usual, the tool is narrower as well: a line leaves out floor that is
+    swept already, so lanes of the same tool would be as far apart as usual.
+
+    Args:
+        tool_m: width of the tool [m].
+        usual_lane_m: distance of the robot's lanes in other passes [m].
+        overlap: share of the tool's width by which neighbouring lanes overlap.
+    """
+    lane_m = tool_m * (1.0 - overlap)
+    return lane_m, tool_m * min(lane_m / usual_lane_m, 1.0)
+
+
 def laid(passes: Sequence[Pass]) -> list[Laid]:
     """Return passes on lattices.
 

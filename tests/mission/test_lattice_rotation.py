@@ -20,7 +20,7 @@ from fasaco_edge.mission.core.events import (
     PlanReady,
     PoseReceived,
 )
-from fasaco_edge.mission.core.lattice_angle import WallWatch
+from fasaco_edge.mission.core.lattice_layout import WallWatch
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
 from fasaco_edge.mission.orders.keep_outs import KeepOut

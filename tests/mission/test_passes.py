@@ -8,7 +8,7 @@ import pytest
 from fasaco_edge.errors import OrderError
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PlanReady, State
-from fasaco_edge.mission.core.lattice_angle import LatticeAngle
+from fasaco_edge.mission.core.lattice_layout import LatticeLayout
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.planners.cost import SearchWork
@@ -230,29 +230,29 @@ def test_lanes_of_a_pass_overlap_as_it_says():
 
 def test_cells_that_no_map_fits_on_are_given_up():
     grid, usual_m = room(3.0, 2.4), CONFIG.footprint.cell_m
-    angle = LatticeAngle(CONFIG)
+    layout = LatticeLayout(CONFIG)
     for lay, deg, cell_m in (
         (Laid(angle_deg=30.0), 30.0, usual_m),
         (Laid(angle_deg=30.0, overlap=0.5), 30.0, usual_m / 2),
         (Laid(), 0.0, usual_m),
     ):
-        assert angle.changes_for_pass(lay, grid)
-        assert (angle.deg, angle.cell_m) == (deg, cell_m)
-        assert not angle.changes_for_pass(lay, grid)
-    angle._most_cells = 100
+        assert layout.changes_for_pass(lay, grid)
+        assert (layout.deg, layout.cell_m) == (deg, cell_m)
+        assert not layout.changes_for_pass(lay, grid)
+    layout._most_cells = 100
     for lay in (Laid(angle_deg=45.0), Laid(overlap=0.4)):
-        assert not angle.changes_for_pass(lay, grid)
-        assert not angle.changes_for_pass(lay, grid)
-        assert (angle.deg, angle.cell_m) == (0.0, usual_m)
+        assert not layout.changes_for_pass(lay, grid)
+        assert not layout.changes_for_pass(lay, grid)
+        assert (layout.deg, layout.cell_m) == (0.0, usual_m)
 
 
 def test_a_map_that_outgrows_the_cells_of_a_pass_gets_the_usual_ones():
-    angle = LatticeAngle(CONFIG)
-    assert angle.changes_for_pass(Laid(overlap=0.5), room(3.0, 2.4))
-    angle._most_cells = 500
-    assert angle.rotates_back_for([room(4.0, 3.0)])
-    assert angle.cell_m == CONFIG.footprint.cell_m
-    assert not angle.rotates_back_for([room(4.0, 3.0)])
+    layout = LatticeLayout(CONFIG)
+    assert layout.changes_for_pass(Laid(overlap=0.5), room(3.0, 2.4))
+    layout._most_cells = 500
+    assert layout.rotates_back_for([room(4.0, 3.0)])
+    assert layout.cell_m == CONFIG.footprint.cell_m
+    assert not layout.rotates_back_for([room(4.0, 3.0)])
 
 
 def test_a_slow_pass_is_sent_with_its_speed_and_driven_to_its_end():

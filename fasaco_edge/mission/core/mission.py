@@ -28,7 +28,7 @@ from fasaco_edge.mission.core.events import (
 )
 from fasaco_edge.mission.core.executive import Executive
 from fasaco_edge.mission.core.in_dock import InDock
-from fasaco_edge.mission.core.lattice_angle import LatticeAngle
+from fasaco_edge.mission.core.lattice_layout import LatticeLayout
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.order_changes import OrderChanges
 from fasaco_edge.mission.core.route import Route
@@ -82,7 +82,7 @@ class Mission:
         """Start with an order, by default for everything reachable, and a kind of company."""
         self._config, self._kind = config, kind
         self.drive, self._gauge = DriveMeter(), BatteryGauge()
-        self._angle = LatticeAngle(config)
+        self._layout = LatticeLayout(config)
         self._idle = IdlePlaces(config)
         self._rooms = RoomWatch()
         self._lay_cells()
@@ -90,14 +90,14 @@ class Mission:
 
     def _lay_cells(self) -> None:
         """Start a mission on a lattice at the decided angle, with cells of the decided edge."""
-        self._rotation = LatticeRotation(self._angle.deg)
+        self._rotation = LatticeRotation(self._layout.deg)
         # Rotation of the lattice against that of the restored ledger [deg], and edge of its cells
         # as a multiple of the ledger's.
         self._rotated_by_deg, self._scaled_by = 0.0, 1.0
         # The newest map in the lattice's frame, and the same in the map frame.
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
-        config = self._rotation.config(self._angle.sized(self._config))
+        config = self._rotation.config(self._layout.sized(self._config))
         self.map = MapState(config)
         cell_m, tool_m, sweeping = config.footprint.cell_m, config.tool_m, config.sweeping
         ahead_m = sweeping.ahead_m if sweeping else 0.0
@@ -139,13 +139,13 @@ class Mission:
         ``coverage.fit``, is reported as a fault (LedgerMismatchError) with the map that
         shows it; coverage begins from zero then.
         """
-        if self._angle.resume(before.lattice_deg):
+        if self._layout.resume(before.lattice_deg):
             self._lay_cells()
         self._resume(before)
 
     def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         self._rotated_by_deg = self._rotation.deg - before.lattice_deg
-        deg, cell_m = self._rotation.deg, self._angle.cell_m
+        deg, cell_m = self._rotation.deg, self._layout.cell_m
         self._scaled_by = cell_m / before.cell_m
         before = relaid_ledger(before, deg, cell_m)
         self.covered.resume(before, is_confirmed=is_confirmed)
@@ -172,7 +172,7 @@ class Mission:
         To be called before the first step, which gets the events of its ``held``.
         """
         self._executive.succeed(before._executive)
-        if before.rotation != self.rotation or before._angle.cell_m != self._angle.cell_m:
+        if before.rotation != self.rotation or before._layout.cell_m != self._layout.cell_m:
             return
         self.orders.succeed(before.orders)
         self._executive.way_out.succeed(before._executive.way_out)
@@ -238,27 +238,27 @@ class Mission:
     def _align(self, happened: Decision, now: float) -> Decision:
         """Lay the lattice for a pass's lanes, or along the walls once these are certain; return
         the combined decision."""
-        state, angle, grid, pose = self.order_state, self._angle, self.grid, self.pose
-        angle.note_faults(happened.faults)
+        state, layout, grid, pose = self.order_state, self._layout, self.grid, self.pose
+        layout.note_faults(happened.faults)
         # A path kept for an errand is given in present cells; a building in doubt may soon be
         # replaced by another.
         if state.errand or self.is_in_doubt or grid is None or pose is None:
             return happened
         sweeps = state.current_zone is not None
-        if sweeps and angle.changes_for_pass(state.current_pass, grid):
-            along = f"along the lanes of the pass, {angle.cell_m:.3g} m wide,"
-        elif not angle.is_settled and angle.rotates_to_walls(grid, pose):
+        if sweeps and layout.changes_for_pass(state.current_pass, grid):
+            along = f"along the lanes of the pass, {layout.cell_m:.3g} m wide,"
+        elif not layout.is_settled and layout.rotates_to_walls(grid, pose):
             along = "along the walls from now on,"
         else:
             return happened
-        why = f"cells lie {along} at {angle.deg:.1f} degrees to the map frame"
+        why = f"cells lie {along} at {layout.deg:.1f} degrees to the map frame"
         stop = self._lay_anew(why, now)
         return replace(happened, path=stop or happened.path)
 
     def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
         """Rotate the lattice back to the map frame's axes for a map that does not fit otherwise."""
         maps = (event.grid for event in events if isinstance(event, MapReceived))
-        if not self._angle.rotates_back_for(maps):
+        if not self._layout.rotates_back_for(maps):
             return None
         return self._lay_anew("the map is too large for other cells than the usual ones", now)
 

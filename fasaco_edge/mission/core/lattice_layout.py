@@ -1,4 +1,4 @@
-"""Lattice angle: angle of the cells' rows to the map frame, edge of a cell, and their changes.
+"""Lattice layout: angle of the cells' rows to the map frame, edge of a cell, and their changes.
 
 Without a configured angle, rows are parallel to the axes of the map frame at first, and to the
 walls once their direction is certain; to the axes again if a map does not fit otherwise. For a
@@ -24,7 +24,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.grid.walls import WallDirection, wall_direction
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.planners.passes import Laid
+from fasaco_edge.planners.passes import Laid, lane_and_tool_m
 
 # Evidence required: length of parallel walls [m], and their share of all walls.
 LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
@@ -101,7 +101,7 @@ def _agree(before: WallDirection | None, seen: WallDirection) -> bool:
     )
 
 
-class LatticeAngle:
+class LatticeLayout:
     """Decides the angle of the cells' rows, and the edge of a cell.
 
     Attributes:
@@ -115,22 +115,20 @@ class LatticeAngle:
         self._resumed_deg: float | None = None
         self._is_given = config.lattice_deg is not None
         self.cell_m = self._usual_cell_m = config.footprint.cell_m
-        self._tool_m, self._most_cells = config.tool_m, config.max_lattice_cells
+        # Width of the tool, usual and as planned with at present [m].
+        self._usual_tool_m = self._tool_m = config.tool_m
+        self._most_cells = config.max_lattice_cells
         self._walls = WallWatch()
         if self._is_given:
             self._walls.end()
 
     def sized(self, config: MissionConfig) -> MissionConfig:
-        """Return a mission's configuration with cells of the present edge.
-
-        Where they are narrower than usual, so is the tool: a line over the floor leaves out what
-        is swept already, and its lanes would overlap as usual.
-        """
+        """Return a mission's configuration with cells of the present edge."""
         scale, sweeping = self.cell_m / self._usual_cell_m, config.sweeping
         if scale == 1.0:
             return config
         if sweeping is not None:
-            sweeping = replace(sweeping, tool_m=sweeping.tool_m * min(scale, 1.0))
+            sweeping = replace(sweeping, tool_m=self._tool_m)
         footprint = replace(config.footprint, cell_m=self.cell_m)
         cost = replace(config.cost, step_s=config.cost.step_s * scale)
         return replace(config, footprint=footprint, cost=cost, sweeping=sweeping)
@@ -152,14 +150,15 @@ class LatticeAngle:
             self._walls.begin()
         self._resumed_deg = None
         wanted = self._usual_deg if deg is None else deg
-        overlap = lay.overlap
-        cell_m = self._usual_cell_m if overlap is None else self._tool_m * (1.0 - overlap)
+        cell_m, tool_m = self._usual_cell_m, self._usual_tool_m
+        if lay.overlap is not None:
+            cell_m, tool_m = lane_and_tool_m(tool_m, cell_m, lay.overlap)
         if (wanted, cell_m) == (self.deg, self.cell_m):
             return False
         # As for walls: the map may grow.
         if not self._fits(grid, wanted, cell_m, share=0.5):
             return False
-        self.deg, self.cell_m = wanted, cell_m
+        self.deg, self.cell_m, self._tool_m = wanted, cell_m, tool_m
         return True
 
     def note_faults(self, faults: Iterable[FasacoError]) -> None:
@@ -196,6 +195,7 @@ class LatticeAngle:
         if is_usual:
             self._usual_deg = 0.0
         self.deg, self.cell_m = self._usual_deg, self._usual_cell_m
+        self._tool_m = self._usual_tool_m
         return True
 
     def _fits(self, grid: OccupancyGrid, deg: float, cell_m: float, share: float = 1.0) -> bool:
