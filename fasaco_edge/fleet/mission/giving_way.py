@@ -83,6 +83,8 @@ class GivingWay(Waiting):
         self._route, self._fleet = route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
+        # The refuge that the robot did not get to from where it stays.
+        self._vain: Cell | None = None
         # Distances of the way from other robots when it was chosen [m].
         self._apart_m: dict[str, float] = {}
         self._has_work = True
@@ -194,6 +196,8 @@ class GivingWay(Waiting):
             return None
         if self._is_underway(here, now):
             return None
+        if self._refuge is not None and now - self._sought_at > PATIENCE_S:
+            self._vain = self._refuge
         self._refuge = None
         if found := self._obstruction(here, now):
             return self._hold(found, area, cell, here, now)
@@ -209,7 +213,7 @@ class GivingWay(Waiting):
         # A moment without an obstruction is no progress.
         has_waited = now - self._waited_at <= STANDS_S
         if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
-            self._stays_at, self._stays_since = here, now
+            self._stays_at, self._stays_since, self._vain = here, now, None
 
     def _is_underway(self, here: tuple[float, float], now: float) -> bool:
         """Return whether the robot drives to its refuge, and no robot has come in its way."""
@@ -302,7 +306,7 @@ class GivingWay(Waiting):
             places, sees = self._map.places_of, partial(self._sees, area)
             way = refuge(area, cell, here, self._radius_m, neighbours, places, sees)
             to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))
-            if way is not None and to is not None and not self._is_in(to, here):
+            if way is not None and to and to != self._vain and not self._is_in(to, here):
                 self._refuge = to
                 beside = discs(self._radius_m, neighbours)
                 update = route.publish(way, self._reason, now, beside=beside)

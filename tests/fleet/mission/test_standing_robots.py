@@ -188,6 +188,21 @@ def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
     assert len(drive.mission.route.path.ahead) > 1
 
 
+def test_a_robot_that_cannot_get_to_its_refuge_plans_around_the_other():
+    # It stood for ever beside one that was done: the refuge was the cell that it stood in, and the
+    # way to the middle of it, of one point, was no way to drive.
+    drive = planned()
+    (row, col), (to_row, to_col) = drive.walk[1], drive.walk[0]
+    off = 2 + 0.4 * (to_row - 2), 4 + 0.4 * (to_col - 4)
+    other = replace(member((col + 0.5) * CELL_M, (row + 0.5) * CELL_M), state="done")
+    for _ in range(int(2 * PATIENCE_S + STANDS_S)):
+        drive.tell(pose_at(*off), other, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+    assert drive.mission.giving_way.waits_for == ""
+    assert len(drive.mission.route.path.ahead) > 1
+
+
 def test_a_waiting_robot_is_done_when_others_sweep_the_rest():
     drive = planned()
     x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
