@@ -63,11 +63,16 @@ def recording(tmp_path):
     ids=["plan", "ants", "warmup", "planners"],
 )
 def test_progress_is_drawn_and_leaves_nothing_behind(words, shown, first_line):
-    with Terminal(*words, columns=120) as shell:
-        text = ended_well(shell)
-        assert re.search(shown, COLOURS.sub("", shell.written))
-        assert not re.search(shown, text)
-        assert re.fullmatch(first_line, text.partition("\n")[0]), text
+    # On a busy machine half a second may be over before a plan is drawn.
+    for tried in (words, (*PLAN[:-1], "20")) if words == PLAN else (words,):
+        with Terminal(*tried, columns=120) as shell:
+            text = ended_well(shell)
+            written = COLOURS.sub("", shell.written)
+        if re.search(shown, written):
+            break
+    assert re.search(shown, written)
+    assert not re.search(shown, text)
+    assert re.fullmatch(first_line, text.partition("\n")[0]), text
 
 
 def test_a_review_shows_what_it_reads(recording):

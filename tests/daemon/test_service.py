@@ -19,8 +19,6 @@ from tests.support.rooms import map_bytes, pillared_room, pose_bytes, two_rooms
 from tests.support.service_manager import Manager
 
 WATCHDOG_S = 1.0
-# Neither free nor occupied by the default thresholds.
-DOUBTFUL = 40
 
 
 @contextmanager
