@@ -186,20 +186,3 @@ def test_a_second_daemon_for_the_robot_is_refused(tmp_path):
             assert "another daemon uses the ledger" in second.log_text()
             assert "hint: stop it, or give this one another robot.name" in second.log_text()
             second.process.returncode = 0
-
-
-def test_the_configured_folder_takes_precedence_over_systemds(tmp_path):
-    environment = {"STATE_DIRECTORY": str(tmp_path / "systemd")}
-    for folder, sections in (
-        ("systemd", {}),
-        ("configured", {"mission": {"state_dir": str(tmp_path / "configured")}}),
-    ):
-        with (
-            daemon_process(tmp_path, state=False, env=environment, **sections) as running,
-            Outsider(running.endpoint) as outsider,
-        ):
-            begin(outsider)
-            assert outsider.ask_status()["ledger"]["path"] == str(
-                tmp_path / folder / "robot.ledger"
-            )
-        assert (tmp_path / folder / "robot.ledger").exists()
