@@ -129,7 +129,7 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"
     # Robots too fast for a busy machine drive past what their daemons would have told them.
-    speed = round(max(6.0 / slowness(), 1.5), 1)
+    speed = round(max(6.0 / slowness(), 3.0), 1)
     options = ("--map", building, "--robots", 2, "--speed", speed, "--timeout", 1200)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")
     assert ended.code == 0, ended.err
