@@ -70,7 +70,8 @@ SAYS = {
     r"from 0\.\d+ to \d\.\d+\n",
     "floor.parquet": r"monday (\{.*\})\ntuesday \1\n",
 }
-TIMEOUT_S = 120.0
+# Nothing takes so long but on a machine that is busy with much else [s].
+TIMEOUT_S = 600.0
 
 
 class Reader:
@@ -236,9 +237,10 @@ def test_a_researcher_s_page(integrated, tmp_path, monkeypatch):
     for night in ("monday", "tuesday"):
         (tmp_path / f"{night}.rrd").write_bytes(recording.read_bytes())
     reader = Reader(tmp_path)
-    # The robot has not driven for a minute.
+    # The robot has not driven for a minute, but on a busy machine.
     last_s = document(read_review([recording]))["duration_s"] - 0.2
-    reader.instead["--at 1:00"] = f"--at 0:{last_s:04.1f}"
+    if last_s < 60.0:
+        reader.instead["--at 1:00"] = f"--at 0:{last_s:04.1f}"
     reader.follow(page(RESEARCHER))
     assert "mine.py:depth_first" in reader.said["bench"]
     names = ("office", "mine", "field", "passes", "then", "both")

@@ -65,9 +65,11 @@ class Campaign:
         taken_over_s: after each event, until those that are left had divided the rest [s].
         united_s: after each return, until all had one division [s].
         twice: of each mission, the share of cells that two or more robots swept.
+        patience: how many times as long as it should something may take.
         violations: what did not hold.
     """
 
+    patience: float = 1.0
     taken_over_s: dict[str, list[float]] = field(default_factory=dict)
     united_s: list[float] = field(default_factory=list)
     twice: list[float] = field(default_factory=list)
@@ -200,11 +202,15 @@ def house(folder: Path) -> Iterator[House]:
 
 
 def run_campaign(
-    folder: Path, counts: dict[Event, int], seed: int = 0, say: Callable[[str], None] = show
+    folder: Path,
+    counts: dict[Event, int],
+    seed: int = 0,
+    say: Callable[[str], None] = show,
+    patience: float = 1.0,
 ) -> Campaign:
     """Let so much go wrong, a few events a mission; return what was seen."""
     warm_kernels()
-    rng, campaign, left = random.Random(seed), Campaign(), Counter(counts)
+    rng, campaign, left = random.Random(seed), Campaign(patience), Counter(counts)
     while (total := left.total()) and campaign.counted["missions"] < 4 * sum(counts.values()):
         place = folder / f"mission{campaign.counted['missions']}"
         place.mkdir()
@@ -294,8 +300,9 @@ def _split(campaign: Campaign, there: House, rng: random.Random) -> None:
 def _check_shared(campaign: Campaign, there: House, kind: str, *sides: list[str]) -> None:
     """Check that the robots of each side take over what is left in time."""
     names = sorted(name for side in sides for name in side)
-    took_s = there.until(lambda: all(there.is_shared(side) for side in sides), TAKEN_OVER_S)
-    if took_s > TAKEN_OVER_S:
+    most_s = campaign.patience * TAKEN_OVER_S
+    took_s = there.until(lambda: all(there.is_shared(side) for side in sides), most_s)
+    if took_s > most_s:
         campaign.violations.append(f"{kind}: not taken over: {_told(there, names)}")
     elif there.is_done(names):
         campaign.counted["done before"] += 1
@@ -306,8 +313,8 @@ def _check_shared(campaign: Campaign, there: House, kind: str, *sides: list[str]
 def _check_united(campaign: Campaign, there: House, what: str) -> None:
     """Check that all have one division soon."""
     names = sorted(set(there.robots) - there.standing)
-    took_s = there.until(lambda: there.is_shared(names), UNITED_S)
-    if took_s > UNITED_S:
+    took_s = there.until(lambda: there.is_shared(names), campaign.patience * UNITED_S)
+    if took_s > campaign.patience * UNITED_S:
         campaign.violations.append(f"not united after {what} came back: {_told(there, names)}")
     else:
         campaign.united_s.append(took_s)

@@ -174,10 +174,12 @@ def try_together(campaign: Campaign) -> None:
             campaign.started(*recorder),
         ):
             until(lambda: _bytes_in(campaign.trap.state) > 100_000)
-            campaign.run("ask", "status", "--json", *connect)
-            campaign.run("mission", "status", *connect)
-            campaign.run("rooms", "list", *connect)
-            campaign.run("watch", "--once", *connect)
+            # A busy machine may take more than the seconds that they wait by themselves.
+            asking = (*connect, "--timeout", "100")
+            campaign.run("ask", "status", "--json", *asking)
+            campaign.run("mission", "status", *asking)
+            campaign.run("rooms", "list", *asking)
+            campaign.run("watch", "--once", *asking)
             campaign.run("doctor", "--config", config, ends=(0, 1))
             until(lambda: _bytes_in(recordings) > 200_000)
     # In the home, where it is kept unless an option says otherwise, and what is there is links.

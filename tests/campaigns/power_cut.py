@@ -20,7 +20,6 @@ import argparse
 import json
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -54,7 +53,6 @@ MISSION, FIRST_START = "mission", "first-start"
 FIRST_SHARE = 0.15
 # A recorder takes longer to start than all the rest: one is, after each so many cuts.
 RECORDS_EACH = 8
-Completed = subprocess.CompletedProcess[str]
 NEW = "robot.ledger.new"
 MISSION_S = 5.0
 

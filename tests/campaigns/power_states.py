@@ -257,14 +257,6 @@ class Disk:
             yield path
 
 
-def _common(one: bytes, other: bytes) -> int:
-    """Return how many bytes both begin with."""
-    least = min(len(one), len(other))
-    if one[:least] == other[:least]:
-        return least
-    return next(at for at in range(least) if one[at] != other[at])
-
-
 def _is_dirty(node: _Node) -> bool:
     return isinstance(node, _File) and node.is_dirty
 

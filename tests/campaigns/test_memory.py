@@ -26,10 +26,7 @@ limited = pytest.mark.skipif(bool(why_not()), reason=why_not())
         (Flood("mappers", 2000, 0.03, 20.0), "taken", ""),
         (Flood("maps", 3000, 0.02, 10.0), "refused", "9000104 bytes was dropped: it may have at"),
         (Flood("maps", 2000, 0.0003, 5.0), "refused", "must be 0.0012 m or larger"),
-        (Flood("grey", 900, 0.02, 10.0), "taken", ""),
-        (Flood("message", 1900, 0.02, 10.0), "taken", ""),
         (Flood("message", 2700, 0.02, 10.0), "refused", "a message of 7290104 bytes"),
-        (Flood("colour", 4000, 0.02, 10.0), "refused", "take 71.7 MB to read, more than the 14.0"),
     ],
     ids=lambda value: value.kind if isinstance(value, Flood) else None,
 )
@@ -45,13 +42,12 @@ def test_a_daemon_takes_no_more_than_it_says(tmp_path, flood, outcome, error):
     "flood",
     [
         Flood("maps", 8000, 0.02, 20.0),
-        Flood("maps", 8000, 0.0001, 2.0),
         Flood("updates", 5000, 0.03, 20.0),
         Flood("grey", 5900, 0.03, 20.0),
         Flood("colour", 8000, 0.03, 20.0),
         Flood("message", 2300, 0.03, 20.0),
     ],
-    ids=["twenty", "fine", "updates", "grey", "colour", "message"],
+    ids=lambda flood: flood.kind,
 )
 def test_a_daemon_lives_under_its_units_limit(tmp_path, flood):
     (row,) = run_floods([flood], tmp_path, 2.0, unit_limit())
@@ -71,8 +67,7 @@ def test_under_a_smaller_limit_it_takes_smaller_maps_and_says_so(tmp_path):
 
 
 @limited
-@pytest.mark.parametrize("kind", ["maps", "updates"])
-def test_a_recorder_lives_under_its_units_limit(tmp_path, kind):
+def test_a_recorder_lives_under_its_units_limit(tmp_path):
     pytest.importorskip("rerun")
     limit = unit_limit(unit=UNIT.with_name("fasaco-edge-recorder.service"))
     program = [sys.executable, "-m", "fasaco_edge", "record", "--out", str(tmp_path / "out")]
@@ -88,7 +83,7 @@ def test_a_recorder_lives_under_its_units_limit(tmp_path, kind):
             told.wait(lambda heard: heard.json()["state"] == "recording")
             outsider.put("map", map_bytes(room(8.0, 6.0)))
             outsider.put("pose", pose_bytes(0.75, 0.75))
-            pour(Flood(kind, 5000, 0.03, 20.0), daemon, outsider, 2.0)
+            pour(Flood("updates", 5000, 0.03, 20.0), daemon, outsider, 2.0)
             told.wait(lambda heard: True, len(told.heard) + 2)  # it still speaks
             assert recorder.poll() is None
             assert group.kills == 0

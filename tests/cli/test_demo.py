@@ -23,7 +23,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.review.review import read_review
 from fasaco_edge.simulation.robot import SimulationConfig
 from maps.map_writer import write_map
-from tests.support.processes import fasaco_edge, is_running
+from tests.support.processes import fasaco_edge, is_running, slowness
 from tests.support.rooms import (
     FREE,
     RADIUS_M,
@@ -128,7 +128,9 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
 def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"
-    options = ("--map", building, "--robots", 2, "--speed", 6, "--timeout", 1200)
+    # Robots too fast for a busy machine drive past what their daemons would have told them.
+    speed = round(max(6.0 / slowness(), 3.0), 1)
+    options = ("--map", building, "--robots", 2, "--speed", speed, "--timeout", 1200)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")
     assert ended.code == 0, ended.err
     assert "fasaco-edge watch --fleet demo --connect tcp/127.0.0.1:" in ended.err
@@ -152,9 +154,9 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     assert [robot["state"] for robot in reviewed["robots"]] == ["done", "done"]
     # Cells, of which some reach into walls, against floor.
     assert reviewed["swept_m2"] == pytest.approx(summary["swept_m2"], rel=0.15)
-    # By the robots' clocks, which are six times as fast.
-    assert reviewed["time_scale"] == 6.0
-    assert summary["wall_s"] < reviewed["makespan_s"] < 6.0 * summary["wall_s"]
+    # By the robots' clocks, which are so much faster.
+    assert reviewed["time_scale"] == speed
+    assert summary["wall_s"] < reviewed["makespan_s"] < speed * summary["wall_s"]
     with Image.open(summary["picture"]) as picture:
         assert min(picture.size) > 200
     assert not [pid for pid in processes_of(out) if is_running(pid)]

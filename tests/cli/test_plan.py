@@ -453,11 +453,15 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     pillars = np.ones((11, 13), bool)
     pillars[2::3, 1::4] = False
     np.save(grid_file, pillars)
-    options = ("--ants", 1_000_000, "--budget", 1)
-    figures, walk = plan(grid_file, *options, "--turn-s", 1)
-    check(figures, walk, cells_in(grid_file), (0, 0), turn_s=1.0)
-    assert figures["kicks"] > 0
-    assert figures["ended_by"] == "budget"
+    # On a busy machine a short one may end before the first kick.
+    for budget_s in (0.3, 3, 30):
+        options = ("--ants", 1_000_000, "--budget", budget_s)
+        figures, walk = plan(grid_file, *options, "--turn-s", 1)
+        check(figures, walk, cells_in(grid_file), (0, 0), turn_s=1.0)
+        assert figures["ended_by"] == "budget"
+        if figures["kicks"] > 0:
+            return
+    raise AssertionError("no kick in half a minute")
 
 
 def test_one_cell_is_a_walk_without_a_step(plan, tmp_path):

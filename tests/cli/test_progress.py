@@ -63,11 +63,16 @@ def recording(tmp_path):
     ids=["plan", "ants", "warmup", "planners"],
 )
 def test_progress_is_drawn_and_leaves_nothing_behind(words, shown, first_line):
-    with Terminal(*words, columns=120) as shell:
-        text = ended_well(shell)
-        assert re.search(shown, COLOURS.sub("", shell.written))
-        assert not re.search(shown, text)
-        assert re.fullmatch(first_line, text.partition("\n")[0]), text
+    # On a busy machine half a second may be over before a plan is drawn.
+    for tried in (words, (*PLAN[:-1], "20")) if words == PLAN else (words,):
+        with Terminal(*tried, columns=120) as shell:
+            text = ended_well(shell)
+            written = COLOURS.sub("", shell.written)
+        if re.search(shown, written):
+            break
+    assert re.search(shown, written)
+    assert not re.search(shown, text)
+    assert re.fullmatch(first_line, text.partition("\n")[0]), text
 
 
 def test_a_review_shows_what_it_reads(recording):
@@ -89,13 +94,13 @@ def test_the_simulation_shows_its_robot_in_one_line():
 
 # Run in a terminal: bars, with their titles as arguments.
 BARS = r"""
-import sys, time
+import sys
 from fasaco_edge.cli.console import streams, terminal
 streams.clean_streams()
 with terminal.progress() as bar:
     for title in sys.argv[1:]:
         bar.add_task(title, total=100_000, completed=20_000)
-    time.sleep(0.5)
+    sys.stdin.readline()
 """
 
 
@@ -107,10 +112,12 @@ def test_bar_and_clock_are_whole(tmp_path, columns, lines):
     program = (sys.executable, str(script), *titles)
     with Terminal(program=program, columns=columns, lines=lines) as shell:
         screen = shell.wait(lambda seen: seen.count("20000/100000") == 3)
+        shell.type("\n")
         assert shell.end() == 0
-    rows = [line for line in screen.splitlines() if "0:00:00" in line]
+    rows = [line for line in screen.splitlines() if "20000/100000" in line]
     for row, title in zip(rows, titles, strict=True):
         assert len(row) <= columns
+        assert re.search(r"\b0:\d\d:\d\d\b", row)
         assert sum(row.count(sign) for sign in BAR) == (32 if columns >= 80 else 16)
         name = re.split("[━╸╺]", row)[0].strip()
         assert name == title or (title.startswith(name[:-1]) and name.endswith("…"))

@@ -6,8 +6,6 @@ import json
 import signal
 from typing import Any
 
-import pytest
-
 from tests.daemon.test_commands import ask, command
 from tests.daemon.test_mission import about, planned
 from tests.mission.test_idle_places import in_or_beside
@@ -62,22 +60,6 @@ def test_a_keep_out_in_mid_mission_keeps_coverage_and_is_avoided(tmp_path):
         assert (trouble["code"], trouble["text"]) == ("no_effect", in_or_beside("keep-out 'far'"))
 
 
-def test_a_robot_inside_gets_an_empty_path_at_once(tmp_path):
-    with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
-        paths = outsider.listen("path")
-        begin(outsider)
-        drive(outsider, lanes(12))
-        paths.wait(lambda heard: len(planned(heard)[0]) > 0)
-        before = len(paths.heard)
-        answer = keep_out(outsider, "add", HERE)
-        assert answer["state"] == "blocked"
-        stop = paths.wait(lambda heard: not len(planned(heard)[0]), since=before)
-        assert "robot is in a keep-out zone" in about(stop)["reason"]
-        keep_out(outsider, "remove", {"name": "here"})
-        status = outsider.wait_status(lambda status: status["state"] == "covering")
-        assert status["coverage"]["covered"] == 12
-
-
 def test_it_outlives_a_kill_and_comes_before_any_map(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         assert keep_out(outsider, "add", VASE)["state"] == "waiting for map"
@@ -96,23 +78,22 @@ def test_it_outlives_a_kill_and_comes_before_any_map(tmp_path):
         assert keep_out(outsider, "remove", {"name": "vase"})["mission"]["keep_outs"] == []
 
 
-@pytest.mark.parametrize("name", ["start", "reset"])
-def test_what_is_covered_is_not_forgotten_without_consent(tmp_path, name):
-    order = {"passes": 2} if name == "start" else None
+def test_what_is_covered_is_not_forgotten_without_consent(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         taken = outsider.listen("command", late=False)
         begin(outsider)
         drive(outsider, lanes(12))
-        error = command(outsider, name, order, discard=False)
-        check("error.json", error)
-        assert error["code"] == "would_forget"
-        assert error["message"].startswith(f"{name} forgets 11 covered cells (1.0 m2), ")
-        assert error["message"].endswith(" % of the floor in reach")
-        assert "--yes" in error["hint"]
+        for name, order in (("start", {"passes": 2}), ("reset", None)):
+            error = command(outsider, name, order, discard=False)
+            check("error.json", error)
+            assert error["code"] == "would_forget"
+            assert error["message"].startswith(f"{name} forgets 11 covered cells (1.0 m2), ")
+            assert error["message"].endswith(" % of the floor in reach")
+            assert "--yes" in error["hint"]
         status = outsider.ask_status()
         assert (status["state"], status["coverage"]["covered"]) == ("covering", 12)
-        assert command(outsider, name, order, discard=True)["coverage"]["covered"] == 1
-        assert [heard.json()["command"] for heard in taken.heard] == [name]
+        assert command(outsider, "reset", discard=True)["coverage"]["covered"] == 1
+        assert [heard.json()["command"] for heard in taken.heard] == ["reset"]
 
 
 def test_a_keep_out_before_a_map_forgets_nothing_in_the_ledger(tmp_path):

@@ -16,7 +16,7 @@ from tests.daemon.test_mission import planned
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import WALL, fill, lanes, map_bytes, pose_bytes, room
-from tests.support.waiting import meanwhile
+from tests.support.waiting import meanwhile, until
 
 PREFIX = "fasaco/@v1/robot/"
 ROOM = room(4.0, 3.0)
@@ -33,9 +33,9 @@ def program(endpoint, *, stamps=True):
         yield opened
 
 
-def in_turn(one, other, name, payloads):
+def in_turn(one, other, name, payloads, turns=TURNS):
     """Publish, the two in turn."""
-    for turn in range(TURNS):
+    for turn in range(turns):
         (one, other)[turn % 2].put(PREFIX + name, payloads[turn % 2])
         time.sleep(PERIOD_S)
 
@@ -46,6 +46,10 @@ def has_two(status):
 
 def text_of(status):
     return next(each["text"] for each in status["troubles"] if each["code"] == "two_publishers")
+
+
+def is_warned(examined, of):
+    return examined.level is Level.WARN and of in examined.found
 
 
 def counting(one, other):
@@ -63,16 +67,18 @@ def test_two_publishers_of_maps_do_not_alternate_the_path(tmp_path):
         one.put(PREFIX + "map", map_bytes(ROOM))
         outsider.put("pose", pose_bytes(*lanes(1)[0]))
         paths.wait(lambda heard: len(planned(heard)[0]) > 0)
-        in_turn(one, other, "map", (map_bytes(ROOM, 2), map_bytes(WALLED, 3)))
+        maps = map_bytes(ROOM, 2), map_bytes(WALLED, 3)
+        in_turn(one, other, "map", maps)
         status = outsider.wait_status(has_two)
         assert status["state"] == "covering"
         assert text_of(status) == f"maps come from two publishers: {counting(one, other)}"
         reasons = [json.loads(heard.attachment)["reason"] for heard in paths.heard]
         assert not [reason for reason in reasons if reason.startswith("map:")]
         bus = BusConfig(listen=(daemon.endpoint,))
-        examined = session.peers(CheckContext(DaemonConfig(bus=bus)))
-        assert examined.level is Level.WARN
-        assert counting(one, other) in examined.found
+        context = CheckContext(DaemonConfig(bus=bus))
+        # On a busy machine it may have no answer in time, and two that are silent are none.
+        with meanwhile(lambda: in_turn(one, other, "map", maps, 2), PERIOD_S):
+            until(lambda: is_warned(session.peers(context), counting(one, other)))
         # The first ends: the other counts from its next map on.
         one.close()
         with meanwhile(lambda: other.put(PREFIX + "map", map_bytes(WALLED, 99)), 1.0):

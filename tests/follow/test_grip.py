@@ -51,8 +51,8 @@ class Base:
         return self
 
 
-@pytest.mark.parametrize("hz", [2.0, 5.0, 20.0])
-@pytest.mark.parametrize("noise_m", [0.0, 0.01, 0.02, 0.04, 0.08])
+@pytest.mark.parametrize("hz", [2.0, 20.0])
+@pytest.mark.parametrize("noise_m", [0.0, 0.02, 0.08])
 @pytest.mark.parametrize("drift_m_s", [0.0, 0.01])
 def test_scatter_and_drift_of_poses_are_no_progress(noise_m, hz, drift_m_s):
     bases = [Base(AHEAD, 0.0, noise_m, hz, drift_m_s, seed).run(120.0) for seed in range(4)]

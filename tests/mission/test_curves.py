@@ -24,7 +24,7 @@ from fasaco_edge.planners.curves import STEP_M
 from tests.mission.curve_base import CONFIG, RADIUS_M, TOOL_M, TURN_M, CurvedMission, configured
 from tests.simulation.rooms import building
 
-ROOM = building(4.5, 3.5)
+ROOM, SWEPT_ROOM = building(4.5, 3.5), building(3.6, 2.8)
 START = Pose2D(1.0, 1.0)
 # What a robot has of its path at least before the next one comes [m].
 AHEAD_M = 2.0
@@ -33,14 +33,15 @@ AHEAD_M = 2.0
 @pytest.fixture(scope="module")
 def driven():
     """A mission with reversing, until it is done."""
-    run = CurvedMission(ROOM, START)
+    run = CurvedMission(SWEPT_ROOM, START)
     run.run(600.0)
     return run
 
 
 def judged(run):
     """The floor that the planner holds for reachable, and what was swept of it."""
-    return judge_floor(ROOM, run.loop.trail, SweepingRobot(TOOL_M, RADIUS_M), stands_at=(1.0, 1.0))
+    robot = SweepingRobot(TOOL_M, RADIUS_M)
+    return judge_floor(SWEPT_ROOM, run.loop.trail, robot, stands_at=(1.0, 1.0))
 
 
 def test_a_mission_sweeps_a_room_without_a_turn_on_the_spot(driven):
@@ -49,7 +50,7 @@ def test_a_mission_sweeps_a_room_without_a_turn_on_the_spot(driven):
     assert set(driven.standing_s) <= {Following.EMPTY_PATH}
     assert judged(driven).figures.swept_share > 0.94
     hull = SweepingRobot(TOOL_M, CONFIG.hull_radius_m)
-    assert judge_floor(ROOM, driven.loop.trail, hull).figures.illegal_share == 0.0
+    assert judge_floor(SWEPT_ROOM, driven.loop.trail, hull).figures.illegal_share == 0.0
 
 
 def test_a_path_is_a_curve_at_its_beginning(driven):
@@ -78,8 +79,8 @@ def test_it_drives_backward_but_not_forward_only(driven):
         return -sum(way for way in along if way < 0.0)
 
     assert backward_m(driven) > 1.0
-    ahead = CurvedMission(ROOM, START, reverses=False)
-    ahead.run(240.0)
+    ahead = CurvedMission(SWEPT_ROOM, START, reverses=False)
+    ahead.run(140.0)
     assert backward_m(ahead) == 0.0
     assert ahead.loop.world.collisions == 0
     assert judged(ahead).figures.swept_share > 0.8

@@ -338,7 +338,7 @@ def test_the_same_events_give_the_same_line():
     assert trails[0] == trails[1]
 
 
-@pytest.mark.parametrize("chunk", [64, 4, 1])
+@pytest.mark.parametrize("chunk", [64, 1])
 def test_maps_that_grow_and_change_on_the_way(chunk, monkeypatch):
     """In small chunks of pixels the floor's raster moves with most of them."""
     monkeypatch.setattr(floor_map, "CHUNK", chunk)

@@ -7,27 +7,26 @@ import pytest
 from fasaco_edge.daemon.loop.mission_reports import floor_report
 from fasaco_edge.mission.core.events import State
 from tests.mission.offset_base import bare_room, driven
-from tests.mission.test_swept_truth import flat
+from tests.mission.test_swept_truth import small_flat
 
 # The most that a claim may be above the truth.
 CLAIM = 0.02
 
 
-@pytest.mark.parametrize("left_m", [0.05, 0.12])
-def test_floor_beside_a_base_off_its_line_is_not_called_swept(left_m):
-    outcome = driven(bare_room(), left_m=left_m)
+def test_floor_beside_a_base_off_its_line_is_not_called_swept():
+    outcome = driven(bare_room(), left_m=0.12)
     assert outcome.mission.state is State.DONE
     assert outcome.claimed <= outcome.swept + CLAIM
     assert outcome.claimed <= outcome.known + CLAIM
 
 
 def test_floor_left_by_the_base_is_swept_later_or_reported():
-    outcome = driven(flat(), left_m=0.12, poses_hz=20.0, tick_s=0.05)
+    outcome = driven(small_flat(), left_m=0.12, poses_hz=20.0, tick_s=0.05)
     assert outcome.mission.state is State.DONE
     # 85 % without; of a twentieth it is only told.
     assert outcome.swept > 0.95
     left_m2 = sum(left.m2 for left in floor_report(outcome.mission).left)
-    assert 0.0 < left_m2 < 0.6
+    assert 0.0 < left_m2 < 0.3
     # Along walls to its right it cannot come nearer, but a lane the other way can.
     outcome = driven(bare_room(), left_m=0.08, poses_hz=20.0, tick_s=0.05)
     told = floor_report(outcome.mission)
@@ -59,9 +58,8 @@ def test_sparse_poses_are_joined_where_the_robot_can_have_driven(poses_hz, speed
     assert outcome.claimed <= outcome.known + CLAIM
 
 
-@pytest.mark.parametrize("noise_m", [0.01, 0.02])
-def test_noise_makes_no_more_be_claimed_and_takes_no_more_time(noise_m):
-    outcome = driven(bare_room(), noise_m=noise_m)
+def test_noise_makes_no_more_be_claimed_and_takes_no_more_time():
+    outcome = driven(bare_room(), noise_m=0.02)
     assert outcome.mission.state is State.DONE
     assert outcome.claimed <= outcome.swept + CLAIM
     assert outcome.seconds < 160.0
@@ -73,7 +71,6 @@ def test_noise_makes_no_more_be_claimed_and_takes_no_more_time(noise_m):
         (0.08, 0.0, "drives 8 cm left of its line"),
         (-0.05, 0.02, "drives 5 cm right of its line"),
         (0.02, 0.02, None),
-        (0.0, 0.02, None),
     ],
 )
 def test_a_base_that_drives_beside_its_line_is_reported(left_m, noise_m, said):

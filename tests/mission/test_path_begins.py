@@ -31,7 +31,7 @@ def distance_to_walls(pixels, points):
     return 0.05 * np.hypot(dx.clip(0), dy.clip(0)).min(axis=1)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_wherever_the_robot_is_pushed_to_the_path_begins_there(seed):
     rng = np.random.default_rng(seed)
     pixels = room_with_box()
@@ -66,7 +66,7 @@ def test_wherever_the_robot_is_pushed_to_the_path_begins_there(seed):
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
 
 
-@pytest.mark.parametrize("after_s", [5.0, 9.3, 17.7, 33.1, 40.2])
+@pytest.mark.parametrize("after_s", [5.0, 17.7, 40.2])
 def test_on_another_raster_the_path_begins_at_the_robot(after_s):
     """Not as far along its first edge as the robot was on the line before."""
     robot = LineRobot(room_with_box(), (0.75, 0.75))

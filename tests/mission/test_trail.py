@@ -22,7 +22,6 @@ ROOMS = (
     "..........",
     "..........",
 )
-UNSEEN = ("??????",) * 6
 TAU0 = np.float32(CONFIG.trail.tau0)
 
 

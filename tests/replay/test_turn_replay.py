@@ -87,14 +87,15 @@ def test_every_decision_is_as_it_was(which, request):
     replay, record, steps = played(samples)
     assert record.gap == ""
     assert replay.difference is None
-    assert replay.turns == record.turns > 50
+    # A busy daemon takes several poses in a turn.
+    assert replay.turns == record.turns > 20
     paths = [step.as_recorded for step in steps if step.decision.path is not None]
     assert all(paths)
     recorded = read_run(samples).paths.values()
     # A mission that drives when its daemon ends has its path withdrawn after the last step.
     assert len(paths) == len([reason for reason in recorded if reason != "the daemon ends"])
     assert len(paths) == recording.status["path"]["revision"]
-    assert replay.plans > 2
+    assert replay.plans > 1
     assert replay.mission.state == recording.status["state"]
     assert bool(record.beginning.ledger) == (which == "recording")
     told = [event for event in replay.mission.held() if isinstance(event, PriorityReceived)]

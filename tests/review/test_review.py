@@ -83,8 +83,8 @@ def test_shares_are_reached_when_they_were(told, review, recording):
         for at, status in recording.statuses
         if status["coverage"]
     ]
-    # The share is drawn every two seconds; a slow computer brings statuses late.
-    late_s = 0.3 + max(np.diff([at for at, _ in counts]))
+    # The share is drawn every two seconds.
+    late_s = _late_s(recording)
     for percent, at_s in told["reached_s"].items():
         needed = -(-told["coverable_cells"] * int(percent) // 100)
         assert all(count < needed for at, count in counts if at < at_s - 2.0 - late_s)
@@ -153,15 +153,16 @@ def test_what_a_process_used_begins_at_nothing_with_each_of_them():
 def test_states_are_those_heard(told, review, recording):
     names = [name for name, _ in _groups(status["state"] for _, status in recording.statuses)]
     mine = [span.name for span in review.states]
-    # The recorder may have joined a little later than the robot.
-    assert mine == names[-len(mine) :]
+    # The recorder joins later than the robot, and one that is busy takes the newest status alone.
+    left = iter(names)
+    assert all(name in left for name in mine), (mine, names)
     assert {"paused", "covering", "done"} <= set(mine)
     entered = {}
     for at, status in recording.statuses:
         entered.setdefault(status["state"], at)
     began = _began(recording, review)
     paused = next(span for span in review.states if span.name == "paused")
-    assert paused.begin_s == pytest.approx(entered["paused"] - began, abs=0.3)
+    assert paused.begin_s == pytest.approx(entered["paused"] - began, abs=_late_s(recording))
     assert sum(told["states"].values()) <= told["duration_s"] + 0.01
 
 
@@ -270,6 +271,11 @@ def _began(recording, review):
     done = next(at for at, status in recording.statuses if status["state"] == "done")
     span = next(span for span in review.states if span.name == "done")
     return done - span.begin_s
+
+
+def _late_s(recording):
+    """How late a status may come: a slow computer brings them late."""
+    return 0.3 + max(np.diff([at for at, _ in recording.statuses]))
 
 
 def _groups(names):

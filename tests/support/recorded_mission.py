@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.mailbox import LatestSlot
@@ -147,6 +148,7 @@ class MappingRobot:
         self.statuses: list[tuple[float, dict]] = []
         self.notes: list[tuple[float, dict]] = []
         self._sent: OccupancyGrid | None = None
+        self._told_at = math.nan, math.nan
         bus.listen(keys, topics.PATH, self._take_path)
         bus.listen(keys, topics.STATUS, self._hear)
 
@@ -175,7 +177,15 @@ class MappingRobot:
             due += tick_s
             time.sleep(max(due - time.monotonic(), 0.0))
         # The last path, which tells the robot to stop, is to be recorded too, and its turn.
-        time.sleep(0.8)
+        self.wait(self._is_up_to_date)
+        heard = len(self.statuses)
+        until(lambda: len(self.statuses) > heard, TIMEOUT_S)
+
+    def _is_up_to_date(self, status: dict) -> bool:
+        """Tell whether a status counts the last pose, and no plan is under way."""
+        pose = status["pose"] or {}
+        here = pytest.approx(self._told_at, abs=1e-3)
+        return (pose.get("x"), pose.get("y")) == here and not status["plan"]["planning"]
 
     def _is_time(self) -> bool:
         """Tell whether the next command is due; one that waits for its first path gets none."""
@@ -202,6 +212,7 @@ class MappingRobot:
             self._publish_map(self._believed(emission.map))
         if emission.pose is not None:
             pose = encode_pose_stamped(emission.pose)
+            self._told_at = emission.pose.pose.x, emission.pose.pose.y
             self._poses.put(pose)
             if self._broken_sent < self._broken_poses:
                 self._broken_sent += 1

@@ -12,6 +12,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.support.outsider import TIMEOUT_S
+
 
 class Manager:
     """Listens on $NOTIFY_SOCKET, all the time."""
@@ -33,7 +35,7 @@ class Manager:
         time.sleep(seconds)
         return self.said[before:].count(word)
 
-    def wait(self, word: str, seconds: float = 30.0) -> str:
+    def wait(self, word: str, seconds: float = TIMEOUT_S) -> str:
         """Return what is said next that begins with ``word``."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
