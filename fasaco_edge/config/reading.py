@@ -217,6 +217,9 @@ def read_text(path: Path) -> ConfigText:
     """
     try:
         node, document = compose(read_bounded(path))
+    except FileNotFoundError as error:
+        hint = f"name another file, or write this one: fasaco-edge init {path}"
+        raise BadConfiguration(str(error.strerror), hint=hint) from error
     except OSError as error:
         raise BadConfiguration(str(error.strerror)) from error
     except PlainYamlError as error:

@@ -184,7 +184,11 @@ def test_people_read_a_line_for_each(tmp_path):
     assert len(said) == len(TOLD)
     missing = fasaco_edge("check-config", tmp_path / "none.yaml")
     assert missing.code == 78
-    assert missing.out == f"{tmp_path / 'none.yaml'}: No such file or directory\n"
+    file = tmp_path / "none.yaml"
+    assert missing.out == (
+        f"{file}: No such file or directory\n"
+        f"  -> name another file, or write this one: fasaco-edge init {file}\n"
+    )
     good = fasaco_edge("check-config", EXAMPLE)
     assert (good.code, good.out) == (0, f"{EXAMPLE}: in order\n")
 
