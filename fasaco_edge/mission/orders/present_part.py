@@ -27,7 +27,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 # robot may stop short of its path's end, with the last cell out of the tool's reach.
 MAX_IN_VAIN = 3
 OTHERS_SEE = "looks for its part, which others see"
-MAP_ENDS = "looks on: the map ends at floor that was covered before a restart"
+MAP_ENDS = "looks where the map ends: the floor there was covered before a restart"
 
 
 class PresentPart(OrderReach):
