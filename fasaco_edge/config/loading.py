@@ -41,8 +41,7 @@ def load_config(path: Path | None) -> DaemonConfig:
     where = f"{path}, line {first.line}" if first.line else str(path)
     hint = first.error.hint
     if more:
-        others = f"the {len(more)} others" if len(more) > 1 else "another one"
-        hint += f"; fasaco-edge check-config {path} shows {others}"
+        hint += f"; there are more: fasaco-edge check-config {path}"
     raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
 
 

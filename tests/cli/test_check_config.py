@@ -193,14 +193,15 @@ def test_people_read_a_line_for_each(tmp_path):
     assert (good.code, good.out) == (0, f"{EXAMPLE}: in order\n")
 
 
-def test_the_daemon_names_the_first_fault_and_counts_the_others(tmp_path):
+def test_the_daemon_names_the_first_fault_and_where_the_others_are(tmp_path):
     file = tmp_path / "config.yaml"
     file.write_text(WRONG)
     with pytest.raises(BadConfiguration) as refused:
         load_config(file)
     # What stands twice comes first: what the rest says depends on which of the two is meant.
     assert str(refused.value).startswith(f"{file}, line 12: planner.ants: is given twice")
-    assert refused.value.hint.endswith(f"check-config {file} shows the 9 others")
+    # It does not count them: check-config also reads the keep-out mask.
+    assert refused.value.hint.endswith(f"; there are more: fasaco-edge check-config {file}")
 
 
 def test_the_keep_out_mask_is_read_as_the_daemon_reads_it(check, tmp_path):
