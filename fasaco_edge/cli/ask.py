@@ -171,7 +171,9 @@ def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
         stage = phrases.stage(mission)
         rows.append(("mission", f"{stage}, {began}"))
     if answer.coverage is not None:
-        rows.append(("covered", phrases.covered(answer.coverage)))
+        # Zones have counts of their own, below.
+        of_all = " of all floor" if mission.zones else ""
+        rows.append(("covered", phrases.covered(answer.coverage) + of_all))
     if answer.floor is not None:
         rows.append(("floor swept", phrases.swept(answer.floor)))
     if mission.keep_out:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from fasaco_edge.cli.geojson import SUFFIX, is_geojson, order_of
 from fasaco_edge.config.reading import ConfigText, keys_and_lines
 from fasaco_edge.errors import OrderError
 from fasaco_edge.host.plain_yaml import PlainYamlError, compose, load, read_bounded
+from fasaco_edge.mission.orders.commands import order_faults
 from fasaco_edge.mission.orders.order import MissionOrder, read_order
 
 # A member at the start of an error's text, and one in it that is unknown.
@@ -24,15 +26,23 @@ def read_order_file(path: Path) -> MissionOrder:
     """
     text = _text(path)
     origins: dict[str, str] = {}
+    faults: list[OrderError] = []
     try:
         document = _parsed(path, text)
         if is_geojson(document):
-            document, origins = order_of(document)
-        return read_order(document)
+            faults = list(_faults_of_features(document))
+            document, origins = order_of(document) if not faults else ({}, origins)
+        faults = faults or order_faults(document)
+        if not faults:
+            return read_order(document)
     except OrderError as error:
-        said = _at_origin(str(error), origins)
-        where = f"{path}, line {line}" if (line := _line_of(said, text)) else str(path)
-        raise OrderError(f"{where}: {said}", hint=error.hint) from error
+        faults = [error]
+    told = []
+    for said in (_at_origin(str(fault), origins) for fault in faults):
+        line = _line_of(said, text)
+        told.append(f"{path}, line {line}: {said}" if line else f"{path}: {said}")
+    hints = dict.fromkeys(fault.hint for fault in faults)
+    raise OrderError("\n".join(told), hint="; ".join(hints))
 
 
 def _text(path: Path) -> str:
@@ -53,6 +63,17 @@ def _parsed(path: Path, text: str) -> object:
         raise OrderError("nested too deeply") from error
     except ValueError as error:
         raise OrderError(f"neither plain YAML nor JSON: {error}") from error
+
+
+def _faults_of_features(document: dict[str, object]) -> Iterator[OrderError]:
+    """Yield what is wrong with each feature of a collection alone."""
+    features = document.get("features")
+    for index, feature in enumerate(features if isinstance(features, list) else ()):
+        try:
+            order_of({"type": document["type"], "features": [feature]})
+        except OrderError as error:
+            text = str(error).replace("features[0]", f"features[{index}]", 1)
+            yield OrderError(text, hint=error.hint)
 
 
 def _at_origin(said: str, origins: dict[str, str]) -> str:

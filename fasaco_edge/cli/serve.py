@@ -184,7 +184,8 @@ def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> 
     if tokens is not None:
         print(f"page at {page}; the tokens are in {one_line(str(tokens))}")
         if sys.stdout.isatty():
-            for role, token in guard.tokens:
+            # One of each role; a recording has viewers alone, and the first token is theirs.
+            for role, token in dict(reversed(guard.tokens)).items():
                 print(f"  {role}: {page}#{token}")
     else:
         print(

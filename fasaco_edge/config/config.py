@@ -17,12 +17,10 @@ from fasaco_edge.config.reading import Section
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import SecurityConfig
-from fasaco_edge.errors import BadConfiguration, OrderError
+from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.host.addresses import Address, read_address
 from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
-from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
-from fasaco_edge.mission.orders.order import OrderDocument, ZoneDocument, order_of
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.wire import schemas
@@ -153,21 +151,6 @@ class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
     """
 
     state_dir: str = ""
-
-    def check_zones(self) -> None:
-        """Check the standing zones as those of an order.
-
-        Raises:
-            BadConfiguration: a zone is wrong, two have one name, or an inline mask is not valid.
-        """
-        if self.keep_out_mask.startswith(INLINE):
-            mask_polygons(self.keep_out_mask)
-        zones = [ZoneDocument(name=zone.name, polygon=zone.polygon) for zone in self.zones]
-        keep_out = [list(polygon) for polygon in self.keep_out]
-        try:
-            order_of(OrderDocument(zones=zones, keep_out=keep_out))
-        except OrderError as error:
-            raise BadConfiguration(f"mission.{error}") from error
 
     def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
         """Return the folder of the coverage ledger.

@@ -22,7 +22,8 @@ from fasaco_edge.config.reading import (
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import security_faults
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.mission.orders.mask import INLINE, inline_mask
+from fasaco_edge.mission.orders.commands import order_faults
+from fasaco_edge.mission.orders.mask import INLINE, inline_mask, mask_polygons
 from fasaco_edge.wire.keys import Keys
 
 
@@ -40,8 +41,7 @@ def load_config(path: Path | None) -> DaemonConfig:
     where = f"{path}, line {first.line}" if first.line else str(path)
     hint = first.error.hint
     if more:
-        others = f"the {len(more)} others" if len(more) > 1 else "another one"
-        hint += f"; fasaco-edge check-config {path} shows {others}"
+        hint += f"; there are more: fasaco-edge check-config {path}"
     raise type(first.error)(f"{where}: {first.error}", hint=hint) from first.error
 
 
@@ -81,7 +81,7 @@ def inspect_config(
 ) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
     """Read a YAML file; return the configuration, or None and all faults.
 
-    Whether values fit together is checked of all sections that no fault of a value concerns.
+    Whether values fit together is checked where no fault of a value concerns them.
 
     Args:
         path: the file; None for the defaults.
@@ -94,16 +94,23 @@ def inspect_config(
     except BadConfiguration as error:
         return None, (Fault("", error),)
     faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
-    unclear = {each for fault in faults for each in _sections_in(f"{fault.key} {fault.error}")}
     document = text.document if isinstance(text.document, dict) else {}
-    sound = {name: document[name] for name in SECTIONS if name in document and name not in unclear}
+    sound = _sound(document, {fault.key for fault in faults})
     config = msgspec.convert(with_credentials(without_removed(sound)), DaemonConfig)
+    unclear = {key for fault in faults for key in _keys_in(f"{fault.key} {fault.error}")}
     misfits = [*_misfits(config), *_refused("", lambda: check(config))]
-    faults += [
-        Fault(_named_in(error), error)
+    found = [
+        error
         for error in misfits
-        if not unclear.intersection(_sections_in(str(error)))
+        if not any(_concern(key, each) for key in _keys_in(str(error)) for each in unclear)
     ]
+    known = {fault.key for fault in faults}
+    found += [
+        error
+        for error in _zone_faults(document)
+        if not any(_concern(_named_in(error), each) for each in known)
+    ]
+    faults += [Fault(_named_in(error), error) for error in found]
     if not faults:
         return config, ()
     return None, tuple(
@@ -114,9 +121,40 @@ def inspect_config(
 SECTIONS = tuple(field.encode_name for field in structs.fields(DaemonConfig))
 
 
-def _sections_in(text: str) -> Iterator[str]:
-    """Yield the sections that a text names."""
-    return (name for name in SECTIONS if re.search(rf"\b{name}\b", text))
+def _sound(document: dict[str, object], faulty: set[str]) -> dict[str, object]:
+    """Return the sections of a document without their faulty keys, as far as they stand so."""
+    left_out = {".".join(re.split(r"[.\[]", key)[:2]) for key in faulty}
+    sound = {
+        name: {key: value for key, value in part.items() if f"{name}.{key}" not in left_out}
+        for name, part in document.items()
+        if name in SECTIONS and name not in left_out and isinstance(part, dict)
+    }
+    return {
+        name: part
+        for name, part in sound.items()
+        if not any(section_faults(DaemonConfig, {name: part}))
+    }
+
+
+def _zone_faults(document: dict[str, object]) -> Iterator[BadConfiguration]:
+    """Yield what is wrong with the standing zones and keep-outs, as with those of an order."""
+    mission = document.get("mission")
+    given = mission if isinstance(mission, dict) else {}
+    order = {name: given[name] for name in ("zones", "keep_out") if name in given}
+    for error in order_faults(order):
+        yield BadConfiguration(f"mission.{error}")
+
+
+def _keys_in(text: str) -> list[str]:
+    """Return the keys that a text names, and the sections."""
+    found = re.findall(r"[a-z]\w*(?:\.[a-z]\w*|\[\d+\])*", text)
+    return [key for key in found if re.split(r"[.\[]", key)[0] in SECTIONS]
+
+
+def _concern(named: str, faulty: str) -> bool:
+    """Return whether a key is a faulty one, is in it, or, unless a section, has it in it."""
+    is_in = f"{named}.".startswith((f"{faulty}.", f"{faulty}["))
+    return is_in or ("." in named and faulty.startswith((f"{named}.", f"{named}[")))
 
 
 def _named_in(error: BadConfiguration) -> str:
@@ -174,8 +212,8 @@ def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
                 f"{footprint.radius():.3g} m, got {radius_m:g}"
             )
     yield from _refused("planner.", config.planner.colony)
-    yield from _refused("", config.mission.check_zones)
     mask = config.mission.keep_out_mask
+    yield from _refused("", lambda: mask_polygons(mask) if mask.startswith(INLINE) else None)
     if config.mission.keep_out_topic and mask and not mask.startswith(INLINE):
         yield BadConfiguration(
             f"mission.keep_out_mask must be left out beside mission.keep_out_topic, got {mask!r}"

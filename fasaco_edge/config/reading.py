@@ -83,8 +83,8 @@ def section_faults(
             yield from section_faults(section, value, path, root)
         elif unknown := tuple(_unknown_keys(fields[name].type, value, path, root)):
             yield from unknown
-        elif fault := _value_fault(fields[name].type, value, path):
-            yield fault
+        else:
+            yield from _value_faults(fields[name].type, value, path)
     for name, field in fields.items():
         if field.required and name not in document:
             yield _fault(key, f"{key}: object missing required field {name}")
@@ -130,12 +130,23 @@ def _unknown_keys(kind: object, value: object, key: str, root: type[Section]) ->
                 yield _fault(path, f"unknown key {path}{_meant(name, place, names, root)}")
 
 
-def _value_fault(kind: object, value: object, key: str) -> Fault | None:
+def _value_faults(kind: object, value: object, key: str) -> Iterator[Fault]:
+    """Yield what is wrong with a value; of a list, with each item alone."""
+    whole = _value_fault(kind, value, key)
+    if whole is None:
+        return
+    items = enumerate(value if type(value) is list else ())
+    alone = [_value_fault(kind, [item], key, str(at)) for at, item in items]
+    yield from [fault for fault in alone if fault and fault.key != key] or [whole]
+
+
+def _value_fault(kind: object, value: object, key: str, place: str = "") -> Fault | None:
     wanted: Any = kind
     try:
         msgspec.convert(value, wanted)
     except msgspec.ValidationError as error:
         at, expected, value = misfit(str(error), value)
+        at = at.replace("[0]", f"[{place}]", 1) if place else at
         expected = _choices(kind) or expected
         if expected == "expected str":
             expected += ", in quotes"  # YAML 1.1 takes 8:1 for a number
@@ -206,6 +217,9 @@ def read_text(path: Path) -> ConfigText:
     """
     try:
         node, document = compose(read_bounded(path))
+    except FileNotFoundError as error:
+        hint = f"name another file, or write this one: fasaco-edge init {path}"
+        raise BadConfiguration(str(error.strerror), hint=hint) from error
     except OSError as error:
         raise BadConfiguration(str(error.strerror)) from error
     except PlainYamlError as error:

@@ -198,7 +198,7 @@ def security_faults(
         if beyond and not open_to_everyone:
             yield OpenToEveryone(
                 f"bus.listen: {beyond[0]} can be reached from other computers: remote access "
-                "requires authentication"
+                "requires authentication (bus.security)"
             )
         named = [role for role, who in security.names().items() if who]
         if named:

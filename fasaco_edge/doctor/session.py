@@ -167,7 +167,8 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     if lacking:
         keys_lacking = ", ".join(key for kind in lacking for key in wanted[kind])
         found = f"{found}; it has no {' and '.join(lacking)}"
-        to_do = f"publish on {keys_lacking}"
+        come = all(received[kind] for kind in lacking)
+        to_do = f"{'correct what comes' if come else 'publish'} on {keys_lacking}"
         if "map" in lacking and elsewhere.places():
             to_do += (
                 ", or use a map found elsewhere: robot.name, bus.base, ros2.domain and "

@@ -41,7 +41,7 @@ from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
 from fasaco_edge.host.resources import folder
-from fasaco_edge.text import shown
+from fasaco_edge.text import nearest, shown
 
 LOG = logging.getLogger(__name__)
 
@@ -283,7 +283,8 @@ def _load_yaml(path: Path) -> dict[str, object]:
         raise MapFileError(f"{path}: not readable as plain YAML: {error}", hint=_OF_YAML) from error
     if not isinstance(loaded, dict):
         raise MapFileError(
-            f"{path}: expected a mapping of keys, got {type(loaded).__name__}", hint=_OF_YAML
+            f"{path}: expected keys and values, got {shown(loaded) if loaded else 'nothing'}",
+            hint=_OF_YAML,
         )
     return loaded
 
@@ -295,6 +296,8 @@ class _YamlKeys:
 
     def error(self, key: str, expected: str) -> MapFileError:
         got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"
+        if key not in self.values and (near := nearest(key, [*map(str, self.values)])):
+            got += f"; did you mean it by {near[0]}?"
         hint = _OF_KEYS.get(key, f"correct {key} in this file")
         return MapFileError(f"{self.path}: {key} must be {expected}; {got}", hint=hint)
 

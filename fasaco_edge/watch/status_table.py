@@ -58,9 +58,8 @@ def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet
         ("trouble", _text(f"{what}: {to_do}", "red")) for what, to_do in phrases.troubles(status)
     ]
     if status.coverage is not None:
-        rows += _coverage(
-            status.coverage, glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
-        )
+        bar = glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
+        rows += _coverage(status.coverage, bar, " of all floor" if status.mission.zones else "")
     if status.path is not None:
         rows += _path(status.path, to_go)
     if status.coverage is not None and status.coverage.recovered:
@@ -81,9 +80,9 @@ def state_colour(state: str) -> str:
     return STATE_COLOURS.get(state, "bright_black")
 
 
-def _coverage(coverage: CoverageReport, bar: Text) -> list[Row]:
+def _coverage(coverage: CoverageReport, bar: Text, of_all: str) -> list[Row]:
     share = Text(phrases.percent(coverage.fraction), "bold")
-    share.append(f", {coverage.covered} of {coverage.coverable} cells", "not bold")
+    share.append(f", {coverage.covered} of {coverage.coverable} cells{of_all}", "not bold")
     return [("covered", share), ("", bar)]
 
 

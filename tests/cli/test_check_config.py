@@ -92,13 +92,28 @@ def test_what_does_not_go_together_is_told_at_once(check):
 
 def test_one_round_names_what_is_known_of_both_kinds(check):
     """A value may be wrong, and others not go together, but not those that the first concerns."""
-    wrong = "robot: {radius: 0.2, name: a/b}\nplanner: {seed: x}\nbattery: {reserv: 0.2}\n"
+    wrong = "robot: {radius: 0.2, name: a/b}\nplanner: {seed: x}\nbattery: {low: 2, enough: 0.2}\n"
     apart = "map: {free_at_most: 70}\nbus: {base: /x}\nmission: {keep_out_mask: none.yaml}\n"
     code, told = check(wrong + apart)
     assert code == 78
     assert [(fault["line"], fault["key"]) for fault in told["faults"]] == [
-        *((1, "robot.radius"), (2, "planner.seed"), (3, "battery.reserv")),
+        *((1, "robot.radius"), (1, "robot.name"), (2, "planner.seed"), (3, "battery.low")),
         *((4, "map.free_at_most"), (5, "bus.base"), (6, "mission.keep_out_mask")),
+    ]
+
+
+def test_one_round_names_what_is_wrong_with_every_zone(check):
+    square = "polygon: [[0, 0], [4, 0], [4, 3]]"
+    zones = ["{name: hall, polygon: [[0, 0], [4, 0]]}", f"{{name: hall, {square}, passes: 2}}"]
+    zones += ["{name: yard, polygon: 7}", "{name: bath, polygon: [[0, 0], [4, 4], [4, 0], [0, 4]]}"]
+    text = "mission:\n  keep_out: [[[1, 1], [2, 1]]]\n  dock: {x_m: 1}\n  zones:\n    - "
+    code, told = check(text + "\n    - ".join(zones))
+    assert code == 78
+    assert [(fault["line"], fault["key"]) for fault in told["faults"]] == [
+        *((2, "mission.keep_out[0]"), (3, "mission.dock")),
+        *((5, "mission.zones[0].polygon"), (6, "mission.zones[1].passes")),
+        *((6, "mission.zones[1].name"), (7, "mission.zones[2].polygon")),
+        (8, "mission.zones[3].polygon"),
     ]
 
 
@@ -169,19 +184,24 @@ def test_people_read_a_line_for_each(tmp_path):
     assert len(said) == len(TOLD)
     missing = fasaco_edge("check-config", tmp_path / "none.yaml")
     assert missing.code == 78
-    assert missing.out == f"{tmp_path / 'none.yaml'}: No such file or directory\n"
+    file = tmp_path / "none.yaml"
+    assert missing.out == (
+        f"{file}: No such file or directory\n"
+        f"  -> name another file, or write this one: fasaco-edge init {file}\n"
+    )
     good = fasaco_edge("check-config", EXAMPLE)
     assert (good.code, good.out) == (0, f"{EXAMPLE}: in order\n")
 
 
-def test_the_daemon_names_the_first_fault_and_counts_the_others(tmp_path):
+def test_the_daemon_names_the_first_fault_and_where_the_others_are(tmp_path):
     file = tmp_path / "config.yaml"
     file.write_text(WRONG)
     with pytest.raises(BadConfiguration) as refused:
         load_config(file)
     # What stands twice comes first: what the rest says depends on which of the two is meant.
     assert str(refused.value).startswith(f"{file}, line 12: planner.ants: is given twice")
-    assert refused.value.hint.endswith(f"check-config {file} shows the 9 others")
+    # It does not count them: check-config also reads the keep-out mask.
+    assert refused.value.hint.endswith(f"; there are more: fasaco-edge check-config {file}")
 
 
 def test_the_keep_out_mask_is_read_as_the_daemon_reads_it(check, tmp_path):

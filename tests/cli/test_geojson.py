@@ -170,11 +170,40 @@ def test_faults_of_a_drawn_order_have_a_line_and_the_features_name(
     assert str(caught.value).startswith(f"{file}, {said}")
 
 
-def test_a_line_is_given_of_an_order_in_yaml(tmp_path):
-    file = tmp_path / "evening.yaml"
-    file.write_text("zones:\n  - name: hall\n    pases: 2\n")
-    with pytest.raises(OrderError, match=r"yaml, line 3: zones\[0\]: unknown member pases; did"):
+HALL = "zones:\n  - name: hall\n    pases: 2\n"
+BARE = {"type": "Feature", "properties": {}, "geometry": None}
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "places"),
+    [
+        ("a.yaml", HALL, ["line 3: zones[0]: unknown member pases; did you mean passes?"]),
+        (
+            "a.yaml",
+            f"{HALL}    polygon: [[0, 0]]\n  - name: hall\n"
+            "keep_out: [[[1, 1]], 7]\nuntil_min: -3\n",
+            [
+                *("line 3: zones[0]: unknown", "line 4: zones[0].polygon: "),
+                *("line 5: zones[1].name: there is", "line 6: keep_out[0]: "),
+                *("line 6: keep_out[1]: ", "line 7: until_min: "),
+            ],
+        ),
+        (
+            "a.geojson",
+            json.dumps({"type": "FeatureCollection", "features": [BARE, BARE]}),
+            ["line 1: features[0]: ", "line 1: features[1]: "],
+        ),
+    ],
+)
+def test_all_faults_of_an_order_have_their_lines(tmp_path, name, text, places):
+    file = tmp_path / name
+    file.write_text(text)
+    with pytest.raises(OrderError) as caught:
         read_order_file(file)
+    found = str(caught.value).split("\n")
+    assert [line[: len(f"{file}, {place}")] for line, place in zip(found, places, strict=True)] == [
+        f"{file}, {place}" for place in places
+    ]
 
 
 def screen(capsys):

@@ -250,7 +250,7 @@ def test_the_command_line(tmp_path):
         assert told(running, "resume")["mission"]["paused"] is False
         shown = fasaco_edge("mission", "status", "--connect", running.endpoint)
         assert shown.code == 0
-        for word in ("kitchen", "pass 1 of 2", "covering", "keep-out zones"):
+        for word in ("kitchen", "pass 1 of 2", "covering", "keep-out zones", "of all floor"):
             assert word in shown.out
         file = tmp_path / "order.yaml"
         file.write_text("keep_out:\n  - [[1, 1], [2, 1], [2, 2]]\npasses: 3\n")

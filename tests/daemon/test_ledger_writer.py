@@ -301,8 +301,9 @@ def test_floor_alone_is_restored_too(tmp_path):
 
 
 @pytest.mark.parametrize("change", ["fresh", "another tool, no floor"])
-def test_starting_over_keeps_the_keep_outs(tmp_path, change):
+def test_starting_over_keeps_the_keep_outs(tmp_path, caplog, change):
     """Progress is set aside, as it was asked for, or as cells are others; keep-outs are not."""
+    caplog.set_level("INFO")
     vase = KeepOut("vase", ((0.9, 0.9), (2.1, 0.9), (2.1, 2.1)))
     note = replace(OrderState.idle(NO_ORDER), keep_out=(vase,)).to_json()
     begun, again = tmp_path / "begun", tmp_path / "again"
@@ -319,3 +320,4 @@ def test_starting_over_keeps_the_keep_outs(tmp_path, change):
         if folder == begun:
             shutil.copytree(begun, again)  # killed before anything was covered
         writer.disk.close(1.0)
+    assert caplog.text.count("keep-outs that were added stay: vase") == 1

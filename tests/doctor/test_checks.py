@@ -313,9 +313,17 @@ def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
         other = session.peers(at(daemon.endpoint, name="second"))
         assert other.found.startswith("no daemon of robot 'second'; no maps and no poses received")
         assert "other robots: robot" in other.details
+        # What comes and is refused is no lack: the reason says what is wrong with it.
+        with meanwhile(lambda: [outsider.put(kind, b"\0") for kind in ("map", "pose")], 0.1):
+            outsider.wait_status(lambda status: "newest map was refused" in status["reason"])
+            refused = session.peers(context)
+        assert "; the newest map was refused: nav_msgs/msg/OccupancyGrid: " in refused.found
+        assert refused.to_do.startswith("correct what comes on fasaco/@v1/robot/map, ")
         outsider.put("map", map_bytes(pillared_room()))
+        outsider.wait_status(lambda status: "newest pose was refused" in status["reason"])
         outsider.put("pose", pose_bytes(1.0, 1.0))
-        outsider.wait_status(lambda status: status["state"] == "covering")
+        status = outsider.wait_status(lambda status: status["state"] == "covering")
+        assert "refused" not in status["reason"]
         assert session.peers(context).level is Level.OK
         assert session.peers(context).found.startswith("the daemon runs: covering, path ")
 

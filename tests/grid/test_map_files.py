@@ -1,6 +1,7 @@
 """Map files mean what they mean to map_server, and bad ones are named."""
 
 import math
+import re
 import struct
 import subprocess
 import sys
@@ -258,6 +259,23 @@ def test_impossible_values_are_named(tmp_path, changes, expected):
 def test_missing_keys_are_named(tmp_path, key):
     path = described(tmp_path, grey([0]), drop=[key])
     with pytest.raises(MapFileError, match=f"{key} must be .*the key is missing"):
+        read_map(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("resolutoin: 0.05", "the key is missing; did you mean it by resolutoin?"),
+        ("", "expected keys and values, got nothing"),
+        ("- a", "expected keys and values, got ['a']"),
+    ],
+)
+def test_a_file_that_is_nearly_one_is_told_what_it_has(tmp_path, text, said):
+    grey([0]).save(tmp_path / "map.png")
+    path = tmp_path / "map.yaml"
+    rest = {key: value for key, value in DESCRIPTION.items() if key != "resolution"}
+    path.write_text(f"{text}\n{yaml.safe_dump(rest)}" if ":" in text else text)
+    with pytest.raises(MapFileError, match=re.escape(said)):
         read_map(path)
 
 

@@ -191,3 +191,34 @@ def test_a_zone_covered_before_its_door_shut_is_not_named():
     drive.tell(patch("#", at=(0, 4)))
     drive.finish()
     assert drive.mission.reason == "every reachable cell of the zones is covered"
+
+
+@pytest.mark.parametrize("over", [False, True])
+def test_a_mapper_that_begins_anew_hides_no_floor_of_an_order(over):
+    """What is covered in sight is not all: beyond it the map showed more before the restart."""
+    wall = "#" * 14
+    seen = building(wall, "#........     ", wall)
+    whole = building(wall, f"#{'.' * 12}#", wall)
+    drive = Drive((1, 1), MapReceived(whole), pose_at(1, 1))
+    while len(drive.visited) < 9:
+        if drive.request is not None:
+            drive.plan()
+        drive.go()
+    if over:
+        drive.finish()
+    kept, order = drive.mission.snapshot(), drive.mission.order_state
+    again = Drive((1, 1), order_state=order)
+    again.mission.restore_ledger(kept)
+    again.mission.restore_order(order)
+    again.tell(MapReceived(seen), pose_at(1, 1))
+    for _ in range(20):
+        if again.request is not None:
+            again.plan()
+        again.go()
+    # An order that was over is not begun again for this.
+    assert again.cell == ((1, 1) if over else (1, 8))
+    assert (again.mission.state is State.DONE) is over
+    if not over:
+        again.tell(MapReceived(whole))
+        again.finish()
+        assert len(again.visited) == 12

@@ -28,6 +28,7 @@ from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.review.figures import FLOOR, document_of
 from fasaco_edge.review.moments import Span
+from fasaco_edge.review.output import pictures
 from fasaco_edge.review.output.export import FORMATS, export
 from fasaco_edge.review.output.pictures import draw_review
 from fasaco_edge.review.output.rows import charge_rows, screen_rows
@@ -181,6 +182,8 @@ def test_what_was_covered_before_is_not_guessed_at(review):
     told = document(review_of(review.record, data, 0))
     assert told["swept_m2"] is None
     assert "7 cells were covered before" in told["not_recorded"][FLOOR]
+    caption = pictures._caption(review_of(review.record, data, 0))
+    assert "7 cells were covered before: the recording does not show which" in caption
 
 
 def test_a_recorder_in_trouble_is_told(review):

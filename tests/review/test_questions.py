@@ -250,9 +250,8 @@ def test_floor_swept_before_the_recording_is_not_called_left(review):
     assert (spot.why, spot.swept) == ("not known", None)
     assert "when that began, 1.9 m2 had been swept" in spot.words
     assert document_of(late).swept_before_m2 == pytest.approx(1.9, abs=0.05)
-    assert (
-        ", and 1.9 m2 before it began" in dict(screen_rows(late, document_of(late)))["floor swept"]
-    )
+    swept = dict(screen_rows(late, document_of(late)))["floor swept"]
+    assert swept.endswith("by recorded poses, and 1.9 m2 before the recording")
     # The floor of an order before this one is none of it.
     for told in (with_floor(review, 2.0, 0.0, 0.3), with_floor(review, 0.0, 0.3)):
         (spot,) = explain(told, [(0.9, 0.7)])

@@ -37,6 +37,7 @@ from tests.support.waiting import until
 BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="needs chromium")
 PHONE, LAPTOP = (390, 844), (1280, 800)
+READY = "Ready to sweep,false"
 # How many of some places all over the map are covered by something else.
 COVERED = """(() => {
   canvas.scrollIntoView();
@@ -194,7 +195,8 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         until(lambda: tab.js("model.role") == "operator")
         outsider.put("map", map_bytes(HALL))
         outsider.put("pose", pose_bytes(*lanes(1)[0]))
-        until(lambda: tab.js("find('does').textContent") == "Ready to sweep")
+        # What is left out is not shown by itself before there was an order.
+        until(lambda: tab.js("[find('does').textContent, find('left').open].join()") == READY)
         until(lambda: tab.js("Boolean(model.map && model.map.pixel === 0.05 && model.pose)"))
         until(lambda: tab.js("view.scale > 0 && !waiting"))
         tab.js("find('plan').open = true")

@@ -9,6 +9,7 @@ import json
 import re
 import socket
 import stat
+import sys
 import time
 from array import array
 from collections.abc import AsyncIterator, Callable, Iterator
@@ -24,11 +25,12 @@ pytest.importorskip("websockets")
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.cli import serve as cli_serve
 from fasaco_edge.client.feed import Feed
-from fasaco_edge.host.addresses import Address
+from fasaco_edge.host.addresses import Address, read_address
 from fasaco_edge.host.processes import own_mb
 from fasaco_edge.serve import viewer
-from fasaco_edge.serve.guard import Guard
+from fasaco_edge.serve.guard import Guard, guard_for
 from fasaco_edge.serve.live import LiveServer
 from fasaco_edge.serve.messages import message_text
 from fasaco_edge.serve.served_view import ServedView
@@ -259,6 +261,19 @@ def test_a_mission_is_run_from_the_page(tmp_path):
             looker.send(kind="command", id=99, command="reset")
             with pytest.raises(ConnectionClosed):
                 looker.wait("answer", lambda said: said["id"] == 99)
+
+
+def test_a_recording_has_one_link_and_not_the_operators(tmp_path, capsys, monkeypatch):
+    tokens, address = tmp_path / "tokens", read_address("--listen", "127.0.0.1:8465", example=8465)
+    guard = guard_for(address, tokens, [], allow_commands=False)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    links = []
+    for each in (guard, guard.to_look_only()):
+        cli_serve._say(address, each, tokens, secured=False)
+        links.append(set(capsys.readouterr().out.splitlines()[1:]))
+    live, recorded = links
+    assert len(live) == 2
+    assert recorded == {line for line in live if line.startswith("  viewer: ")}
 
 
 def test_tokens_say_who_may_look_and_who_may_command(covering, tmp_path):

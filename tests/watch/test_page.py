@@ -162,9 +162,11 @@ def test_it_says_how_far_an_order_is():
         "return_home": True,
         "unreached": {"cells": 5},
     }
+    assert "of all floor" not in page_of(view, 120, 40)
     tell(view, "status", status(mission=order | more))
     page = page_of(view, 120, 40)
     for said in (
+        "10 of 40 cells of all floor",
         "zone kitchen, pass 1 of 2, cross",
         "kitchen   pass 1 of 2, 25.0 %: 15 of 60 cells",
         "hall      to come",

@@ -37,8 +37,8 @@ def files_of_a_run(paths: Sequence[Path]) -> list[Path]:
         )
     if len(runs) > 1:
         terminal.err().print(
-            f"{len(runs)} runs: this is the newest, {max(runs)}; of another one name its files, as "
-            f"{min(runs)}-*.rrd",
+            f"{len(runs)} runs: this is the newest, {max(runs)}; for another one name its files, "
+            f"such as {min(runs)}-*.rrd",
             soft_wrap=True,
         )
     return [*(runs[max(runs)] if runs else []), *nameless]

@@ -194,6 +194,8 @@ def _writing_on(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerW
         keep_outs = OrderState.from_json(found.note).keep_out if found.note else ()
     if found.ledger is not None or not keep_outs:
         return LedgerWriter(file, found)
+    names = ", ".join(each.name for each in keep_outs)
+    LOG.info("keep-outs that were added stay: %s; `mission keep-out remove` removes one", names)
     note = replace(OrderState.idle(NO_ORDER), keep_out=keep_outs).to_json()
     begun = LedgerSnapshot(cell_m, "", 0, {}, note=note)
     writer = LedgerWriter(file, replace(found, ledger=begun))

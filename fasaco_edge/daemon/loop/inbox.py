@@ -171,6 +171,9 @@ class Inbox:
         max_pixels: of a map or an update.
         maps: further subscriptions that deliver maps.
         fleet: receives messages of a fleet's other robots; None without one.
+
+    Attributes:
+        refused: kinds of samples whose newest one was refused, and why.
     """
 
     def __init__(
@@ -194,6 +197,7 @@ class Inbox:
         if fleet is not None:
             fleet.listen(bus, poster(mailbox, topics.FLEET.name, max_pixels))
         self._returning = ReturningMaps()
+        self.refused: dict[str, str] = {}
         self._publishers = {
             topic.name: OnePublisher(many, topic.one_publisher_s, bus)
             for topic, many in PLURALS.items()
@@ -243,6 +247,7 @@ class Inbox:
             self._returning.note(grid, at)
         map_at = {frame: at for frame, (_, at) in maps.items()}
         faults.extend(map(_size_fault, batch.oversized))
+        self.refused |= {each.kind: str(_size_fault(each)) for each in batch.oversized}
         lost = batch.updates_lost
         for received in batch.samples:
             is_early = received.kind == topics.FLEET.name and not has_mission
@@ -252,7 +257,9 @@ class Inbox:
                 event = self._event(received)
             except FasacoError as error:
                 faults.append(_bare(error))
+                self.refused[received.kind] = str(error)
                 continue
+            self.refused.pop(received.kind, None)
             if isinstance(event, PatchReceived):
                 if received.at < map_at.get(event.patch.frame, float("-inf")):
                     lost = 0  # the lost ones were even older
@@ -286,6 +293,10 @@ class Inbox:
                 faults.append(_bare(error))
             else:
                 maps.setdefault(grid.frame, (grid, received.at))
+        if maps:
+            self.refused.pop("map", None)
+        elif faults:
+            self.refused["map"] = str(faults[0])
         return dict(reversed(maps.items())), faults
 
     def _event(self, received: Received) -> Event | None:

@@ -81,6 +81,7 @@ class Loop:
         self._keeper, self._rooms = keeper, rooms
         self._runner = MissionRunner(config, keeper, ports.mailbox, rooms=rooms.book)
         self._status = StatusBoard(config)
+        self._status.refused = ports.inbox.refused
         self._latency = MapLatency()
         self._begin_messages()
         self._guard = ports.outbox.guard

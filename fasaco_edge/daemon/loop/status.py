@@ -6,6 +6,7 @@ The mission's parts of it are in ``mission_reports``.
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
@@ -45,6 +46,14 @@ if TYPE_CHECKING:
 HEARTBEAT_S = 1.0
 # A mission that has not begun after this time is a trouble [s].
 BEGUN_S = 30.0
+# The kind of samples that a state, or a trouble, lacks.
+LACKING = {
+    "waiting for map": "map",
+    "waiting for pose": "pose",
+    "no_map": "map",
+    "no_pose": "pose",
+    "no_battery": "battery",
+}
 # What to do about troubles that are not the mission's.
 TO_DO = {
     "two_publishers": "stop one of the two",
@@ -61,6 +70,7 @@ class StatusBoard:
         claim: id of this daemon and whether it plans, as in the status.
         yield_reason: reason why another daemon plans instead; "" if this one plans.
         conflicts: which inputs come from two publishers.
+        refused: kinds of samples whose newest one was refused, and why.
     """
 
     def __init__(self, config: DaemonConfig) -> None:
@@ -75,6 +85,7 @@ class StatusBoard:
         self.claim = ClaimReport()
         self.yield_reason = ""
         self.conflicts: list[str] = []
+        self.refused: Mapping[str, str] = {}
         self._config = config
         self.show(config)
         self._started = time.monotonic()
@@ -156,13 +167,23 @@ class StatusBoard:
         if self.yield_reason:
             return "blocked", self.yield_reason
         if (mission := runner.mission) is not None:
-            return str(mission.state), mission.reason
+            return str(mission.state), self._why(mission.state, mission.reason)
         order_state, loading = runner.order_state, runner.loading
         if order_state.paused:
             return "paused", order_state.why_paused
         if order_state.order is None:
             return "idle", order_state.why
-        return ("loading", loading) if loading else ("waiting for map", self.waits)
+        return ("loading", loading) if loading else ("waiting for map", self._why_not_begun)
+
+    @property
+    def _why_not_begun(self) -> str:
+        return self._why("waiting for map", self.waits)
+
+    def _why(self, lacks: str, text: str) -> str:
+        """Return why a state or trouble lasts, with what was wrong with the input it lacks."""
+        kind = LACKING.get(lacks, "")
+        why = self.refused.get(kind)
+        return f"{text}; the newest {kind} was refused: {why}" if why else text
 
     def _troubles(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
         """Return all troubles; only the mission's own troubles make it degraded."""
@@ -184,10 +205,14 @@ class StatusBoard:
             self._unbegun_at = None
             # A mission whose daemon yields takes in nothing more.
             ran = None if self.yield_reason else runner.mission
-            return trouble_reports(ran, now) if ran is not None else ()
+            reports = trouble_reports(ran, now) if ran is not None else ()
+            return tuple(replace(each, text=self._why(each.code, each.text)) for each in reports)
         self._unbegun_at = now if self._unbegun_at is None else self._unbegun_at
         since_s = round(now - self._unbegun_at - BEGUN_S, 1)
-        text, to_do = f"the mission cannot begin: {self.waits}", "publish what it waits for"
+        text, to_do = (
+            f"the mission cannot begin: {self._why_not_begun}",
+            "publish what it waits for",
+        )
         return (TroubleReport("not_begun", text, to_do, since_s),) if since_s >= 0.0 else ()
 
 

@@ -54,7 +54,7 @@ from fasaco_edge.mission.map.room_cells import RoomCells
 from fasaco_edge.mission.map.room_watch import RoomWatch
 from fasaco_edge.mission.orders.by_room import RoomPrice
 from fasaco_edge.mission.orders.mask import mask_frame
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.placing import restored
 from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
@@ -142,6 +142,7 @@ class Mission:
         if self._layout.resume(before.lattice_deg):
             self._lay_cells()
         self._resume(before)
+        self.covered.before = self.covered.current.snapshot()
 
     def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         self._rotated_by_deg = self._rotation.deg - before.lattice_deg
@@ -158,6 +159,8 @@ class Mission:
         self.map.places.resume(order.places)
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
+        if order.stage is Stage.OVER:
+            self.covered.before = None
         self._changes.begin(self._rotation.order(order, self._rotated_by_deg, self._scaled_by))
         self.state, self.reason = self._executive.status()
 

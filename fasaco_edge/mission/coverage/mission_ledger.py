@@ -107,6 +107,7 @@ class MissionLedger:
         reopened: how often covered cells were opened again.
         shared: cells swept by other robots.
         passed: cells that this robot has passed while floor in them is unswept.
+        before: the coverage from before a restart in the middle of an order; None for none.
     """
 
     def __init__(
@@ -134,6 +135,7 @@ class MissionLedger:
         self.reopened = 0
         self.shared = shared or OthersCells()
         self.passed = PassedCells()
+        self.before: LedgerSnapshot | None = None
         self._opened_again: Counter[Cell] = Counter()
         # The ledger from before a restart while no map has confirmed it.
         self._resumed: LedgerSnapshot | None = None
@@ -149,6 +151,14 @@ class MissionLedger:
         """Return the visits to cells, uint16 (rows, cols); 1 where only another robot swept."""
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
+
+    def not_since(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of a window were last visited before the restart."""
+        visits = self.current.visits(window)
+        if self.before is None:
+            return np.zeros(visits.shape, np.bool_)
+        same: NDArray[np.bool_] = (visits > 0) & (visits == self.before.visits(window))
+        return same
 
     def snapshot(self) -> LedgerSnapshot:
         """Return a copy of the present coverage."""
@@ -258,6 +268,7 @@ class MissionLedger:
             return inside(around, self._cell_m)[rows - row0, cols - col0]
 
         self._forget_passed()
+        self.before = None
         self.current.forget(cells_inside)
         self.floor.forget(lambda window: inside(window, PIXEL_M))
         self.shared.disregard(cells_inside)
@@ -326,7 +337,7 @@ class MissionLedger:
 
     def _replace(self, frame: str) -> None:
         self.current, self.floor = self._nothing(frame)
-        self._resumed = self._pose_before_motion = None
+        self._resumed = self._pose_before_motion = self.before = None
         self._forget_passed()
         self.shared.note_forgotten()
 

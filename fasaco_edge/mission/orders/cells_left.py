@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Polygon, Window, polygon_bounds
-from fasaco_edge.grid.lattice import BLOCKED, CoverageLattice
+from fasaco_edge.grid.lattice import BLOCKED, Cell, CoverageLattice
 from fasaco_edge.grid.polygons import area_m2
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
@@ -83,6 +83,21 @@ class CellsLeft:
         if area is None:
             return 0
         return int(np.count_nonzero(frontier(area) & self.asked_for(area.lattice.window)))
+
+    def ends_of_map(self, cell: Cell) -> list[Cell]:
+        """Return the cells to look on from, the nearest to ``cell`` first.
+
+        They border on unknown cells, and were covered before a restart: the map may have shown
+        more then than that of a mapper that has begun anew.
+        """
+        area = self._map.area
+        if area is None or self._ledger.before is None:
+            return []
+        window = area.lattice.window
+        ends = frontier(area) & self.asked_for(window) & self._ledger.not_since(window)
+        cells = np.argwhere(ends) + np.array((window.row0, window.col0))
+        nearest = np.argsort(np.abs(cells - cell).sum(axis=1), kind="stable")
+        return [(row, col) for row, col in cells[nearest].tolist()]
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` this robot has to cover, covered or not."""

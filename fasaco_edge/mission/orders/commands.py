@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import msgspec
 
 from fasaco_edge.errors import OrderError
@@ -63,6 +65,35 @@ def read_command(document: object) -> Command:
         raise OrderError(f"keep_out.polygon: goes with keep_out_add, {got}")
     room = checked_room(name, asked.room)
     return Command(name, order_of(asked.order or OrderDocument()), keep_out, asked.discard, room)
+
+
+def order_faults(document: object) -> list[OrderError]:
+    """Return all faults of a parsed order: each member and zone is judged alone, then together."""
+    found: dict[str, OrderError] = {}
+    for part, index in [*_parts(document), (document, 0)]:
+        if part is document and found:
+            break  # by itself it shows only the first of them
+        try:
+            order_of(converted(part, OrderDocument))
+        except OrderError as error:
+            text = str(error).replace("[0]", f"[{index}]", 1)
+            found.setdefault(text, OrderError(text, hint=error.hint))
+    return list(found.values())
+
+
+def _parts(order: object) -> Iterator[tuple[object, int]]:
+    """Yield parts of an order that can be judged alone, and the index of a zone or keep-out."""
+    for name, value in order.items() if isinstance(order, dict) else ():
+        if name not in ("zones", "keep_out") or not isinstance(value, list):
+            yield {name: value}, 0
+            continue
+        for index, item in enumerate(value):
+            members = item.items() if name == "zones" and isinstance(item, dict) else ()
+            yield from (({name: [{"name": "zone", key: held}]}, index) for key, held in members)
+            if "name" not in dict(members):
+                yield {name: [{} if members else item]}, index
+        if name == "zones" and all(isinstance(item, dict) and "name" in item for item in value):
+            yield {name: [{"name": item["name"]} for item in value]}, 0
 
 
 def read_recorded(document: dict[str, object]) -> Command:

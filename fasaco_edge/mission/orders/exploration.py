@@ -18,7 +18,7 @@ from fasaco_edge.mission.orders.zones import in_zones
 SEEN_AROUND = 1
 # Period of looking again for a way past robots that stand in it [s].
 AGAIN_S = 1.0
-# Time for which a robot looks at ground that others see: its map may come late [s].
+# Time for which a robot looks at ground beyond its map, which may come late [s].
 LOOKS_S = 6.0
 
 
@@ -59,7 +59,7 @@ class Exploration:
     Attributes:
         viewpoints: cells (row, col) to look from, not yet reached.
         reached: number of viewpoints that were reached.
-        looked: cells already visited in search of the zone, or of ground that others see.
+        looked: cells already visited in search of the zone, or of ground beyond the map.
         seeks_zone: whether the viewpoints are for a zone.
         is_shut: whether other robots stand in the way to all cells from which the zone may be seen.
     """
@@ -69,8 +69,9 @@ class Exploration:
     reached: int = 0
     seeks_zone: bool = False
     is_shut: bool = False
-    # The last viewpoint of ground that others see, and since when the robot has been there.
+    # The last viewpoint of ground beyond the map, why, and since when the robot has been there.
     _beyond: Cell | None = None
+    _why_beyond: str = ""
     _there_since: float | None = None
     # Since when the robot has waited for those robots, and when it looked for a way last.
     _shut_since: float | None = None
@@ -128,8 +129,8 @@ class Exploration:
         """Return whether it is too soon to look again for a way past others."""
         return self._shut_since is not None and now - self._shut_looked < AGAIN_S
 
-    def look_beyond(self, viewpoint: Cell, cell: Cell) -> str:
-        """Look from the edge of ground that others see; return why a plan is wanted, or "".
+    def look_beyond(self, viewpoint: Cell, cell: Cell, why: str) -> str:
+        """Look beyond the map, from ``cell``; return ``why``, as a plan is wanted, or "".
 
         Each viewpoint is used once: data of others may be wrong, or the way closed to this robot.
         """
@@ -137,16 +138,16 @@ class Exploration:
             return ""
         self.looked.add(viewpoint)
         self.viewpoints, self.seeks_zone = {viewpoint}, False
-        self._beyond, self._there_since = viewpoint, None
-        return "looks for its part, which others see"
+        self._beyond, self._why_beyond, self._there_since = viewpoint, why, None
+        return why
 
-    def is_looking(self, cell: Cell, now: float) -> bool:
-        """Return whether the robot stands and looks at ground that others see."""
+    def why_looking(self, cell: Cell, now: float) -> str:
+        """Return why the robot stands and looks beyond its map, or ""."""
         if self._beyond is None or not _is_beside(self._beyond, cell):
-            return False
+            return ""
         if self._there_since is None:
             self._there_since = now
-        return now - self._there_since <= LOOKS_S
+        return self._why_beyond if now - self._there_since <= LOOKS_S else ""
 
     def aim_at(self, viewpoints: set[Cell]) -> None:
         """Set the viewpoints."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ from fasaco_edge.planners.problem import CoverageProblem
 # After this many paths in a row that cover no further cell, the cells left wait for the retry: the
 # robot may stop short of its path's end, with the last cell out of the tool's reach.
 MAX_IN_VAIN = 3
+OTHERS_SEE = "looks for its part, which others see"
+MAP_ENDS = "looks where the map ends: the floor there was covered before a restart"
 
 
 class PresentPart(OrderReach):
@@ -123,8 +126,13 @@ class PresentPart(OrderReach):
         free = None if area is None else self.scope.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
-        viewpoints = self._company.viewpoints(self.cells.open_cells, cell)
-        return next(filter(None, (exploration.look_beyond(at, cell) for at in viewpoints)), "")
+        of_others = self._company.viewpoints(self.cells.open_cells, cell)
+        viewpoints = chain(
+            ((at, OTHERS_SEE) for at in of_others),
+            ((at, MAP_ENDS) for at in self.cells.ends_of_map(cell)),
+        )
+        looks = (exploration.look_beyond(at, cell, why) for at, why in viewpoints)
+        return next(filter(None, looks), "")
 
     def why_standing(self, now: float) -> str:
         """Return why the robot stands, though a plan is wanted, or ""."""
@@ -135,14 +143,13 @@ class PresentPart(OrderReach):
     def why_looking(self, cell: Cell, now: float) -> str:
         """Return why the robot stands where it has nothing to cover, or "".
 
-        It looks at ground that others see, or waits for others that stand in the way to its zone:
+        It looks beyond its map, or waits for others that stand in the way to its zone:
         as long as the retries of an order take.
         """
         exploration, policy = self._exploration, self._config.policy
         if exploration.waits_for_way(now, policy.retries * policy.retry_s):
             return self._why_shut()
-        is_looking = exploration.is_looking(cell, now)
-        return "looks for its part, which others see" if is_looking else ""
+        return exploration.why_looking(cell, now)
 
     def _why_shut(self) -> str:
         zone = self.order_state.current_zone

@@ -167,6 +167,8 @@ def _caption(review: Review) -> list[str]:
             f"{cells[0]:,} of {cells[1]:,} reachable cells covered; "
             f"recorded for {clock(review.duration_s)}"
         )
+    if before := review.data.restored_cells:
+        lines.append(f"{before:,} cells were covered before: the recording does not show which")
     if review.floor is not None:
         figures = review.floor.figures
         swept = swept_words(figures.swept_m2, figures.reachable_m2)

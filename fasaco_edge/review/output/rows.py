@@ -197,16 +197,18 @@ def _some(texts: Sequence[str]) -> str:
 
 
 def _swept(review: Review, document: ReviewDocument) -> str:
-    text, by, orders = floor_words(document), "recorded poses", document.orders
+    text, by, share = floor_words(document), "recorded poses", "and"
+    orders = document.orders
     counted = review.data.ledger_floor
     if not text and counted is not None and counted.reached_m2 is not None:
         reachable_m2 = counted.reachable_m2 or 0.0
         text, by = swept_words(counted.reached_m2, reachable_m2), "the daemon's count"
-        orders = orders[-1:]
+        orders, share = orders[-1:], "of these"
     if not text:
         return NOT_KNOWN
     before_m2 = document.swept_before_m2
-    before = f", and {before_m2:.1f} m2 before it began" if before_m2 else ""
+    # The daemon's count has it in it, poses of the recording have not.
+    before = f", {share} {before_m2:.1f} m2 before the recording" if before_m2 else ""
     return f"{text}{ordered_words(orders)}, by {by}{before}"
 
 

@@ -100,7 +100,8 @@ function showLeft(state) {
     return line;
   }));
   find("left-hint").hidden = !find("left").querySelector("button");
-  if (isOver && !wasOver) find("left").open = true;
+  // Without an order yet, there is no end.
+  if (isOver && !wasOver && (state.mission.stage || wasOver === false)) find("left").open = true;
   wasOver = isOver;
   const shown = model.left && parts.find((part) => part.reason === model.left.reason);
   if (model.left) { model.left = shown || null; showBars(); if (!shown) wants(); }
