@@ -46,7 +46,7 @@ def read_command(document: object) -> Command:
     """Return the command in a parsed document.
 
     Raises:
-        OrderError: naming the member, what was expected and what came.
+        OrderError: a member is wrong; the text names it, the expected and the given value.
     """
     asked = converted(document, CommandDocument)
     name = asked.command
@@ -66,7 +66,7 @@ def read_command(document: object) -> Command:
 
 
 def read_recorded(document: dict[str, object]) -> Command:
-    """Return a command of a recording; releases before ``discard`` always forgot covered cells.
+    """Return a recorded command; without ``discard``, as in older releases, it forgets cells.
 
     Raises:
         OrderError: as ``read_command``.
