@@ -17,12 +17,12 @@ from fasaco_edge.mission.orders.zones import in_zones
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Covered cells that have to be covered again.
+    """Covered cells that a command would forget.
 
     Attributes:
-        cells: their number; those under the tool do not count, as they stay covered.
+        cells: their number, without cells under the tool, which stay covered.
         m2: their area [m2].
-        share: of the cells that the robot can reach; None where these are not known.
+        share: their share of the reachable cells; None if those are unknown.
     """
 
     cells: int
@@ -72,9 +72,9 @@ def loss_in(zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> Los
 
 
 def _beyond(window: Window, zones: tuple[Zone, ...], own: LedgerSnapshot) -> int:
-    """Return how many cells in zones are covered outside of a window.
+    """Return the number of covered cells in zones outside the map's window.
 
-    A map may have shrunk, as when a mapper begins anew.
+    The map may have been larger, as before a restart of the mapper.
     """
     cells = 0
     for i, j in own.tiles:

@@ -1,7 +1,7 @@
 """Relaid ledger: conversion of a ledger to cells at another angle, or of another size.
 
-Coverage is rebuilt from swept floor alone: a cell counts as covered if the floor at its centre is
-swept. The trail, stored per step between cells, starts again; other robots resend theirs.
+Coverage is rebuilt from swept floor: a cell counts as covered if the floor at its centre is swept.
+The trail, stored per step between cells, starts again; other robots resend their cells.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ from fasaco_edge.planners.living_trail import NO_TRAIL
 
 
 def relaid_ledger(before: LedgerSnapshot, lattice_deg: float, cell_m: float) -> LedgerSnapshot:
-    """Return a ledger converted to cells of ``cell_m`` [m] at ``lattice_deg`` [deg] to the map
-    frame."""
+    """Return a ledger converted to cells of ``cell_m`` [m], rotated by ``lattice_deg`` [deg]."""
     by_deg, floor = before.lattice_deg - lattice_deg, before.floor
     if not by_deg and before.cell_m == cell_m:
         return before
@@ -60,7 +59,7 @@ def _rotated(
 
     Args:
         floor: the present floor.
-        by_deg: rotation of the result against it [deg].
+        by_deg: rotation of the result against the floor [deg].
         side: edge of a tile, in squares.
         edge_m: edge of a square [m].
     """
