@@ -1,6 +1,6 @@
 """Rotations about the map frame's origin, which align a building's walls with the lattice's axes.
 
-To rotate the lattice over a map is to rotate the map below it. Pixels keep their values; only their
+Instead of the lattice, the map below it is rotated: pixels keep their values, and only their
 placement changes.
 """
 
@@ -39,7 +39,7 @@ def rotated_pose(pose: Pose2D, by_deg: float) -> Pose2D:
 
 
 def composed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return ``pose``, given in a frame, in the parent of that frame; yaw in [-pi, pi]."""
+    """Return ``pose``, given in ``frame``, in the parent of that frame; yaw in [-pi, pi]."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return Pose2D(
         frame.x + pose.x * cos - pose.y * sin,
