@@ -1,4 +1,4 @@
-"""Plans of several passes over a map, each from where the one before ends, and their figures."""
+"""Plans of several passes over a map, each begun where the previous one ends; their figures."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class PassPlans:
     """Passes over a map, one plan each.
 
     Attributes:
-        passes: what was asked for.
+        passes: the passes.
         plans: their plans, in order.
     """
 
@@ -66,7 +66,7 @@ class PassPlans:
 
     @property
     def drive(self) -> Drive:
-        """What driving the lines takes: sums over the passes, without a gap."""
+        """The effort of driving the lines: sums over the passes, without a gap."""
         drives = [plan.drive for plan in self.plans]
         metres, turns, seconds = (
             math.fsum(getattr(drive, name) for drive in drives)
@@ -81,14 +81,14 @@ class PassPlans:
         judged = judged_floor(first.map.grid, self.xy, first.robot)
         if judged is None:
             return None
-        # Each pass has its own speed; a lower bound of the time is known for single passes only.
+        # Each pass has its own speed; a lower bound of the time is only known for single passes.
         seconds, swept_m2 = self.drive.seconds, judged.figures.swept_m2
         each = seconds / swept_m2 if swept_m2 else None
         return replace(judged.figures, least_s=0.0, seconds=seconds, seconds_per_m2=each)
 
     @property
     def figures(self) -> dict[str, object]:
-        """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
+        """All figures as JSON values: those of ``fasaco-edge plan --json``."""
         first = self.plans[0]
         return {
             "map": first.map.name,
@@ -138,11 +138,11 @@ def plan_passes(
     stop: StoppingCriterion | None = None,
     watch: Callable[[SearchProgress], None] = lambda _: None,
 ) -> PassPlans:
-    """Plan several passes over a map, each from where the one before ends.
+    """Plan several passes over a map, each begun where the previous one ends.
 
     Args:
-        map, robot, start, start_xy, line, align, search, stop, watch: see ``plan``; the budget is
-            that of each pass.
+        map, robot, start, start_xy, line, align, search, stop, watch: see ``plan``; each pass has
+            the whole budget.
         passes: what each covers, and the direction of its lanes: "edge", "rest", "auto", "cross",
             an angle as "30deg", "rest:cross", "cross%30@0.15" with an overlap [percent] and a
             speed [m/s]; or a ``Pass``.
@@ -207,7 +207,7 @@ def _robot_in(each: Pass, robot: RobotConfig) -> RobotConfig:
 
 
 def _end(end: str | Cell, plans: Sequence[Plan]) -> str | Cell:
-    """Return the end of the last pass: home is where the first one began."""
+    """Return the end of the last pass, where home is the start of the first pass."""
     if end != HOME or not plans:
         return end
     first = plans[0]
