@@ -31,7 +31,7 @@ def host_of(endpoint: str) -> str:
 def is_local(endpoint: str) -> bool:
     """Return whether only this computer can reach an endpoint; False if uncertain.
 
-    Names are not resolved, so only ``localhost`` counts as local.
+    Names are not resolved; the only local name is ``localhost``.
     """
     protocol = protocol_of(endpoint)
     if protocol in UNIX:

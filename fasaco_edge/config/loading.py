@@ -93,7 +93,7 @@ def inspect_config(
         text = read_text(path)
     except BadConfiguration as error:
         return None, (Fault("", error),)
-    faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
+    faults = [*text.duplicates, *section_faults(DaemonConfig, text.document)]
     unclear = {each for fault in faults for each in _sections_in(f"{fault.key} {fault.error}")}
     document = text.document if isinstance(text.document, dict) else {}
     sound = {name: document[name] for name in SECTIONS if name in document and name not in unclear}

@@ -183,12 +183,12 @@ class ConfigText:
     Attributes:
         document: plain values.
         lines: line of each key, from 1.
-        twice: faults of keys that occur more than once, of which YAML would take the last.
+        duplicates: faults of keys that occur more than once; YAML would take the last value.
     """
 
     document: object
     lines: dict[str, int] = dataclasses.field(default_factory=dict)
-    twice: tuple[Fault, ...] = ()
+    duplicates: tuple[Fault, ...] = ()
 
     def line_of(self, key: str) -> int | None:
         """Return the line of a key, or of its section if it is missing; None if both are."""
@@ -213,13 +213,13 @@ def read_text(path: Path) -> ConfigText:
         hint = "correct the file at that place"
         raise BadConfiguration(f"not plain YAML: {error}", hint=hint) from error
     lines: dict[str, int] = {}
-    twice = []
+    duplicates = []
     for key, line in keys_and_lines(node):
         if key in lines:
             text = f"{key}: is given twice, in line {lines[key]} and in line {line}"
-            twice.append(Fault(key, BadConfiguration(text), line))
+            duplicates.append(Fault(key, BadConfiguration(text), line))
         lines[key] = line
-    return ConfigText(document if document is not None else {}, lines, tuple(twice))
+    return ConfigText(document if document is not None else {}, lines, tuple(duplicates))
 
 
 def keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:

@@ -61,8 +61,8 @@ class Nav2Config(Section, frozen=True):
 
     ``controller``, ``goal_checker``, ``progress_checker`` and ``path_handler`` name its plugins, ""
     for the only one there is; ``release`` is the ROS release whose goals a server behind a bridge
-    accepts. The path of a goal keeps ``near_m`` [m] from itself, by default 0.75 of the tool's
-    width.
+    accepts. Parts of a goal's path keep ``near_m`` [m] from each other, by default 0.75 of the
+    tool's width.
 
     Its docking server, used if ``dock`` is ``nav2``: ``dock_id`` names a dock of its database, ""
     for the pose ``mission.dock``; ``dock_type`` is its plugin, "" for the only one there is.

@@ -82,8 +82,8 @@ class SecurityConfig(Section, frozen=True):
     def warn_of_clock(self) -> None:
         """Warn if the clock is before the certificate's start, so that no connection can be made.
 
-        Certificates are read, which takes memory and time, only if the clock is before the times at
-        which their files and this program were written.
+        Certificates are read, which takes memory and time, only if the clock is before the time at
+        which one of their files, or this program, was written.
         """
         if self.kind != "tls":
             return

@@ -41,7 +41,7 @@ class MaskTopic:
         arrived: called for each mask, on a Zenoh thread.
 
     Attributes:
-        map_frame: frame of the map; masks wait while it is "", which is unknown.
+        map_frame: frame of the map; "" while it is unknown, and masks wait.
     """
 
     def __init__(

@@ -127,7 +127,7 @@ FIGURES = (
     Figure("plans_total", "plans made", _member("plan", "plans")),
     Figure(
         "plans_outdated_total",
-        "plans that did not hold any more when they came",
+        "plans that were outdated when they arrived",
         _member("plan", "outdated"),
     ),
     Figure("latency_seconds", "how long a stage took last", _latencies),

@@ -34,7 +34,7 @@ class ServiceManager:
     Each notification is one datagram.
 
     Attributes:
-        is_there: whether there is a manager.
+        is_present: whether there is a manager.
         watchdog_s: time without a notification after which it ends this process [s]; 0 for none.
     """
 
@@ -45,7 +45,7 @@ class ServiceManager:
         is_ours = environ.pop("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
         # "@" stands for the NUL of a name in the abstract namespace.
         self._address = f"\0{address[1:]}" if address.startswith("@") else address
-        self.is_there = bool(address)
+        self.is_present = bool(address)
         # Kept open, as a process without free descriptors still has to feed the watchdog.
         self._out = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) if address else None
         if self._out is not None:

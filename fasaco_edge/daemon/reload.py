@@ -119,7 +119,7 @@ class Reload:
     def take(self, running: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
         """Return the running configuration with the changeable values of the file.
 
-        Also return why the file, of which then no value is taken, or the newest mask is refused.
+        Also return why the file or the newest mask is refused; a refused file changes no value.
         """
         assert self._reading is not None
         reading, self._reading = self._reading, None

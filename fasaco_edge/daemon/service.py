@@ -99,11 +99,11 @@ def run_daemon(
     call_on(signal.SIGTERM, signal.SIGINT, call=end)
     manager = ServiceManager()
     reload = Reload(read, manager)
-    if manager.is_there:
+    if manager.is_present:
         # Without a service manager, SIGHUP comes from a closed terminal and ends the process.
         call_on(signal.SIGHUP, call=reload.asked.set)
     config = _afforded(config)
-    compiler = KernelCompiler(manager) if manager.is_there else None
+    compiler = KernelCompiler(manager) if manager.is_present else None
     try:
         folder = state or config.mission.state_folder()
         ledger = open_ledger(folder, config.robot.name, config.cell_m, fresh=fresh)

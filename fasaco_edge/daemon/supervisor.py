@@ -116,7 +116,7 @@ class RecorderSupervisor:
             return
         if self._process is not None and report.pid == self._process.pid:
             self._report, self._reported_at = report, now
-            # Only a longer run shortens the pause: a recorder that its data kill reports first.
+            # Only a longer run resets the pause: a recorder that fails on its data reports first.
             if now - self._began_at >= LONGEST_PAUSE_S:
                 self._pause_s = FIRST_PAUSE_S
 

@@ -136,7 +136,7 @@ class FloorMap:
         near = cells_near_changes(grids, plain.window, wide, self._footprint.thresholds, within)
         self.revision += 1
         self.shift = geometry.corner_of(self.geometry)
-        # Without new cells, as those along the sides of a grown map contain little new floor.
+        # New cells are left out: along the sides of a grown map they contain little new floor.
         self.touched = self._reach.pixels_of(near, plain.window, geometry)
         is_same = geometry == self.geometry
         if self.touched is None and is_same and plain.window == before.window:

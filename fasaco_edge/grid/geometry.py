@@ -269,7 +269,7 @@ class GridGeometry:
         return GridGeometry(window.rows, window.cols, raster.resolution, origin)
 
     def corner_of(self, other: GridGeometry) -> tuple[int, int]:
-        """Return the pixel (row, col) at the corner of a grid whose pixels' edges lie on this."""
+        """Return the pixel (row, col) at another grid's corner, which is a pixel's corner here."""
         col, row = self.to_pixels(other.origin.x, other.origin.y)
         return round(row), round(col)
 

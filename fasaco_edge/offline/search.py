@@ -34,8 +34,8 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
-# Limit on the proposals per cell of a search for a walk, above which the search for the line gains
-# more; and on all proposals of the first walk, which no budget ends: some five seconds.
+# Limit on the proposals per cell of a search for a walk: beyond it, the search for the line gains
+# more. Limit on all proposals of the first walk, which has no budget: some five seconds.
 PROPOSALS_A_CELL, FIRST_PROPOSALS = 10_000, 25_000_000
 # Number of stages after which two lines are compared.
 COMPARED = 3
@@ -56,8 +56,8 @@ class Ending:
     Attributes:
         by: what ended them.
         bound: the problem's lower bound, for planners that have none of their own.
-        is_walk_limited, is_walk_cut: whether the last search for a walk ended by its proposals, or
-            by the budget or by ``stop``.
+        is_walk_limited: whether the limit on proposals ended the last search for a walk.
+        is_walk_cut: whether ``budget`` or ``stop`` ended it.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Ending:
         return self.is_walk_limited
 
     def is_stopped(self) -> bool:
-        """Return whether the search for the first line is stopped, which no budget ends."""
+        """Return whether ``stop`` ends the search for the first line, which has no budget."""
         return self._progress is not None and self._is_over(self._progress)
 
     def is_line_over(self) -> bool:

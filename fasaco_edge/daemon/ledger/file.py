@@ -49,7 +49,7 @@ def lock_file(folder: Path, robot: str) -> Path:
 def why_no_lock(name: Path) -> str:
     """Return what blocks the path of the lock file, "" for nothing.
 
-    It is not set aside, as through a link of another user our ledger would be written elsewhere.
+    Nothing is set aside here, as a link of another user must not receive our ledger.
     """
     kind = "a link" if name.is_symlink() else "a folder" if name.is_dir() else ""
     return f"{kind} lies in place of {name}" if kind else ""

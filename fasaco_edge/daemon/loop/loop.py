@@ -259,7 +259,7 @@ class Loop:
         if mission is None:
             if self.config.mission.waits_for_mask:
                 self._status.waits = "no keep-out mask yet"
-            self._send_path()  # a stop that could not be sent
+            self._send_path()  # sends a stop that could not be sent before
             return Decision(answers=self._runner.answer(commands, self._status.yield_reason))
         self._status.waits = "no map yet"
         if not self._has_begun:

@@ -80,7 +80,7 @@ class StatusBoard:
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[object, ...] = ()
-        # Time since when no mission exists or is being loaded; None otherwise.
+        # Start of the time without a mission or its loading [s]; None while there is either.
         self._unbegun_at: float | None = None
         self._since: dict[str, float] = {}
 
@@ -171,7 +171,7 @@ class StatusBoard:
             return own
         idle = runner.mission.idle_places(now) if runner.mission else ""
         texts = {"two_publishers": "; ".join(self.conflicts), "no_effect": idle}
-        # Start of the report of each [s].
+        # Time at which each trouble began [s].
         self._since = {code: self._since.get(code, now) for code, text in texts.items() if text}
         return own + tuple(
             TroubleReport(code, texts[code], TO_DO[code], round(now - since, 1))

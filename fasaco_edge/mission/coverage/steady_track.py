@@ -72,9 +72,9 @@ class PoseScatter:
 
 
 # Half-width of the 95 % confidence interval, in standard deviations.
-SURE = 2.0
+SURE_SIGMAS = 2.0
 # Error of a place that needs no wider window [m].
-RIGHT_M = PIXEL_M / 4
+GOOD_ERROR_M = PIXEL_M / 4
 # Limit on the poses before and after a place.
 MOST_BESIDE = 15
 
@@ -156,7 +156,7 @@ class SteadyTrack:
     @property
     def _beside(self) -> int:
         """Number of poses before and after a place in its window."""
-        needed = (self._scatter.sigma_m / RIGHT_M) ** 2
+        needed = (self._scatter.sigma_m / GOOD_ERROR_M) ** 2
         return min(max(math.ceil((needed - 1) / 2), 0), MOST_BESIDE)
 
     def _places(self, stop: int) -> list[Place]:
@@ -166,7 +166,7 @@ class SteadyTrack:
 
     def _place(self, index: int) -> Place:
         poses, sigma_m = self._poses, self._scatter.sigma_m
-        here, reach_m = poses[index], self._reach_m + SURE * sigma_m
+        here, reach_m = poses[index], self._reach_m + SURE_SIGMAS * sigma_m
         beside = min(self._beside, index, len(poses) - 1 - index)
         for away in range(1, beside + 1):
             before, after = poses[index - away], poses[index + away]
@@ -179,5 +179,5 @@ class SteadyTrack:
         around = poses[index - beside : index + beside + 1]
         count = len(around)
         x, y = sum([pose.x for pose in around]) / count, sum([pose.y for pose in around]) / count
-        error_m = SURE * sigma_m / math.sqrt(count)
+        error_m = SURE_SIGMAS * sigma_m / math.sqrt(count)
         return Place(x, y, error_m, self._farthest_m[index], here.yaw)

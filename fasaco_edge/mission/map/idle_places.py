@@ -17,8 +17,8 @@ from fasaco_edge.mission.orders.zones import near_polygons
 
 # Least time between two checks of the same places [s], as a growing map changes often.
 PERIOD_S = 1.0
-# Limit on the pixels of a check, and pixels counted for each polygon besides those in it: together
-# some tens of milliseconds.
+# Limit on the pixels of a check, which takes some tens of milliseconds; fixed cost of a polygon, in
+# pixels.
 MOST_PIXELS, POLYGON_PIXELS = 1_000_000, 500
 # Limit on the places that are named.
 MOST_NAMED = 5
@@ -30,7 +30,7 @@ class IdlePlaces:
     """Finds places that have no effect on a map; used from one thread.
 
     Args:
-        config: of the mission, with the places in the map frame.
+        config: configuration of the mission, with the places in the map frame.
     """
 
     def __init__(self, config: MissionConfig) -> None:

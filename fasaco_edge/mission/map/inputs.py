@@ -180,7 +180,7 @@ class InputMonitor:
         on_line_m: longest possible drive along the line, also if the track between the two poses is
             unknown [m].
         pose_at, map_at: time of the last pose, and of the last map or update; before the first one,
-            the time since when it is due; None if it is not due.
+            the time from which it is due; None before that time.
         driven: selects the poses that count for swept floor.
     """
 

@@ -1,8 +1,8 @@
 """Loop closures: SLAM corrects the whole map, and moves map and pose at once.
 
-The ledger's cells are places in the map frame. When the map moves, it is unknown where on the way
-from its old to its new position it was while the tool swept. So only cells still count that were
-covered under every intermediate map position.
+The ledger's cells are places in the map frame. When the map has moved, its true position while the
+tool swept them is unknown: somewhere between the old and the new one. So only cells that are
+covered for every intermediate position still count.
 
 Small shifts are found by walls alone. A loop closure that moves the map by less than a cell changes
 too few cells for ``has_moved``, and is smaller than the steps between poses of a driving robot. The
@@ -182,7 +182,7 @@ def uncertain_cells(
 def certain_floor(
     before: FloorSnapshot, motion: Motion
 ) -> Callable[[Tiles], list[tuple[Place, Bits]]]:
-    """Return a function from tiles to those with uncertain pixels, which it removes."""
+    """Return a function that returns the tiles with uncertain pixels, without these pixels."""
     known = _stacked(before.tiles)
 
     def left_of(tiles: Tiles) -> list[tuple[Place, Bits]]:

@@ -19,12 +19,12 @@ from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 
 # Time for which floor is closed [s], doubled each time it is closed again, up to a limit.
 CLOSED_S, MOST_CLOSED_S = 20.0, 320.0
-# Distance up to which two reports mean the same obstacle [m]; time after which its floor has opened
+# Distance up to which two reports mean the same obstacle [m]; time from the opening of its floor
 # until it is forgotten [s].
 SAME_M, FORGET_S = 0.5, 600.0
-# A follower that still reports the obstacle after AGAIN_S [s] cannot drive the new path either: the
-# floor is closed wider by WIDER_M [m], up to MOST_WIDER times.
-AGAIN_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
+# A follower that still reports the obstacle after WIDEN_AFTER_S [s] cannot drive the new path
+# either: the floor is closed wider by WIDER_M [m], up to MOST_WIDER times.
+WIDEN_AFTER_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
 # Assumed depth of an obstacle, away from the robot; spacing of its points; the follower's clearance
 # from it; width of the ring around the robot's disc that stays free [m].
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
@@ -42,8 +42,8 @@ class _Obstacle:
         points: points seen of it, the nearest first [m].
         here: the robot's position at that time [m].
         at, until: times at which its floor is closed and opened [s].
-        times: how often its floor was closed, having been opened in between.
-        wider: how often its floor was closed wider.
+        times: number of separate times that its floor was closed.
+        wider: number of times that the closed floor was widened.
     """
 
     points: tuple[Point, ...]
@@ -58,7 +58,7 @@ class Obstacles:
     """Keeps obstacles, and draws them on maps.
 
     Args:
-        radius_m: of the robot's disc [m].
+        radius_m: radius of the robot's disc [m].
     """
 
     def __init__(self, radius_m: float) -> None:
@@ -82,7 +82,7 @@ class Obstacles:
         if not points:
             return False
         same = [one for one in self._closed if _is_same(one, points[0])]
-        if any(now - one.at < AGAIN_S for one in same):
+        if any(now - one.at < WIDEN_AFTER_S for one in same):
             return False
         past = [one for one in self._past if _is_same(one, points[0])]
         times = max([1, *(one.times for one in same), *(one.times + 1 for one in past)])

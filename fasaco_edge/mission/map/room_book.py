@@ -107,7 +107,7 @@ class RoomSheet:
         pending: squares of these regions.
         settled: the squares of rooms some updates ago, without what the newest maps have added.
         changes: scores of possible changes (what, room, other room): a room that may join another,
-            or a part of it that may. Each update that shows the change adds 1, each other takes 2.
+            or a part of it that may. Each update that shows a change adds 1, others subtract 2.
     """
 
     frame: str

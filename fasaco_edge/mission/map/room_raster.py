@@ -28,7 +28,7 @@ BLOCK = 1 << 18
 
 # Distance from a cut up to which squares are cut, by their centre [squares]: no step passes between
 # them.
-CUT = 0.75
+CUT_SQUARES = 0.75
 
 Ids = NDArray[np.uint16]
 Cut = tuple[Point, Point]
@@ -148,5 +148,7 @@ def is_cut(window: Window, square_m: float, cut: Cut) -> NDArray[np.bool_]:
     along = np.clip(along, 0.0, 1.0)
     right, up = x0 + along * dx - x, y0 + along * dy - y
     far = right * right + up * up
-    near: NDArray[np.bool_] = (far < (CUT * square_m) ** 2).reshape(window.rows, window.cols)
+    near: NDArray[np.bool_] = (far < (CUT_SQUARES * square_m) ** 2).reshape(
+        window.rows, window.cols
+    )
     return near

@@ -41,7 +41,7 @@ LEAST_SQUARE_M = 0.05
 PERIOD_S, PIXELS_PER_S = 2.0, 50_000
 # Larger maps are made coarser before a search, which takes some 20 bytes per pixel.
 MOST_PIXELS = 1_000_000
-# Longest time that a search is put off to a step without a new map [s], as a plan comes first.
+# Longest delay of a search, until a step without a new map [s], as planning comes first.
 LATE_S = 1.0
 
 ROOMS_STAY = "the robot goes on with the rooms it knows; report it with the log"
@@ -177,7 +177,7 @@ def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
 
 
 def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
-    """Return the share of floor in matching regions and rooms, of the map's or sheet's floor."""
+    """Return the share of the smaller floor, of map or sheet, in matching regions and rooms."""
     window = window_over(found.geometry, sheet.raster.square_m)
     if window.rows * window.cols > MOST_SQUARES:
         return 0.0

@@ -22,7 +22,7 @@ class RoomPrice:
 
     Args:
         by_room: whether rooms matter.
-        cells: the rooms of cells.
+        cells: the room of each cell.
     """
 
     def __init__(self, by_room: ByRoom, cells: RoomCells) -> None:

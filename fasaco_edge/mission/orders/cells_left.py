@@ -69,7 +69,7 @@ class CellsLeft:
 
     @property
     def is_exploring(self) -> bool:
-        """Whether the map does not yet show for each reachable cell if the robot fits there."""
+        """Whether a reachable cell is undecided: the map does not show if the robot fits there."""
         area = self._map.area
         decided = None if area is None else self._map.is_decided(area.lattice.window)
         if area is None or decided is None:
@@ -166,8 +166,8 @@ class LeftBehind:
     def is_open(self, unswept: NDArray[np.bool_], area: ReachableArea) -> bool:
         """Return whether floor has opened since it set out: at least a square of two by two cells.
 
-        Rows of cells along walls come and go with the map's noise. ``unswept``: bool (rows, cols)
-        of the area.
+        Single rows of cells along walls are noise of the map. ``unswept``: bool (rows, cols) of the
+        area.
         """
         before = self._area = self._area or area
         opened = unswept & area.reachable
@@ -183,8 +183,8 @@ class LeftBehind:
 def visits_due(zone: Zone, area: ReachableArea, skipped: NDArray[np.bool_]) -> int:
     """Return the number of cells that the passes over a zone cover.
 
-    The first pass leaves out ``skipped``, bool (rows, cols) of the area. Of a zone without a
-    reachable cell, all cells count that fit into its polygon.
+    The first pass leaves out ``skipped``, bool (rows, cols) of the area. If no cell of the zone is
+    reachable, the area of its polygon gives the number.
     """
     lattice = area.lattice
     inside = in_zones((zone,), lattice.window, lattice.cell_m) & area.reachable

@@ -1,4 +1,4 @@
-"""Exploration: cells visited only to look around, for a path to an unreachable zone."""
+"""Exploration: cells visited to look for a path to an unreachable zone."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class Exploration:
             self.viewpoints.clear()
 
     def skip_viewpoint(self) -> bool:
-        """Drop the viewpoints if some are unreached; return whether others may be left."""
+        """Give up an unreached viewpoint; return whether another one may show the zone."""
         another = bool(self.looked and self.viewpoints)
         if another:
             self.viewpoints.clear()

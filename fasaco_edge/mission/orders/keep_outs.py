@@ -18,7 +18,7 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
 
-# Limits on the places of an order: it is kept with the ledger, which is written once a second.
+# Limits on the places of an order, as it is part of the ledger, which is written once a second.
 MOST_KEEP_OUT = 100
 MOST_POINTS = 1_000
 MOST_POINTS_IN_ALL = 5_000

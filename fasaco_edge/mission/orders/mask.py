@@ -60,7 +60,7 @@ def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = Non
 
 
 def inline_grid(grid: OccupancyGrid, occupied_at_least: int) -> str:
-    """Return the inline form of a mask that came as a message, the input of ``mask_polygons``.
+    """Return the inline form of a mask received as a message, the input of ``mask_polygons``.
 
     Raises:
         BadConfiguration: its outlines are too fine, or it is too wide.

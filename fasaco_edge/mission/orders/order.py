@@ -196,8 +196,8 @@ class OrderDocument(Document, frozen=True):
     """What to cover. Without zones: everything the robot can reach.
 
     Attributes:
-        passes: over everything, and over zones that give none; by default one pass, and over rooms
-            those of their settings.
+        passes: passes of everything, and of zones that give none; by default one pass, or for rooms
+            the passes of their settings.
         unknown: whether an order with an unknown zone name is refused, or the zone waits, after
             all others, for a room of that name.
         until_min: time after which the order ends, with the robot at home [min]; 0 for no limit,

@@ -30,8 +30,8 @@ class PlacesNote:
         of: checksum of these places; "" while they belong to no map.
         frame: frame of that map.
         is_left: whether the map in that frame has shown another building since.
-        left_mask: checksum of a keep-out mask that came as a message, if its map has shown another
-            building since; "" for none.
+        left_mask: checksum of the keep-out mask received as a message if the map in its frame has
+            shown another building since; else "".
     """
 
     of: str = ""
@@ -55,7 +55,7 @@ class OrderProgress:
         pass_number: number of the pass over it, from 1.
         begun: whether that pass has begun.
         tries: number of retries so far.
-        home: the cell (row, col) where the first order began, since a reset or a change of map.
+        home: cell (row, col) where the first order since a reset or a change of map began.
         paused: whether the robot must stand.
         errand: destination to drive to before the order continues.
         why: why there is no order, why it is paused, or how it ended.
@@ -102,7 +102,7 @@ class OrderProgress:
 
     @property
     def current_pass(self) -> Laid:
-        """The pass being made, on a lattice."""
+        """The present pass, with its lanes on a lattice."""
         zone = self.current_zone
         return Laid() if zone is None else zone.laid(self.pass_number)
 

@@ -41,7 +41,7 @@ from fasaco_edge.mission.orders.reached_cells import ReachedCells
 
 __all__ = ["AT_HOME", "NO_ORDER", "NO_PLACES", "OrderState", "PlacesNote", "Stage"]
 
-# Reason of being idle without autostart.
+# Reason for being idle without autostart.
 NO_ORDER = "no order yet: start a mission"
 AT_HOME = "at home"
 _START_AGAIN = "start the mission again; nothing is driven without an order"
@@ -221,7 +221,8 @@ class _Note(
 ):
     """An order state as kept on disk; member names are those of the files.
 
-    Older daemons read a note without errand, keep-outs, frame, places, reached cells and limit.
+    Older daemons can read it only without errand, keep-outs, frame, places, reached cells and time
+    limit.
     """
 
     version: Literal[1]

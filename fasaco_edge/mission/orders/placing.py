@@ -1,4 +1,4 @@
-"""Placing of orders: zones by name become standing zones or rooms, whose outlines they follow.
+"""Placing of orders: zones given by name get the polygons of standing zones, or of rooms.
 
 Polygons are in the map frame, except in ``rotated_order``.
 """
@@ -42,7 +42,7 @@ def located(
 def _looked_up(
     zone: Zone, index: int, standing: dict[str, Polygon], book: RoomBook, *, may_wait: bool
 ) -> Zone:
-    """Return a zone with its polygon or its room's number; with neither if it waits."""
+    """Return a zone with its polygon or its room's number; unchanged if it waits for a room."""
     if not zone.room and zone.polygon != ():
         return zone
     if not zone.room and zone.name in standing:

@@ -53,7 +53,7 @@ class PlanScope:
 
         Args:
             cell: the robot's cell.
-            before: int32 (n, 2), the current path from there on.
+            before: int32 (n, 2), the current path from that cell on.
             home: the cell that the order leads back to at its end.
             attempt: see ``CoverageProblem``.
 
@@ -77,7 +77,7 @@ class PlanScope:
             cost=self._cost(),
             before=before,
             attempt=attempt,
-            # The robot may have left the path, on which an attempt starts, for another area.
+            # An attempt starts on the path, from which the robot may have moved to another area.
             reachable=reachable if area.contains(cell) else None,
         )
         return self._room_price.added_to(problem)
@@ -90,7 +90,7 @@ class PlanScope:
         return cost.along(state.current_pass.lanes)
 
     def walk_s(self, cells: NDArray[np.int32]) -> float:
-        """Return how long a walk takes in the present pass [s]."""
+        """Return the duration of a walk in the present pass [s]."""
         return self._cost().of_walk(cells)
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:

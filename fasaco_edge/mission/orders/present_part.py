@@ -102,7 +102,7 @@ class PresentPart(OrderReach):
 
         Args:
             cell: the robot's cell.
-            before: int32 (n, 2), the current path from there on.
+            before: int32 (n, 2), the current path from that cell on.
             attempt: see ``CoverageProblem``.
 
         Raises:

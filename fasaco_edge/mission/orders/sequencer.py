@@ -25,7 +25,8 @@ from fasaco_edge.mission.orders.present_part import MAX_IN_VAIN, PresentPart
 from fasaco_edge.mission.orders.zones import in_zones
 
 # A robot is shut in if its reachable area is below this share of the area that was ever reachable:
-# HOME_SHARE if home is in it, as a closed door then need not stop it, else MOST_SHARE.
+# HOME_SHARE if the area contains home, so that a closed door to other rooms has no effect, else
+# MOST_SHARE.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 CARRIED_OUT = "the order was carried out"
 
@@ -71,7 +72,7 @@ class Sequencer(PresentPart):
         return self.order_state.stage is Stage.OVER
 
     def start(self, state: OrderState) -> None:
-        """Begin another order, or none."""
+        """Begin with another order, or with none."""
         self.order_state = replace(state, reached=None)
         self._left_behind, self._retry_at = LeftBehind(), None
         is_over = state.stage is Stage.OVER and bool(state.why)
@@ -136,7 +137,7 @@ class Sequencer(PresentPart):
         return "" if state.automatic else state.title
 
     def _forget(self, zone: Zone, state: OrderState) -> None:
-        """Forget the visits of the cells that the pass which begins covers again."""
+        """Forget the visits to cells that the new pass covers again."""
         number, covers = state.pass_number, state.current_pass.covers
         if number == 1 or covers == "all":
             self._ledger.forget(partial(in_zones, (zone,)))

@@ -76,7 +76,7 @@ class WorthFirst:
         self._cell_m, self._zone, self._frame = cell_m, zone, frame
         # The received priorities on the cells of a window, int8 (rows, cols); -1 for none.
         self._on_cells: tuple[Window, NDArray[np.int8]] | None = None
-        # Least time per cell [s]: an estimate too low never puts off floor that fits.
+        # Lower bound of the time per cell [s], so that floor which fits is never put off.
         self._cell_s = step_s
         self._is_given_up = False
 
