@@ -272,7 +272,7 @@ class FloorMap:
         return stand_placement(self.geometry, self._footprint.cell_m, self.discs.radius_m)
 
     def _compute_stands(self, plain: CoverageLattice, stale: NDArray[np.bool_]) -> None:
-        """Recompute stale cells; the others are those of the previous lattice."""
+        """Recompute stale cells; the others are taken from the previous lattice."""
         self.stands = StandLattice.where(
             self.blocked,
             self.places,

@@ -97,12 +97,8 @@ class Window:
 
     def in_chunks(self, chunk: int, rows: int, cols: int) -> Window:
         """Return the window rounded outward to chunks of a grid of ``rows`` x ``cols`` cells."""
-        return Window(
-            self.row0 // chunk * chunk,
-            self.col0 // chunk * chunk,
-            min(-(-self.row1 // chunk) * chunk, rows),
-            min(-(-self.col1 // chunk) * chunk, cols),
-        )
+        whole = self.rounded_out(chunk)
+        return Window(whole.row0, whole.col0, min(whole.row1, rows), min(whole.col1, cols))
 
     def rounded_out(self, chunk: int) -> Window:
         """Return the window rounded outward to whole chunks of an unbounded grid."""

@@ -15,13 +15,12 @@ from PIL import Image
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.host.outputs import whole
 from fasaco_edge.judge.floor import FloorFigures
 from fasaco_edge.offline.figures import floor_document, floor_words, judged_floor
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.plan import plan
-from fasaco_edge.offline.result import Drive, Plan, picture_of, png_of
+from fasaco_edge.offline.result import Drive, Plan, picture_of, png_of, saved
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
 from fasaco_edge.planners.passes import Pass, laid, read_pass
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
@@ -88,7 +87,7 @@ class PassPlans:
 
     @property
     def figures(self) -> dict[str, object]:
-        """All figures as JSON values: those of ``fasaco-edge plan --json``."""
+        """All figures of ``fasaco-edge plan --json`` as JSON values."""
         first = self.plans[0]
         return {
             "map": first.map.name,
@@ -118,10 +117,7 @@ class PassPlans:
         for each in pictures:
             picture.paste(each, (left, 0))
             left += each.width
-        if file is not None:
-            with whole(Path(file)) as new:
-                picture.save(new, "PNG")
-        return picture
+        return saved(picture, file)
 
 
 def plan_passes(
@@ -149,7 +145,7 @@ def plan_passes(
         end: where the last pass ends: "anywhere", "home", or a cell.
 
     Raises:
-        BadConfiguration: a value is invalid; further errors are those of ``plan``.
+        BadConfiguration: a value is invalid; ``plan`` raises further errors.
     """
     robot = RobotConfig() if robot is None else robot
     if robot.turn_radius_m > 0.0:

@@ -180,7 +180,7 @@ class Plan:
 
     @property
     def figures(self) -> dict[str, object]:
-        """All figures as JSON values: those of ``fasaco-edge plan --json``."""
+        """All figures of ``fasaco-edge plan --json`` as JSON values."""
         path, problem, search, floor = self.path, self.problem, self.search, self.floor
         cell_m = problem.lattice.cell_m
         curve = {}
@@ -232,11 +232,7 @@ class Plan:
 
         ``rooms``: whether it shows each room in its colour, in place of the swept floor.
         """
-        picture = picture_of(self, rooms=rooms)
-        if file is not None:
-            with whole(Path(file)) as new:
-                picture.save(new, "PNG")
-        return picture
+        return saved(picture_of(self, rooms=rooms), file)
 
 
 def driving(robot: RobotConfig) -> dict[str, float | None]:
@@ -247,6 +243,14 @@ def driving(robot: RobotConfig) -> dict[str, float | None]:
         "turn_s": robot.cost().quarter_turn_s,
         **{name: getattr(robot, name) if has_limits else None for name in LIMITS},
     }
+
+
+def saved(picture: Image.Image, file: str | Path | None) -> Image.Image:
+    """Return a picture, also written to ``file`` as PNG unless that is None."""
+    if file is not None:
+        with whole(Path(file)) as new:
+            picture.save(new, "PNG")
+    return picture
 
 
 def png_of(picture: Image.Image) -> bytes:

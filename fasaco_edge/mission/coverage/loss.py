@@ -8,6 +8,7 @@ import numpy as np
 
 from fasaco_edge.errors import WouldForget
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.floor_tiles import window_of
 from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
@@ -77,9 +78,8 @@ def _beyond(window: Window, zones: tuple[Zone, ...], own: LedgerSnapshot) -> int
     The map may have been larger, as before a restart of the mapper.
     """
     cells = 0
-    for i, j in own.tiles:
-        tile = Window(TILE * i, TILE * j, TILE * (i + 1), TILE * (j + 1))
-        for part in tile.without(window):
+    for place in own.tiles:
+        for part in window_of(place, TILE).without(window):
             covered = (own.visits(part) > 0) & in_zones(zones, part, own.cell_m)
             for row, col in own.under_tool:
                 if part.contains(Window(row, col, row + 1, col + 1)):

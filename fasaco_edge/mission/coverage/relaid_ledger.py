@@ -22,6 +22,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     Place,
     Similarity,
     swept_on,
+    window_of,
 )
 from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.planners.living_trail import NO_TRAIL
@@ -74,9 +75,8 @@ def _rotated(
         )
         places |= {(i, j) for i in rows for j in cols}
     for place in sorted(places):
-        row, col = side * place[0], side * place[1]
-        window = Window(row, col, row + side, col + side)
-        squares = rotated_geometry(GridGeometry.of_cells(window, edge_m), -by_deg)
+        cells = GridGeometry.of_cells(window_of(place, side), edge_m)
+        squares = rotated_geometry(cells, -by_deg)
         swept = swept_on(floor.swept_in, Similarity.of(squares), Window(0, 0, side, side))
         if swept.any():
             yield place, swept

@@ -70,15 +70,17 @@ def has_moved(change: LatticeChange) -> bool:
     """Return whether a map shows many walls at other places."""
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
-    then, now = (
-        lattice.window.values_at(lattice.states, change.cells, UNKNOWN)
-        for lattice in (change.before, change.after)
-    )
+    then, now = _states(change.before, change), _states(change.after, change)
     changed = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
     # Counts the whole lattice only if necessary, as this runs with every map.
     return changed >= LEAST_CELLS and changed >= LEAST_SHARE * int(
         np.count_nonzero(change.before.states != UNKNOWN)
     )
+
+
+def _states(lattice: CoverageLattice, change: LatticeChange) -> NDArray[np.uint8]:
+    """Return the states of the changed cells on a lattice, uint8 (n,)."""
+    return lattice.window.values_at(lattice.states, change.cells, UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,11 +258,8 @@ def closes_cells(change: LatticeChange | None) -> bool:
     """Return whether a change of the lattice closes cells, as a shift of the map does."""
     if change is None or change.before is None:
         return False
-    then, now = (
-        lattice.window.values_at(lattice.states, change.cells, UNKNOWN)
-        for lattice in (change.before, change.after)
-    )
-    closed = (then == COVERABLE) & (now == BLOCKED)
+    was_open = _states(change.before, change) == COVERABLE
+    closed = was_open & (_states(change.after, change) == BLOCKED)
     return bool(np.count_nonzero(closed) >= LEAST_CLOSED)
 
 

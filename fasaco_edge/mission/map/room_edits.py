@@ -72,7 +72,7 @@ def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
         OrderError: there is no such room, the rooms are not joined, or the name is taken.
     """
     sheet = _sheet(book) if book.sheet else None
-    rooms = sorted({room.id: room for room in map(book.room, called)}.values(), key=_number)
+    rooms = [room for _, room in sorted({each.id: each for each in map(book.room, called)}.items())]
     if len(rooms) < 2 or sheet is None:
         raise OrderError("room.others: a merge takes two rooms or more", hint="name another room")
     numbers = [room.id for room in rooms]
@@ -108,10 +108,6 @@ def move(book: RoomBook, motion: Motion) -> None:
 def _moved(point: Point, motion: Motion) -> Point:
     x, y = motion.forward(np.array([point[0]]), np.array([point[1]]))
     return float(x[0]), float(y[0])
-
-
-def _number(room: Room) -> int:
-    return room.id
 
 
 def _sheet(book: RoomBook) -> RoomSheet:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.errors import NotPublished
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.grid.rotation import rotated_pose
@@ -121,12 +121,8 @@ class RoomWatch:
 
     def move(self, motion: Motion, lattice_deg: float) -> None:
         """Move the rooms with the map; ``motion`` is in the frame of the lattice."""
-        start, end = (_turned(pose, lattice_deg) for pose in (motion.start, motion.end))
+        start, end = (rotated_pose(pose, lattice_deg) for pose in (motion.start, motion.end))
         move(self.book, Motion(start, end))
-
-
-def _turned(pose: Pose2D, by_deg: float) -> Pose2D:
-    return rotated_pose(pose, by_deg) if by_deg else pose
 
 
 def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
