@@ -121,7 +121,7 @@ def _scan(config: DaemonConfig) -> Iterator[str]:
     if not config.scan:
         return
     if config.ros2 and config.ros2.follow == "nav2":
-        yield "scan has no effect where ros2.follow is nav2: scans are Nav2's business there"
+        yield "scan has no effect where ros2.follow is nav2, as Nav2 reads scans itself"
     away_m = math.hypot(config.scan.x_m, config.scan.y_m)
     if away_m > config.robot.radius_m:
         yield (

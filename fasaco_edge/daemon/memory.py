@@ -30,7 +30,7 @@ A cell takes these bytes:
 * the path: some 80 for each pose, twice while it is sent;
 * the living trail: 16, as much again while a copy is planned on or written, and 8 in the ledger's
   file; the trail of a plan's ants spans only the regions that they walked on;
-* priorities: 1 for those of a message, and 2 for those of rooms;
+* priorities: 1 if received as a message, and 2 for priorities of rooms;
 * covered cells of the ledger: 4, with the copy being written;
 * swept floor: 18 for a cell of 0.3 m, a bit for each pixel of 2.5 cm, and as much again if it has
   changed since the copy being written.

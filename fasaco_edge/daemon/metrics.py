@@ -130,7 +130,7 @@ FIGURES = (
         "plans that were outdated when they arrived",
         _member("plan", "outdated"),
     ),
-    Figure("latency_seconds", "how long a stage took last", _latencies),
+    Figure("latency_seconds", "last duration of each stage", _latencies),
     Figure("cycles_total", "cycles of the loop", _member("loop_ms", "turns")),
     Figure("cycles_late_total", "cycles longer than 100 ms", _member("loop_ms", "late")),
     Figure(

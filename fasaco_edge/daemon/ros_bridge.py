@@ -1,6 +1,6 @@
 """The ROS 2 bridge: the daemon's samples under the keys of a ROS 2 graph, without ROS.
 
-Incoming samples enter the mailbox with those of the native keys; outgoing samples are encoded once
+Incoming samples share the mailbox with samples of native keys; outgoing samples are encoded once
 for both. rmw_zenoh and zenoh-bridge-ros2dds differ only in keys, attachments and tokens.
 """
 

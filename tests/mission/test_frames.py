@@ -43,7 +43,7 @@ def test_one_map_in_another_frame_costs_nothing(driven):
     again = restarted(driven, ODOM)
     assert again.mission.state is State.WAITING_FOR_MAP
     assert again.mission.reason == (
-        "no map in frame 'map' yet, that of the progress kept: the newest is in 'odom'"
+        "no map in frame 'map' yet, in which progress is kept: the newest is in 'odom'"
     )
     decision = again.tell(MAP, HERE)
     assert decision.faults == ()

@@ -200,7 +200,7 @@ def mission_report(
 
 
 def _keep_outs(order_state: OrderState) -> Iterator[KeepOutReport]:
-    """Yield the keep-outs of the operator, then those of the order, in the map frame."""
+    """Yield the keep-outs of the operator, then of the order, in the map frame."""
     for keep_out in order_state.keep_out:
         yield KeepOutReport(keep_out.name, _corners(keep_out.polygon))
     if order_state.order is not None:

@@ -3,7 +3,7 @@
 The duration of a turn is the time from ``BESIDE_S`` before it to ``BESIDE_S`` after it, minus the
 time of that distance at full speed, so it includes braking and starting, as
 ``robot.quarter_turn_s`` does. Only turns between two straight stretches count, faster than
-``TURNS_RAD_S``. The results are medians, which waits at turns change little. Times are those of the
+``TURNS_RAD_S``. The results are medians, which waits at turns change little. Times are by the
 poses' stamps.
 
 Swept floor uses only poses that the robot can have driven to. Localisation sometimes errs by more

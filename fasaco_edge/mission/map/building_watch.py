@@ -111,7 +111,7 @@ class Agreement:
 
 
 class BuildingWatch:
-    """Compares each map with the previous building. Times are [s], lattices those of cell centres.
+    """Compares each map with the previous building. Times are [s], lattices of cell centres.
 
     Attributes:
         why: why the robot has to stand; "" if it may drive.
@@ -241,8 +241,8 @@ class BuildingWatch:
         if for_s >= GRACE_S:
             self.why = (
                 "the map shows another building, or another floor, and the pose has not moved "
-                f"with it: waits until the map has stayed so for {patience_s:g} s, or has shown "
-                f"the one before for {SETTLED_S:g} s"
+                f"with it: waits until maps have shown that for {patience_s:g} s, or the previous "
+                f"building for {SETTLED_S:g} s"
             )
         return for_s >= patience_s
 

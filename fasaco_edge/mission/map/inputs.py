@@ -141,7 +141,7 @@ class FrameSelector:
         if not self.active or not others:
             return "no map yet"
         return (
-            f"no map in frame {self.active!r} yet, that of the progress kept: the newest is in "
+            f"no map in frame {self.active!r} yet, in which progress is kept: the newest is in "
             f"{others[-1]!r}{self._outlook(others[-1])}"
         )
 
@@ -156,8 +156,8 @@ class FrameSelector:
         if frame != self._rival:
             return ""
         return (
-            f"; that frame counts once map and poses have come in it for {PATIENCE_S:g} s and no "
-            f"pose in {self.active!r}, or at a reset"
+            "; that frame is used once map and poses have arrived only in it for "
+            f"{PATIENCE_S:g} s, or after a reset"
         )
 
     def _limit(self, held: dict[str, OccupancyGrid] | dict[str, tuple[StampedPose, float]]) -> None:

@@ -45,7 +45,7 @@ IN_DOCK_M = 0.5
 
 
 class MapState(Ground):
-    """Takes in maps and poses; the lattice and the floor are those of the newest map.
+    """Takes in maps and poses; lattice and floor show the newest map.
 
     Attributes:
         grid: the newest map, with all updates and obstacles; None before there is one.

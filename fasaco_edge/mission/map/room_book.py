@@ -267,7 +267,7 @@ class RoomBook:
         check_name(where, name)
         if LIKE_NUMBER.fullmatch(name):
             raise OrderError(
-                f"{where}: {name!r} is how a room without a name is called",
+                f"{where}: {name!r} would be read as the number of a room",
                 hint="choose a name that is more than a number",
             )
         taken = self.find(name)

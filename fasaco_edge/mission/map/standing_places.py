@@ -99,7 +99,7 @@ class StandingPlaces:
         """Why the keep-out zones of this map are unknown; "" if known, or if none are given."""
         is_given = "keep_out" in self._names or "keep_out_mask" in self._names
         why = self.why if is_given and self.why else self._why_no_mask
-        return f"{why}: waits for its own, or for that map" if why else ""
+        return f"{why}: waits for places of this map, or for that map" if why else ""
 
     @property
     def _why_no_mask(self) -> str:

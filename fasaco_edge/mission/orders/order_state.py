@@ -219,7 +219,7 @@ _KeepOuts = Annotated[list[KeepOutDocument], Meta(max_length=MOST_KEEP_OUT)]
 class _Note(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True
 ):
-    """An order state as kept on disk; member names are those of the files.
+    """An order state as kept on disk, with the files' member names.
 
     Older daemons can read it only without errand, keep-outs, frame, places, reached cells and time
     limit.

@@ -49,7 +49,7 @@ class PresentPart(OrderReach):
         # Number of cells done at the last path's end (-1 before the first path), and number of
         # paths in a row that did not increase it.
         self._done, self._in_vain = -1, 0
-        # Whether the next plan begins a pass whose lanes differ from those of the pass before.
+        # Whether the next plan begins a pass with other lanes than the pass before.
         self._has_new_lanes = False
         self.cells = CellsLeft(
             *(config, map_state, ledger, company),
