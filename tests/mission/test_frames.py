@@ -104,7 +104,7 @@ def test_progress_is_set_aside_only_once_it_is_certain(driven):
     faults = told_for(again, PATIENCE_S - 1.5, ODOM, THERE)
     assert {type(fault) for fault in faults} == {WrongFrame}
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
-    assert "counts once map and poses have come in it for 10 s" in again.mission.reason
+    assert "is used once map and poses have arrived only in it for 10 s" in again.mission.reason
     mismatch = [
         fault
         for fault in told_for(again, 3.0, ODOM, THERE)
