@@ -303,8 +303,8 @@ class DaemonConfig(Section, frozen=True):
     def lattice_deg(self) -> float | None:
         """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls.
 
-        Cells are aligned with the axes if walks lead through cell centres, and in a fleet, as each
-        of its robots would see other walls first.
+        Cells are aligned with the axes if walks lead through cell centres. They are in a fleet,
+        too, as each of its robots would see other walls first.
         """
         if self.planner.line == "cells" or self.planner.align == "axes":
             return 0.0

@@ -30,7 +30,7 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
 SILENT_AFTER_S = 30.0
 # Timeout of its first report, as slow computers load its libraries for half a minute [s].
 START_WITHIN_S = 120.0
-# Processor time in each wait for its end, below which a recorder hangs [s].
+# Least processor time that an ending recorder uses in each wait; with less it hangs [s].
 WORKS_S = 0.01
 
 
@@ -116,7 +116,7 @@ class RecorderSupervisor:
             return
         if self._process is not None and report.pid == self._process.pid:
             self._report, self._reported_at = report, now
-            # Only a longer run resets the pause: a recorder that fails on its data reports first.
+            # A report alone does not reset the pause: a recorder may report, then fail on its data.
             if now - self._began_at >= LONGEST_PAUSE_S:
                 self._pause_s = FIRST_PAUSE_S
 

@@ -93,7 +93,7 @@ def plan(
             method ``plan``. It gets the seed of ``search``, and is ended after ``budget_s``, by
             default 60 s, if it runs in the main thread.
         stop: stopping criterion.
-        watch: called with the progress of the search for a walk, for a second walk from the start.
+        watch: called with the progress of each search for a walk.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
             once at the end of colony-search; not by planners without pheromone.
 

@@ -42,7 +42,7 @@ REASONS = {
     Cause.KEPT_OUT: "in a keep-out zone",
     Cause.BEHIND_KEEP_OUT: "closed off by a keep-out zone",
     Cause.BEHIND_OBSTACLES: "closed off by obstacles",
-    # Whether by an obstacle, a wall that has moved, or one thicker by a pixel, is unknown.
+    # The reason may be an obstacle, a wall that has moved, or one drawn thicker by a pixel.
     Cause.CLOSED: "no longer free on the map",
     Cause.UNKNOWN: "unknown to the map",
 }
@@ -153,8 +153,8 @@ class OrderReach:
             once = self._once_on(window)
             here = once[area.lattice.window.slices_in(window)]
             if self._have_moved:
-                # After a motion by a fraction of a cell, moved cells that are not coverable and lie
-                # beside reachable cells are in walls.
+                # After a motion by a fraction of a cell, some moved cells lie in walls: those that are
+                # not coverable beside reachable cells.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
             self._once, self._newest, self._have_moved = (window, once), area, False
@@ -285,7 +285,7 @@ class OrderReach:
         return REASONS.get(cause, f"{LEFT_OVER} {tries}{why}")
 
     def _viewpoints(self) -> set[Cell]:
-        """Return the cells (row, col) that show areas closed since."""
+        """Return the cells (row, col) from which the robot can look at closed areas."""
         order, area = self.order_state.order, self._map.area
         if order is None or area is None:
             return set()

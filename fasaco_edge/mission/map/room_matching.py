@@ -43,8 +43,8 @@ HOLD_NEW, HOLD_CHANGE = 4, 8
 SETTLED = 2 * HOLD_CHANGE
 # Decrease of a change's score with an update that does not show it.
 PENALTY = 2
-# A region shows a room if they have in common this area [m2], or half of a smaller room, and this
-# share of the smaller of the two.
+# A region shows a room if their common area is at least LEAST_SHOWN_M2 [m2], or half of a smaller
+# room, and at least LEAST_SHARE of the smaller of the two.
 LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
 # Least size of a region, as a share of a room, to show all of the room: its other squares are then
 # no floor.

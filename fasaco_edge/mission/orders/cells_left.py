@@ -85,7 +85,7 @@ class CellsLeft:
         return int(np.count_nonzero(frontier(area) & self.asked_for(area.lattice.window)))
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
-        """Return which cells of ``window`` this robot has to cover, covered or not."""
+        """Return the cells of ``window`` that this robot has to cover, or has covered."""
         state = self._state()
         zone, order = state.current_zone, state.order
         due = (zone,) if zone is not None else order.zones if order is not None else ()

@@ -24,9 +24,8 @@ from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.present_part import MAX_IN_VAIN, PresentPart
 from fasaco_edge.mission.orders.zones import in_zones
 
-# A robot is shut in if its reachable area is below this share of the area that was ever reachable:
-# HOME_SHARE if the area contains home, so that a closed door to other rooms has no effect, else
-# MOST_SHARE.
+# Share of the area ever reachable, below which a robot is shut in: HOME_SHARE with home in reach, so
+# that a closed door to another room has no effect, else MOST_SHARE.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 CARRIED_OUT = "the order was carried out"
 
@@ -107,7 +106,7 @@ class Sequencer(PresentPart):
         self._left_behind.set_out(None)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
-        """Return whether home and most floor, or nearly all floor, are out of reach of an area.
+        """Return whether an area lacks home and most floor, or nearly all floor.
 
         False if all is covered, as the order can end then.
         """
