@@ -160,11 +160,11 @@ class Mailbox(Generic[Item]):
             return items
 
     def hold(self) -> None:
-        """Keep rate-limited kinds and their followers until ``let_go``."""
+        """Keep rate-limited kinds and their followers until ``release``."""
         with self._changed:
             self._free_at = math.inf
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Return the kinds kept by ``hold`` again."""
         with self._changed:
             self._free_at = -math.inf

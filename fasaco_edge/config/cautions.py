@@ -1,6 +1,6 @@
-"""Cautions: settings that are in order each, but together have no effect, or one not expected.
+"""Cautions: valid settings that together have no effect, or an unexpected one.
 
-The daemon starts with them; values that it cannot work with are faults of ``loading``.
+The daemon starts with them; invalid values are faults of ``loading``.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from fasaco_edge.grid.polygons import is_near
 
 LOG = logging.getLogger(__name__)
 
-# How often poses come at least, as localisers send them [Hz]; and how far apart two may be, in
-# tool's widths, for the floor between them to count (``mission.coverage.swept_floor.JUMP_TOOLS``).
+# Least rate of poses, as localisers send them [Hz]; largest distance of two poses between which
+# floor counts as swept [tool widths] (``mission.coverage.swept_floor.JUMP_TOOLS``).
 POSES_HZ, JUMP_TOOLS = 10.0, 2.0
-# Clearance above this share of the tool's width is given up along walls
+# Share of the tool's width above which lines give up clearance along walls
 # (``planners.line.NEAR_SHARE``).
 NEAR_SHARE = 0.2
-# Rounding of a tool as wide as the robot [m].
+# Tolerance for a tool as wide as the robot [m].
 ROUNDING_M = 1e-6
 
 
 def cautions(config: DaemonConfig) -> list[str]:
-    """Return the cautions, each with the keys that it is about."""
+    """Return the cautions, each with its keys."""
     robot = config.robot
     found = (
         *(_tool(robot), _clearance(config), _turns(robot), _planner(config), _places(config)),
@@ -42,7 +42,7 @@ def log_cautions(config: DaemonConfig) -> None:
 
 
 def tool_caution(robot: RobotConfig) -> str:
-    """Return that the tool sticks out of the robot's disc; "" if it does not."""
+    """Return the caution that the tool extends beyond the robot's disc; "" for none."""
     tool_m = abs(robot.tool_ahead_m) + 0.5 * robot.tool_width_m
     out_m = tool_m - robot.radius_m
     if out_m <= ROUNDING_M:
@@ -121,7 +121,7 @@ def _scan(config: DaemonConfig) -> Iterator[str]:
     if not config.scan:
         return
     if config.ros2 and config.ros2.follow == "nav2":
-        yield "scan has no effect where ros2.follow is nav2: scans are Nav2's business there"
+        yield "scan has no effect where ros2.follow is nav2, as Nav2 reads scans itself"
     away_m = math.hypot(config.scan.x_m, config.scan.y_m)
     if away_m > config.robot.radius_m:
         yield (

@@ -1,4 +1,4 @@
-"""Certificates: whether a certificate, its key and its CA fit together, tried by a handshake."""
+"""Certificate check: whether a certificate, its key and its CA match, tried by a handshake."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class Certificate:
     """Content of a certificate.
 
     Attributes:
-        name: its common name, by which roles are given.
+        name: its common name, to which roles are assigned.
         hosts: the names and addresses by which others may connect to it.
-        begins: when it and its CA are valid.
-        ends: when it or its CA ends, whichever is first.
+        begins: time from which both it and its CA are valid.
+        ends: time at which it or its CA expires, whichever is first.
     """
 
     name: str
@@ -51,7 +51,7 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
         listens: whether its owner accepts connections, too.
 
     Raises:
-        BadConfiguration: a file cannot be read, has ended, or does not fit the others.
+        BadConfiguration: a file cannot be read, has expired, or does not match the others.
         ClockBeforeCertificate: by this computer's clock it is not valid yet.
     """
     try:
@@ -67,7 +67,7 @@ def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
             hint="name the CA that has signed it, or have it signed anew (protocol/security.md)",
         ) from error
     except ssl.SSLError as error:
-        # OpenSSL gives no reason where a file is not PEM, or the key is locked.
+        # OpenSSL gives no reason if a file is not PEM, or the key is locked.
         reason = (error.reason or "not PEM, or a key with a password").lower().replace("_", " ")
         together = f"{files.certificate}, {files.private_key} and {files.root_ca}"
         raise BadConfiguration(f"{together} do not fit together: {reason}") from error

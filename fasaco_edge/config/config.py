@@ -37,7 +37,7 @@ Percent = Annotated[int, Meta(ge=0, le=100)]
 
 
 class BusConfig(Section, frozen=True):
-    """How to join the bus, and who else may.
+    """How the daemon joins the bus, and who else may join it.
 
     Remote access requires authentication (``security``), unless ``open_to_everyone`` is set.
     """
@@ -52,7 +52,7 @@ class BusConfig(Section, frozen=True):
     def settings(self, prefix: str, ros: RosConfig | None = None) -> BusSettings:
         """Return the settings of the session of a robot whose keys begin with ``prefix``.
 
-        ``ros`` are its keys under ROS 2.
+        ``ros``: its section of ROS 2; None without one.
 
         Raises:
             BadConfiguration: a file of ``security`` cannot be read.
@@ -84,7 +84,7 @@ class MapConfig(Section, frozen=True):
 
 
 class PoseConfig(Section, frozen=True):
-    """The type of poses whose samples name none, as under ROS 2."""
+    """The type of poses in samples that name none, as under ROS 2."""
 
     schema: Literal[
         "geometry_msgs/msg/PoseStamped",
@@ -99,15 +99,16 @@ class PlannerConfig(Section, frozen=True):
     While the robot drives, ``spare_share`` of a processor core is used to improve the rest of its
     path; only colony-search can do that.
 
-    colony-search looks for the fewest seconds until the budget ends; ``ants``, ``visibility`` and
-    ``threads`` are for fasaco and aco, which may end earlier.
+    colony-search minimises the seconds of driving until the budget ends; ``ants``, ``visibility``
+    and ``threads`` apply to fasaco and aco, which may end earlier.
 
     ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
-    ``visibility`` is eta of the paper's ants with ``neighbour``; with ``fewest-open`` they prefer
-    cells that would soon be cut off, which saves revisits (``tests/benchmarks/RESULTS.md``).
+    ``visibility`` is eta of the ants: ``neighbour`` as in the paper; with ``fewest-open`` they
+    prefer cells that would soon be cut off, which saves revisits
+    (``tests/benchmarks/RESULTS.md``).
 
-    ``align`` is the direction of the rows of cells if a line is driven: that of the building's
-    walls, once the map shows them clearly; of the map frame's axes; or at an angle to these [deg].
+    ``align`` is the direction of the rows of cells if a line is driven: along the building's walls,
+    once the map shows them clearly; along the map frame's axes; or at an angle to these [deg].
     """
 
     name: PlannerName = "colony-search"
@@ -126,7 +127,7 @@ class PlannerConfig(Section, frozen=True):
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def colony(self) -> ColonyConfig:
-        """Return these as a colony.
+        """Return the configuration of the colony.
 
         Raises:
             BadConfiguration: the velocities cannot be read, or there are fewer ants
@@ -145,7 +146,7 @@ class PlannerConfig(Section, frozen=True):
 
 
 class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
-    """The mission's policy, and where progress is kept.
+    """The mission's policy, and the folder of its progress.
 
     ``state_dir`` "" is the state folder of the service, else of the user.
     """
@@ -177,12 +178,12 @@ def _home(path: Path) -> Path:
 
 
 class FleetConfig(Section, frozen=True):
-    """Robots under one ``bus.base`` with this name and one map frame share the work in an area.
+    """A fleet: robots with the same ``bus.base``, name and map frame share the work in an area.
 
     Only names of frames are compared, so the frame must have the same origin for all. Robots with
     maps of their own set a common ``frame``, and the pose of their map's origin in it: ``x_m``,
-    ``y_m`` [m], ``yaw_deg`` [deg]. The pose is valid for the map in ``map_frame``, else for the
-    first map received with it: on another map, as of another floor, the robot takes no part.
+    ``y_m`` [m], ``yaw_deg`` [deg]. The pose is valid for the map in ``map_frame``, by default for
+    the first map received; on another map, as of another floor, the robot takes no part.
     """
 
     name: Annotated[str, Meta(min_length=1, max_length=64)]
@@ -227,16 +228,16 @@ class RecordingConfig(Section, frozen=True):
 
 
 class MetricsConfig(Section, frozen=True):
-    """Where the figures of the status are served over HTTP: ``127.0.0.1:9465``; "" for nowhere.
+    """The address of metrics over HTTP, as ``127.0.0.1:9465``; "" for none.
 
-    Other computers may read them only where ``open_to_everyone`` is set: HTTP asks for no password.
+    Other computers may read them only if ``open_to_everyone`` is set, as HTTP asks for no password.
     """
 
     listen: str = ""
     open_to_everyone: bool = False
 
     def address(self) -> Address | None:
-        """Return where to listen; None for nowhere.
+        """Return the address; None for none.
 
         Raises:
             BadConfiguration: it is no address with a port, or other computers can reach it although
@@ -254,8 +255,11 @@ class MetricsConfig(Section, frozen=True):
 
 
 class DaemonConfig(Section, frozen=True):
-    """The whole configuration; without ``fleet`` the robot is alone, without ``scan`` it uses only
-    the map, without ``ros2`` nothing is published or subscribed under ROS."""
+    """The whole configuration.
+
+    Without ``fleet`` the robot is alone, without ``scan`` it uses only the map, and without
+    ``ros2`` it neither publishes nor subscribes under ROS.
+    """
 
     robot: RobotConfig = RobotConfig()
     bus: BusConfig = BusConfig()
@@ -282,8 +286,8 @@ class DaemonConfig(Section, frozen=True):
     def lattice_deg(self) -> float | None:
         """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls.
 
-        Walks through the centres of cells, and robots that share cells, keep to the axes: each
-        robot of a fleet would see other walls first.
+        Cells are aligned with the axes if walks lead through cell centres. They are in a fleet,
+        too, as each of its robots would see other walls first.
         """
         if self.planner.line == "cells" or self.planner.align == "axes":
             return 0.0

@@ -22,7 +22,7 @@ def protocol_of(endpoint: str) -> str:
 
 
 def host_of(endpoint: str) -> str:
-    """Return the host of an IP endpoint, without brackets; "" where none can be made out."""
+    """Return the host of an IP endpoint, without brackets; "" for none."""
     address = re.split(r"[?#]", endpoint.partition("/")[2])[0]
     host = address.rpartition(":")[0]
     return host[1:-1] if host.startswith("[") and host.endswith("]") else host
@@ -31,7 +31,7 @@ def host_of(endpoint: str) -> str:
 def is_local(endpoint: str) -> bool:
     """Return whether only this computer can reach an endpoint; False if uncertain.
 
-    Names are not resolved: any but ``localhost`` may stand for any address.
+    Names are not resolved; the only local name is ``localhost``.
     """
     protocol = protocol_of(endpoint)
     if protocol in UNIX:
@@ -68,11 +68,11 @@ MOST_BYTES = 255
 
 
 def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfiguration]:
-    """Yield the faults of endpoints, for which Zenoh would only report that none answers.
+    """Yield the faults of endpoints; Zenoh would only report that none of them answers.
 
     Args:
-        name: of the key or option that has them.
-        endpoints: as they were given.
+        name: the key or option that contains them.
+        endpoints: the endpoints as given.
     """
     for endpoint in endpoints:
         if why := _why_none(endpoint):

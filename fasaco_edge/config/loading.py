@@ -46,12 +46,12 @@ def load_config(path: Path | None) -> DaemonConfig:
 
 
 def with_mask(config: DaemonConfig, file: Path | None, most_bytes: int | None) -> DaemonConfig:
-    """Return a configuration that holds its keep-out mask itself.
+    """Return a configuration that contains its keep-out mask.
 
     Args:
         config: configuration that names a mask file, relative to its own folder.
-        file: of the configuration.
-        most_bytes: most memory for reading the mask [bytes]; None for no limit.
+        file: the file of the configuration.
+        most_bytes: limit on the memory for reading the mask [bytes]; None for no limit.
 
     Raises:
         BadConfiguration: the mask cannot be read, or takes more memory.
@@ -68,7 +68,7 @@ def decode_config(document: bytes) -> DaemonConfig:
     """Return a configuration from the JSON that another process of the package has encoded.
 
     Raises:
-        BadConfiguration: it is none.
+        BadConfiguration: it is no configuration.
     """
     try:
         return msgspec.json.decode(document, type=DaemonConfig)
@@ -81,7 +81,7 @@ def inspect_config(
 ) -> tuple[DaemonConfig | None, tuple[Fault, ...]]:
     """Read a YAML file; return the configuration, or None and all faults.
 
-    Whether values fit together is checked where no fault of a value concerns them.
+    Values are checked for conflicts with each other where none of them is faulty.
 
     Args:
         path: the file; None for the defaults.
@@ -93,7 +93,7 @@ def inspect_config(
         text = read_text(path)
     except BadConfiguration as error:
         return None, (Fault("", error),)
-    faults = [*text.twice, *section_faults(DaemonConfig, text.document)]
+    faults = [*text.duplicates, *section_faults(DaemonConfig, text.document)]
     document = text.document if isinstance(text.document, dict) else {}
     sound = _sound(document, {fault.key for fault in faults})
     config = msgspec.convert(with_credentials(without_removed(sound)), DaemonConfig)
@@ -164,7 +164,7 @@ def _named_in(error: BadConfiguration) -> str:
 
 
 def _misfits(config: DaemonConfig) -> Iterator[BadConfiguration]:
-    """Yield values that do not fit together."""
+    """Yield conflicts between values."""
     low, high = config.map.free_at_most, config.map.occupied_at_least
     if low >= high:
         yield BadConfiguration(

@@ -17,8 +17,8 @@ from fasaco_edge.host.plain_yaml import PlainYamlError, compose, read_bounded
 from fasaco_edge.text import misfit, nearest, objects_of, shown
 
 FOLDER = "CREDENTIALS_DIRECTORY"
-# Keys of earlier releases: why each was removed, and its replacement. An empty one asked for
-# nothing, and is ignored: examples that were copied whole have it.
+# Removed keys of earlier releases: why, and what to do. A removed key without a value is ignored,
+# as copies of old examples contain it.
 REMOVED = {
     "planner.own": (
         "was removed in this version, the daemon plans with its own planners only",
@@ -43,7 +43,7 @@ class Fault:
     Attributes:
         key: its place, like ``bus.listen[0]``; "" for the file.
         error: the fault, and the allowed values; without the name of the file.
-        line: of the file, from 1; None if there is none.
+        line: line in the file, from 1; None if there is none.
     """
 
     key: str
@@ -59,8 +59,9 @@ def section_faults(
     Args:
         kind: the section.
         document: result of parsing its text as YAML.
-        key: of the section, "" for the whole.
-        root: the whole document: a key that is unknown in the section may belong elsewhere in it.
+        key: key of the section; "" for the whole.
+        root: type of the whole document, in which an unknown key of the section may belong
+            elsewhere.
     """
     root = root or kind
     fields = {field.encode_name: field for field in msgspec.structs.fields(kind)}
@@ -103,7 +104,7 @@ def without_removed(document: Mapping[str, object], key: str = "") -> dict[str, 
 def renamed(config: Mapping[str, object]) -> dict[str, object]:
     """Return a recorded configuration with this release's name of the planner.
 
-    ``planner.local_search`` made colony-search of fasaco.
+    With ``planner.local_search``, fasaco was what is now colony-search.
     """
     planner = config.get("planner")
     if not isinstance(planner, Mapping) or "local_search" not in planner:
@@ -115,12 +116,12 @@ def renamed(config: Mapping[str, object]) -> dict[str, object]:
 
 
 def section_of(kind: object) -> type[Section] | None:
-    """Return the section that a key of this type holds, also an optional one."""
+    """Return the section, optional or not, that a key of this type contains; None for none."""
     return next((each for each in objects_of(kind, 1) if issubclass(each, Section)), None)
 
 
 def _unknown_keys(kind: object, value: object, key: str, root: type[Section]) -> Iterator[Fault]:
-    """Yield the unknown keys of an object, or of each in a list, such as a dock or zones."""
+    """Yield the unknown keys of an object, such as a dock, or of a list of objects."""
     objects = {f"{key}[{at}]": each for at, each in enumerate(value if type(value) is list else ())}
     for place, held in (objects or {key: value}).items():
         for structure in objects_of(kind) if isinstance(held, dict) else ():
@@ -192,16 +193,16 @@ class ConfigText:
 
     Attributes:
         document: plain values.
-        lines: of each key, from 1 on.
-        twice: faults of keys that occur more than once: YAML would take the last.
+        lines: line of each key, from 1.
+        duplicates: faults of keys that occur more than once; YAML would take the last value.
     """
 
     document: object
     lines: dict[str, int] = dataclasses.field(default_factory=dict)
-    twice: tuple[Fault, ...] = ()
+    duplicates: tuple[Fault, ...] = ()
 
     def line_of(self, key: str) -> int | None:
-        """Return the line of a key, or of the section it belongs in; None if there is neither."""
+        """Return the line of a key, or of its section if it is missing; None if both are."""
         while key:
             if key in self.lines:
                 return self.lines[key]
@@ -226,13 +227,13 @@ def read_text(path: Path) -> ConfigText:
         hint = "correct the file at that place"
         raise BadConfiguration(f"not plain YAML: {error}", hint=hint) from error
     lines: dict[str, int] = {}
-    twice = []
+    duplicates = []
     for key, line in keys_and_lines(node):
         if key in lines:
             text = f"{key}: is given twice, in line {lines[key]} and in line {line}"
-            twice.append(Fault(key, BadConfiguration(text), line))
+            duplicates.append(Fault(key, BadConfiguration(text), line))
         lines[key] = line
-    return ConfigText(document if document is not None else {}, lines, tuple(twice))
+    return ConfigText(document if document is not None else {}, lines, tuple(duplicates))
 
 
 def keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:
@@ -252,8 +253,8 @@ def keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[s
 def with_credentials(part: object, environ: Mapping[str, str] = os.environ) -> object:
     """Return a part of a configuration with ``$CREDENTIALS_DIRECTORY/`` resolved.
 
-    A service manager lends files in a folder of another name for each service, see
-    LoadCredential= in systemd.exec(5). Without one the name stays, and the file is missing.
+    A service manager passes files in a folder of its own for each service (LoadCredential= in
+    systemd.exec(5)). Without that folder the text stays, so that the file is reported missing.
     """
     folder = environ.get(FOLDER)
     if folder is None:

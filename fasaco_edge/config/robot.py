@@ -28,12 +28,12 @@ Coordinate = Annotated[float, Meta(ge=-7, le=7)]
 
 
 class FootprintConfig(Section, frozen=True):
-    """The robot's outline about the point that it turns about [m]; x is ahead.
+    """The robot's outline relative to its turning point [m]; x points ahead.
 
-    Either ``width_m`` and ``length_m``, of which ``ahead_m`` lie ahead of that point (half without
-    it), or the corners (x, y) of a ``polygon``. The robot is planned with the disc around it: it
-    can turn on the spot wherever it is, and passages narrower than that disc are left out. The tool
-    is taken to be at the point that the robot turns about.
+    Either ``width_m`` and ``length_m``, of which ``ahead_m`` lie ahead of that point (by default
+    half), or the corners (x, y) of a ``polygon``. Plans use the disc around the outline, so that
+    the robot can turn on the spot anywhere; passages narrower than the disc are left out. The tool
+    is assumed at the turning point.
     """
 
     width_m: Length | None = None
@@ -42,7 +42,7 @@ class FootprintConfig(Section, frozen=True):
     polygon: tuple[tuple[Coordinate, Coordinate], ...] = ()
 
     def radius(self) -> float:
-        """Return the radius of the disc around it [m]; 0 if underspecified."""
+        """Return the radius of the disc around the outline [m]; 0 if underspecified."""
         corners = self.polygon
         if self.width_m is not None and self.length_m is not None:
             ahead = 0.5 * self.length_m if self.ahead_m is None else self.ahead_m
@@ -67,24 +67,25 @@ class FootprintConfig(Section, frozen=True):
 
 
 class RobotConfig(Section, frozen=True):
-    """The robot: its name on the bus, its size [m], and what driving takes it.
+    """The robot: its name on the bus, its size [m], and its driving.
 
-    ``quarter_turn_s`` is a turn by 90 degrees on the spot [s], braking and starting included; 0
-    minimises steps, whatever the turns. Where ``turn_deg_s`` is given, the robot's limits count in
-    its place: the rate of turning [deg/s], its acceleration [deg/s2], that of driving [m/s2], and
-    the largest bend that is steered while driving [deg]. ``overlap`` is the share of the tool's
-    width by which cells overlap under a line over the floor (``planner.line``); the line then
-    leaves out what is swept already. Passes of an order may ask for lanes that overlap more.
-    ``footprint`` stands in place of ``radius_m``: the disc around it is planned with.
-    ``clearance_m`` is a distance that lines keep from walls and furniture in addition to the
-    radius; they give up half of it, or all, where only that reaches floor that is worth it.
-    ``turn_radius_m`` is the tightest arc that the robot drives; 0 for one that turns on the spot.
-    With a radius, lines over the floor become curves of arcs a tenth wider, and lanes; ``reverses``
-    is whether they may lead backward, too.
-    ``tool_ahead_m`` is how far the tool's centre lies ahead of the point that the robot turns
-    about; below 0 behind.
-    ``time_scale`` is for a simulated robot: its seconds per second. The daemon's own timeouts are
-    real seconds whatever it is; reports of a recording have the robot's seconds.
+    ``quarter_turn_s`` is the duration of a turn by 90 degrees on the spot, with braking and
+    starting [s]; with 0, plans minimise steps alone. If ``turn_deg_s`` is given, the robot's limits
+    replace it: the rate of turning [deg/s], the angular acceleration [deg/s2], the acceleration of
+    driving [m/s2], and the largest bend that is steered while driving [deg].
+    ``overlap`` is the share of the tool's width by which cells overlap if a line is driven
+    (``planner.line``); the line then leaves out floor swept already. Passes of an order may set
+    another one.
+    ``footprint`` replaces ``radius_m`` by the radius of the disc around it.
+    ``clearance_m`` is the distance that lines keep from walls and furniture in addition to the
+    radius; they give up half of it, or all, where only that reaches floor worth the time.
+    ``turn_radius_m`` is the radius of the tightest arc; 0 for a robot that turns on the spot. With
+    a radius, lines become curves of lanes and of arcs a tenth wider; ``reverses`` is whether the
+    robot may drive them backward, too.
+    ``tool_ahead_m`` is the distance of the tool's centre ahead of the turning point, below 0 if
+    behind.
+    ``time_scale`` is the number of a simulated robot's seconds in a real second. Timeouts of the
+    daemon are real seconds; reports of a recording have the robot's seconds.
     """
 
     name: str = "robot"
@@ -111,10 +112,10 @@ class RobotConfig(Section, frozen=True):
             msgspec.structs.force_setattr(self, "radius_m", radius_m)
 
     def __repr__(self) -> str:
-        """Return the robot as Python, without what is not set."""
+        """Return the robot as Python, without members that are not set."""
         members = msgspec.structs.asdict(self).items()
-        said = (f"{name}={value!r}" for name, value in members if value is not msgspec.UNSET)
-        return f"Robot({', '.join(said)})"
+        texts = (f"{name}={value!r}" for name, value in members if value is not msgspec.UNSET)
+        return f"Robot({', '.join(texts)})"
 
     @property
     def assumed(self) -> str:
@@ -140,7 +141,7 @@ class RobotConfig(Section, frozen=True):
         return self.tool_width_m * (1.0 - self.overlap)
 
     def with_overlap(self, overlap: float) -> RobotConfig:
-        """Return the robot for a pass whose lanes overlap by a share of the tool's width."""
+        """Return the robot for a pass whose lanes overlap by ``overlap`` of the tool's width."""
         lane_m, tool_m = lane_and_tool_m(self.tool_width_m, self.lane_m, overlap)
         return msgspec.structs.replace(self, tool_width_m=tool_m, overlap=1.0 - lane_m / tool_m)
 
@@ -157,8 +158,8 @@ class RobotConfig(Section, frozen=True):
     def turning_deg_s(self) -> float:
         """Return the rate of turning on the spot [deg/s].
 
-        Without ``turn_deg_s`` it is the rate at which a quarter-turn takes ``quarter_turn_s``,
-        without braking before it and starting after it.
+        Without ``turn_deg_s`` it is the rate at which a quarter-turn takes ``quarter_turn_s`` less
+        the times of braking before it and starting after it.
         """
         if self.turn_deg_s is not None:
             return self.turn_deg_s
@@ -172,7 +173,7 @@ class RobotConfig(Section, frozen=True):
         return half - math.sqrt(square)
 
     def curves(self, price_s_m2: float) -> CurveConfig | None:
-        """Return how it drives curves; None if it turns on the spot.
+        """Return the configuration of curves; None for a robot that turns on the spot.
 
         Args:
             price_s_m2: value of sweeping a square metre [s/m2].

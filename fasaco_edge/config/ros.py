@@ -1,4 +1,4 @@
-"""Configuration of the daemon's side towards ROS 2."""
+"""ROS 2 section of the configuration: topics, services, frames, and Nav2."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _MAX_PREFIX_LENGTH = _MAX_TOPIC_LENGTH - len("/resume")
 DEFAULT_NODE = "fasaco_edge"
 # History depth of rclcpp's services.
 SERVICE_DEPTH = 10
-# What a follower needs of them: poses, and maps to compare scans with.
+# Inputs that a follower needs: poses, and maps to compare scans with.
 OF_DRIVER = ("map", "map_update", "pose", TF_STATIC)
 
 
 class RosTopicNames(Section, frozen=True):
-    """Names of topics, before which the namespace is put; ``pose`` or ``tf`` is not needed."""
+    """Names of topics below the namespace; either ``pose`` or ``tf`` is used."""
 
     map: str = "/map"
     map_updates: str = "/map_updates"
@@ -50,23 +50,22 @@ class RosTopicNames(Section, frozen=True):
 
 
 class RosFrames(Section, frozen=True):
-    """First and last frame of the chain of transforms; the frames between are found
-    automatically."""
+    """First and last frame of the chain of transforms; frames in between are found."""
 
     map: str = "map"
     robot: str = "base_link"
 
 
 class Nav2Config(Section, frozen=True):
-    """Nav2's controller server, where ``follow`` is ``nav2``.
+    """Nav2's controller server, used if ``follow`` is ``nav2``.
 
     ``controller``, ``goal_checker``, ``progress_checker`` and ``path_handler`` name its plugins, ""
     for the only one there is; ``release`` is the ROS release whose goals a server behind a bridge
-    accepts. A goal does not come nearer to itself than ``near_m`` [m]; without it, than 0.75 of the
+    accepts. Parts of a goal's path keep ``near_m`` [m] from each other, by default 0.75 of the
     tool's width.
 
-    Its docking server, where ``dock`` is ``nav2``: ``dock_id`` names a dock of its database, "" for
-    the pose ``mission.dock``; ``dock_type`` is its plugin, "" for the only one there is.
+    Its docking server, used if ``dock`` is ``nav2``: ``dock_id`` names a dock of its database, ""
+    for the pose ``mission.dock``; ``dock_type`` is its plugin, "" for the only one there is.
     """
 
     action: str = "/follow_path"
@@ -83,14 +82,14 @@ class Nav2Config(Section, frozen=True):
 
 
 class RosConfig(Section, frozen=True):
-    """ROS 2 topics, beside the native keys.
+    """ROS 2 topics, in addition to the native keys.
 
-    ``kind`` says how ROS comes to Zenoh: its middleware is rmw_zenoh, or zenoh-bridge-ros2dds
-    stands between. ``domain`` and ``node`` are for rmw_zenoh alone: a bridge has its own.
-    ``pose`` is the type of the pose's topic, or "tf"; the mission's commands are services
-    below ``services``. ``follow`` says what ``fasaco-edge follow`` does: drive the base itself, or
-    hand the path to Nav2's controller. ``dock`` says who moves the robot from before its dock into
-    it, and out: the base by itself, or Nav2's docking server, on request of ``fasaco-edge follow``.
+    ``kind`` is the connection of ROS to Zenoh: the middleware rmw_zenoh, or a bridge,
+    zenoh-bridge-ros2dds. ``domain`` and ``node`` are for rmw_zenoh, as a bridge has its own.
+    ``pose`` is the type of the pose's topic, or "tf"; the mission's commands are services below
+    ``services``. ``follow`` is what ``fasaco-edge follow`` does: drive the base itself, or send the
+    path to Nav2's controller. ``dock`` is what moves the robot into its dock and out of it: the
+    base by itself, or Nav2's docking server, on request of ``fasaco-edge follow``.
     """
 
     kind: Literal["bridge", "rmw_zenoh"]
@@ -112,30 +111,30 @@ class RosConfig(Section, frozen=True):
 
     @property
     def inputs(self) -> dict[str, RosTopic]:
-        """What daemon and recorder subscribe to, by the topic's name in the daemon."""
+        """The topics that daemon and recorder subscribe to, by their names in the daemon."""
         poses = ("tf_static", "tf") if self.pose == "tf" else ("pose",)
         names = ("map", "map_updates", "battery", "priority", *poses)
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
     @property
     def keep_out_mask(self) -> RosTopic:
-        """The topic of a keep-out mask, to which the daemon subscribes if it is to take one."""
+        """The topic of keep-out masks."""
         return self._topic("keep_out_mask")
 
     @property
     def scan(self) -> RosTopic:
-        """The topic of scans, to which the follower subscribes if it is to take them."""
+        """The topic of the follower's scans."""
         return self._topic("scan")
 
     @property
     def outputs(self) -> dict[str, RosTopic]:
-        """What the daemon publishes, by the native topic that is like it."""
+        """The topics that the daemon publishes, by the names of the native topics."""
         names = ("coverage_path", "coverage_grid", "diagnostics")
         return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
 
     @property
     def commands(self) -> dict[Triggered, RosTopic]:
-        """The services by which the mission is commanded, by the command."""
+        """The services that command the mission, by command."""
         return {
             name: RosTopic(self._name(f"{self.services}/{name}"), TRIGGER, depth=SERVICE_DEPTH)
             for name in TRIGGERED
@@ -166,7 +165,7 @@ class RosConfig(Section, frozen=True):
         return RosTopic(self._name(getattr(self.topics, name)), schema, row.latched, row.depth)
 
     def input_key(self, topic: RosTopic) -> str:
-        """Return the key to subscribe to for a topic, whatever hash rmw_zenoh puts behind it."""
+        """Return the key to subscribe to for a topic, with any type hash of rmw_zenoh."""
         if self.kind == "bridge":
             return topic.bridge_key
         return topic.rmw_key(self.domain, any_hash=True)
@@ -197,7 +196,7 @@ class RosConfig(Section, frozen=True):
         return [] if self.kind == "bridge" else [graph_key(self.domain)]
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield faults beyond types: invalid or equal names, settings of rmw_zenoh for a bridge."""
+        """Yield invalid or equal names, and settings of rmw_zenoh for a bridge."""
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
             yield BadConfiguration(f"namespace must be / or like /robot1, got {self.namespace!r}")
         if (
@@ -223,7 +222,7 @@ class RosConfig(Section, frozen=True):
         yield from self._topic_faults()
         for key in ("map", "robot"):
             frame = getattr(self.frames, key)
-            # What cannot be printed may have no UTF-8, or be a NUL.
+            # Unprintable characters may have no UTF-8, or be a NUL.
             printed = frame if frame.isprintable() else ""
             if not 0 < len(printed.encode()) <= MAX_STRING_BYTES:
                 yield BadConfiguration(f"frames.{key} must be the name of a frame, got {frame!r}")

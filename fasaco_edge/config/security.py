@@ -80,10 +80,10 @@ class SecurityConfig(Section, frozen=True):
         return structs.asdict(self.roles)
 
     def warn_of_clock(self) -> None:
-        """Warn where the clock is before the certificate, so that no connection can be made.
+        """Warn if the clock is before the certificate's start, so that no connection can be made.
 
-        To read certificates takes memory and time: that is done only where the clock is before
-        the time at which their files, or this program, were written.
+        Certificates are read, which takes memory and time, only if the clock is before the time at
+        which one of their files, or this program, was written.
         """
         if self.kind != "tls":
             return
@@ -91,7 +91,7 @@ class SecurityConfig(Section, frozen=True):
             written = [os.stat(path).st_mtime for _, path in files(self)]
             if time.time() >= max(*written, Path(__file__).stat().st_mtime):
                 return
-            # This module imports ssl, which a daemon whose clock is right does not need.
+            # Imports ssl, which a daemon with a correct clock does not need.
             from fasaco_edge.config.certificates import read_certificate  # noqa: PLC0415
 
             read_certificate(self.tls)
@@ -127,7 +127,7 @@ class SecurityConfig(Section, frozen=True):
                 transport = access.user_password(user.name, password, dictionary_file)
             case _:
                 return {}
-        # Gossip would send every peer the others' endpoints, and let them make us connect there.
+        # By gossip, peers would receive each other's endpoints, and could make us connect there.
         return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
 
     def of_daemon(
@@ -139,7 +139,7 @@ class SecurityConfig(Section, frozen=True):
         """Return the credentials of a daemon's session, with access control for all others.
 
         Args:
-            prefix: of all keys of the robot.
+            prefix: prefix of all keys of the robot.
             ros, ros_driver: rights of the roles ``ros`` and ``driver`` under ROS 2; None without a
                 section ``ros2``.
 
@@ -191,7 +191,7 @@ def security_faults(
 ) -> Iterator[BadConfiguration]:
     """Yield missing and inconsistent values.
 
-    Remote endpoints without authentication are OpenToEveryone.
+    Remote endpoints without authentication yield OpenToEveryone.
     """
     beyond = [endpoint for endpoint in listen if not is_local(endpoint)]
     if security.kind == "none":

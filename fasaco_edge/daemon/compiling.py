@@ -1,7 +1,7 @@
 """Compilation of the kernels before a service reports that it is ready, in a separate process.
 
-The first map must not wait minutes for compilation. An idle daemon stays small: it loads the
-kernels with the first map.
+The first map must not wait minutes for compilation. The process is separate so that an idle daemon
+stays small: it loads the kernels with the first map.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from fasaco_edge.planners.compiling import REASON, STAGE, CompilerProcess
 
 LOG = logging.getLogger(__name__)
 
-# Startup time requested for each stage; longer than any takes on a small computer [s].
+# Startup time requested for each stage; longer than any stage takes on a small computer [s].
 STAGE_S = 600.0
+# Period of checks whether compilation has ended [s].
 LOOK_S = 0.02
 
 
@@ -32,7 +33,7 @@ class KernelCompiler:
             threading.Thread(target=self._listen, name="compiler", daemon=True).start()
 
     def wait(self, stop: threading.Event) -> None:
-        """Wait until all kernels are there, or ``stop`` is set.
+        """Wait until all kernels are compiled, or ``stop`` is set.
 
         Raises:
             ProcessEnded: the compiler failed, or was killed.

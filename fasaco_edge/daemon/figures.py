@@ -15,8 +15,8 @@ LOG = logging.getLogger(__name__)
 
 # Cycles longer than this are late [s].
 LATE_S = 0.1
-# Durations are counted to within 10 %, in logarithmic buckets, the last one beyond 18 minutes: so
-# memory does not grow with uptime.
+# Durations are counted in logarithmic buckets, to within 10 % and up to 18 minutes, so that memory
+# does not grow with uptime.
 LEAST_S, PER_DOUBLING, BUCKETS = 1e-6, 8, 8 * 30
 
 

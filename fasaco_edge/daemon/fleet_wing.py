@@ -1,4 +1,4 @@
-"""Interface to the package ``fleet``: what a daemon needs, loaded only if a fleet is configured."""
+"""Interface of a daemon to the package ``fleet``, loaded only if a fleet is configured."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
-"""A keep-out mask that comes as a message, from Nav2 or another program.
+"""Keep-out mask received as a message, from Nav2 or another program.
 
-It takes the place of the file ``mission.keep_out_mask`` in the configuration in force, as a reload
-does: recordings and replays know it from there. Reading one takes as much memory as a map; maps
-wait meanwhile.
+The mask replaces the file ``mission.keep_out_mask`` in the configuration in force, as by a reload,
+so that recordings and replays contain it. Reading a mask takes as much memory as a map; maps wait
+meanwhile.
 
-A mask belongs to the frame it came in. The newest one of another frame than the map's is kept: it
-holds if the map's frame becomes that one. Until one of the map's frame has come, the mission waits.
+A mask is valid in its frame. The newest mask in another frame than the map's is kept, in case the
+map's frame changes to it. The mission waits until there is a mask in the map's frame.
 """
 
 from __future__ import annotations
@@ -27,37 +27,37 @@ from fasaco_edge.mission.orders.mask import inline_grid
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 
-# Limit on the masks that wait to be read, each of another publisher; one of them counts.
+# Limit on the masks that wait to be read, each of another publisher; only one publisher counts.
 MOST_WAITING = 2
 
 
 class MaskTopic:
-    """Subscribes to the mask, and puts the one that belongs to the map into a configuration.
+    """Subscribes to masks, and puts the mask in the map's frame into a configuration.
 
     Args:
         bus: the session.
-        config: of the daemon.
-        ros: its side towards ROS 2; None without one.
-        came: called for each mask, on a Zenoh thread.
+        config: the daemon's configuration.
+        ros: the bridge to ROS 2; None without one.
+        arrived: called for each mask, on a Zenoh thread.
 
     Attributes:
-        map_frame: the frame of the map; until it is known, "", a mask waits.
+        map_frame: frame of the map; "" while it is unknown, and masks wait.
     """
 
     def __init__(
-        self, bus: Bus, config: DaemonConfig, ros: RosBridge | None, came: Callable[[], None]
+        self, bus: Bus, config: DaemonConfig, ros: RosBridge | None, arrived: Callable[[], None]
     ) -> None:
         self._max_pixels = config.map.max_pixels
         self._occupied_at_least = config.map.occupied_at_least
-        self._came = came
+        self._arrived = arrived
         self.map_frame = ""
         self._lock = threading.Lock()
-        # For each publisher its newest mask and time of arrival [s, monotonic]; and the mask to
+        # The newest mask of each publisher with its time of arrival [s, monotonic]; and the mask to
         # read.
         self._waiting: dict[str, tuple[Sample, float]] = {}
         self._newest: Sample | None = None
         self._publisher = OnePublisher("keep-out masks", topics.KEEP_OUT_MASK.one_publisher_s, bus)
-        # The newest mask of each frame, inline, the newest last; and the one in force.
+        # The newest mask of each frame, inline, the newest last; and the mask in force.
         self._masks: dict[str, str] = {}
         self._in_force = ""
         self._subscriptions = [bus.listen(config.keys(), topics.KEEP_OUT_MASK, self._take)]
@@ -78,20 +78,20 @@ class MaskTopic:
                 subscription.ask()
 
     def conflicts(self, now: float) -> list[str]:
-        """Return whether masks come from two publishers."""
+        """Return the text of a conflict of two publishers, if there is one."""
         text = self._publisher.conflict(now)
         return [text] if text else []
 
     @property
-    def has_come(self) -> bool:
-        """Whether there is a mask to read, or the map's frame has become that of another one."""
+    def has_change(self) -> bool:
+        """Whether there is a mask to read, or the map's frame is now that of another mask."""
         kept = self._masks.get(self.map_frame, self._in_force)
         return bool(self.map_frame) and (self._newest is not None or kept != self._in_force)
 
     def added_to(self, config: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
-        """Return a configuration with the newest mask of the map's frame, or else the last one.
+        """Return a configuration with the newest mask in the map's frame, or else the last mask.
 
-        Also return why the newest mask is not used: it is malformed, too fine, or of another frame.
+        Also return why the newest mask is not used: malformed, too fine, or in another frame.
         """
         frame = self.map_frame
         with self._lock:
@@ -107,13 +107,13 @@ class MaskTopic:
                 text = str(error) if is_named else f"keep_out_mask: {error}"
                 faults.append(BadConfiguration(text, hint=error.hint))
             else:
-                came_in = next(reversed(self._masks))
-                if came_in != frame:
-                    text = f"keep_out_mask: in frame {came_in!r}, the map in {frame!r}"
+                mask_frame = next(reversed(self._masks))
+                if mask_frame != frame:
+                    text = f"keep_out_mask: in frame {mask_frame!r}, the map in {frame!r}"
                     hint = "publish map and mask in the same frame"
                     faults.append(BadConfiguration(text, hint=hint))
         self._in_force = self._masks.get(frame, self._in_force)
-        # Only a restart changes whether the mask comes as a message, even if the file changes.
+        # Only a restart can replace the mask of a message by that of a file.
         mission = structs.replace(config.mission, keep_out_mask=self._in_force)
         return structs.replace(config, mission=mission), faults
 
@@ -137,4 +137,4 @@ class MaskTopic:
             self._waiting[sample.sender] = sample, time.monotonic()
             if len(self._waiting) > MOST_WAITING:
                 del self._waiting[next(iter(self._waiting))]
-        self._came()
+        self._arrived()

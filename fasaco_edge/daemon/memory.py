@@ -5,40 +5,45 @@ A daemon whose maps have at most P pixels, on a lattice of at most C cells, take
     BASE_BYTES + MAPS * P + CELL_BYTES * C
 
 and, if it plans lines over the floor, ``FLOOR_BYTES * P + STAND_BYTES * C`` more: its fine raster
-has no more pixels than a map may have (``grid.fine_raster``). This holds for any input at any rate
-and resolution. A limit on the memory, ``MemoryMax=`` of the unit, limits the maps: the sum is at
-most 90 % of that limit, above which the system throttles the service (``afforded``). Without a
-limit, the configuration gives the largest map. One test checks the systemd units against these
-constants, another measures memory.
+has no more pixels than a map may have (``grid.fine_raster``). This applies to any input at any rate
+and resolution. If ``MemoryMax=`` of the unit limits the memory, maps are limited so that the sum is
+at most 90 % of it, above which the system throttles the service (``afforded``). Without that limit,
+the configuration gives the largest map. One test checks the systemd units against these constants,
+another measures memory.
 
 A pixel is a byte, held in up to ten copies if updates are as large as the map:
 
 * 3 in Zenoh: a message being assembled, one being handed over, one on its way to a recorder;
 * 2 in the mailbox: the map queue and the update queue hold at most one largest message each;
 * 3 in the cycle: a map and an update being decoded, and Zenoh's buffer of the last one;
-* 2 in the mission: its map, and the one it is compared with or patched to. One more with obstacles
-  drawn on it, of a map of up to 6 million pixels: for that the base has room.
+* 2 in the mission: its map, and the map that it is compared with or patched to. A third copy, with
+  obstacles, is part of the base, as it has at most 6 million pixels.
 
 A keep-out mask is read while no map is decoded, and may take as much as two of the cycle's copies
 (``mask_bytes``).
 
-Larger messages are dropped on arrival, by their size alone. Nothing else grows with the
-pixels: kernels read a map tile by tile, and a tile is bounded, see ``grid.lattice``. Of the memory
-per cell the path takes most: some 80 bytes a pose, twice while it is sent. The living trail takes
-16 bytes a cell, as much again while a copy is planned on or written, and 8 in the ledger's file;
-what the ants of a plan leave spans the regions they walked on. Priorities take 3 bytes a cell:
-those of a message, and twice those of rooms.
-The rest of the ledger takes 4 bytes a cell, with the copy being written; swept floor takes a bit a
-pixel of 2.5 cm, 18 bytes a cell of 0.3 m, and as much again where it changed since that copy. The
-ledger is bounded on its own: 34 MB of cells and twice 13 MB of floor, if jumping poses fill it.
+Larger messages are dropped on arrival. Nothing else grows with the pixels: kernels read a map tile
+by tile, and tiles are bounded (``grid.lattice``).
 
-Measured (``python -m tests.campaigns.memory``, x86-64): a path of 440,000 cells takes 127 MB more
-than a mission on a small map, maps of 25 million pixels at 20 Hz 75 MB more, each followed by a map
-update of full size 240 MB, and 50 MB more with a recorder. That mission has 121 MB of its own, 17
-of them for its million pixels, and 228 with pages of libraries, which the system takes back
-(``fasaco-edge bench daemon``): the base has room for what waits for the loop beside maps, 42 MB,
-and for the pages in use. Of these a library just unpacked takes up to 16 MB more than one that was
-copied, as the system maps larger blocks of it at once.
+A cell takes these bytes:
+
+* the path: some 80 for each pose, twice while it is sent;
+* the living trail: 16, as much again while a copy is planned on or written, and 8 in the ledger's
+  file; the trail of a plan's ants spans only the regions that they walked on;
+* priorities: 1 if received as a message, and 2 for priorities of rooms;
+* covered cells of the ledger: 4, with the copy being written;
+* swept floor: 18 for a cell of 0.3 m, a bit for each pixel of 2.5 cm, and as much again if it has
+  changed since the copy being written.
+
+The ledger has limits of its own: 34 MB for cells, and twice 13 MB for floor.
+
+Measured (``python -m tests.campaigns.memory``, x86-64): a mission on a map of a million pixels
+takes 121 MB, 17 MB of them for the map, and 228 MB with pages of libraries, which the system can
+reclaim (``fasaco-edge bench daemon``). A path of 440,000 cells takes 127 MB more; maps of 25
+million pixels at 20 Hz take 75 MB more, 240 MB if an update of full size follows each, and another
+50 MB with a recorder. The base includes 42 MB of samples other than maps that wait for the loop,
+and the library pages in use. A library just unpacked has up to 16 MB more of these than a copied
+one, as the system maps it in larger blocks.
 """
 
 from __future__ import annotations
@@ -57,29 +62,29 @@ MIB = 1 << 20
 BASE_BYTES = 235 * MB
 MAPS = 10
 CELL_BYTES = 370
-# Bytes of a pixel of floor: 3 for the floor to sweep and the line's passes over it, 2 more while
-# they move with a growing map; a bit each for blocked pixels and poses, twice if an order has
-# keep-out zones, and once more while a map is taken in; some bits a block of 64; and a tenth of all
-# that for the frame around the map. Counted, not measured.
+# Bytes of a pixel of floor, counted, not measured: 3 for the floor to sweep and the line's passes
+# over it, and 2 more while they move with a growing map; a bit each for blocked pixels and poses,
+# twice if an order has keep-out zones, and once more while a map is taken in; some bits for a block
+# of 64; and a tenth of the sum for the frame around the map.
 FLOOR_BYTES = 7
-# Pixels of a frame that every map may have: relative to size, small maps have the widest.
+# Pixels of the frame around any map, which is relatively widest around small maps.
 FRAME_PIXELS = 100_000
-# Bytes of a cell with stand and bends: 32, as much again with keep-out zones, once more while a map
-# is taken in; and 26 a point of the line. Counted, too.
+# Bytes of a cell with stand and bends, counted, too: 32, as much again with keep-out zones, and
+# once more while a map is taken in; and 26 for a point of the line.
 STAND_BYTES = 128
 # MemoryMax= relative to MemoryHigh=, above which the system only throttles a service.
 SPARE = 1.1
 
-# Copies of a pixel that reading a keep-out mask may use; the memory of the reader; and the least
-# for a mask, of which the base has some to spare.
+# Copies of a pixel that reading a keep-out mask may use; memory of the reader; and least memory for
+# reading a mask, in part from the base.
 MASK_COPIES = 2
 PILLOW_BYTES = 6 * MB
 LEAST_MASK_BYTES = 14 * MB
 
-# The smallest limits ever applied: a small flat.
+# The smallest limits applied, enough for a small flat.
 LEAST_PIXELS, LEAST_CELLS = 250_000, 10_000
 
-# Queue limit of these kinds [bytes].
+# Queue limit of all kinds not listed in ``queues`` [bytes].
 QUEUED_BYTES = 8 * MAX_POSE_BYTES
 
 
@@ -113,7 +118,7 @@ def needed_bytes(config: DaemonConfig) -> int:
 
 
 def has_default_sizes(config: DaemonConfig) -> bool:
-    """Return whether largest map and lattice are the defaults, which follow a limit on memory."""
+    """Return whether the sizes of map and lattice are the defaults, which may be reduced."""
     maps, default = config.map, MapConfig()
     sizes = maps.max_pixels, maps.max_lattice_cells
     return sizes == (default.max_pixels, default.max_lattice_cells)
@@ -127,9 +132,9 @@ def unit_bytes(config: DaemonConfig) -> tuple[int, int]:
 
 
 def floor_pixels(max_pixels: int) -> int:
-    """Return how many pixels the raster of floor may have for maps of ``max_pixels``.
+    """Return the limit on the pixels of the raster of floor, for maps of ``max_pixels``.
 
-    As many as the map, and a frame around it: it must fit every accepted map.
+    It is a map with a frame around it, so that every accepted map fits.
     """
     return max_pixels + max_pixels // 10 + FRAME_PIXELS
 
@@ -137,8 +142,8 @@ def floor_pixels(max_pixels: int) -> int:
 def mask_bytes(config: DaemonConfig, limit: int | None) -> int:
     """Return the memory for reading a keep-out mask under a memory limit [bytes].
 
-    As much as decoding a map and an update in a cycle: none is decoded while the configuration is
-    reloaded. A small picture is always read.
+    It is that of decoding a map and an update in a cycle, as none is decoded while the
+    configuration is reloaded. A small picture is always read.
     """
     share = MASK_COPIES * afforded(config, limit).map.max_pixels
     return max(share - PILLOW_BYTES, LEAST_MASK_BYTES)
@@ -157,7 +162,7 @@ def limits_mib(config: DaemonConfig) -> tuple[int, int]:
 def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
     """Return the configuration with map and lattice sizes limited to fit ``limit`` [bytes].
 
-    None is no limit. Both shrink alike; a small flat is always tried.
+    None is no limit. Both shrink by the same factor, but not below the size of a small flat.
     """
     if limit is None or needed_bytes(config) <= (high := int(limit / SPARE)):
         return config

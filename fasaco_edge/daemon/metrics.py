@@ -1,7 +1,7 @@
-"""Metrics for Prometheus: one table of all metrics of a status, and a server of them over HTTP.
+"""Metrics for Prometheus: a table of all metrics of a status, and an HTTP server.
 
-The text format is 0.0.4, in base units. The server has a thread of its own: the loop only passes a
-reference to the newest status.
+The text format is 0.0.4, in base units. The server has a thread of its own, to which the loop only
+passes a reference to the newest status.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ LOG = logging.getLogger(__name__)
 PATH = "/metrics"
 # Limit on the bytes of a request; timeout of a connection [s].
 MOST_BYTES, LONGEST_S = 8192, 1.0
-# Time that each answer waits, and for which all get the same one [s]: a client that asks in a tight
-# loop costs little. Limit on open connections: beyond it the oldest are closed.
+# Delay of each answer, and time for which all get the same answer [s], so that a client in a tight
+# loop costs little. Limit on open connections, beyond which the oldest is closed.
 PAUSE_S, MOST_OPEN = 0.05, 64
 REASONS = {200: "OK", 404: "Not Found", 405: "Method Not Allowed", 503: "Service Unavailable"}
 
@@ -43,7 +43,7 @@ Sample = tuple[Labels, float | UnsetType | None]
 class Figure(NamedTuple):
     """A metric: name, help text, and its samples from a status.
 
-    A sample whose value is None or unset is left out.
+    Samples without value, None or unset, are left out.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Figure(NamedTuple):
 
     @property
     def kind(self) -> str:
-        """Its type; a counter has a name that says so."""
+        """Its type; names of counters end in ``_total``."""
         plain = "counter" if self.name.endswith("_total") else "gauge"
         return "summary" if self.is_summary else plain
 
@@ -63,7 +63,7 @@ def _one(value: Callable[[Status], float | None]) -> Callable[[Status], list[Sam
 
 
 def _member(part: str, name: str) -> Callable[[Status], list[Sample]]:
-    """Return the sampler of a member of a part that may be missing."""
+    """Return the sampler of a member of a part of the status that may be missing."""
     return lambda status: [({}, getattr(getattr(status, part), name, None))]
 
 
@@ -127,10 +127,10 @@ FIGURES = (
     Figure("plans_total", "plans made", _member("plan", "plans")),
     Figure(
         "plans_outdated_total",
-        "plans that did not hold any more when they came",
+        "plans that were outdated when they arrived",
         _member("plan", "outdated"),
     ),
-    Figure("latency_seconds", "how long a stage took last", _latencies),
+    Figure("latency_seconds", "last duration of each stage", _latencies),
     Figure("cycles_total", "cycles of the loop", _member("loop_ms", "turns")),
     Figure("cycles_late_total", "cycles longer than 100 ms", _member("loop_ms", "late")),
     Figure(
@@ -157,7 +157,7 @@ FIGURES = (
 
 
 def exposition(status: Status, age_s: float) -> str:
-    """Return all metrics of a status of this age [s]."""
+    """Return all metrics of a status, whose age is ``age_s`` [s]."""
     age = Figure(
         "status_age_seconds",
         "since the daemon's loop made these figures; after some seconds it counts as hung",
@@ -189,10 +189,10 @@ def _escaped(text: str) -> str:
 
 
 class MetricsServer:
-    """Serves the newest status it was given.
+    """Serves the newest status.
 
     Args:
-        address: where to listen.
+        address: the address to listen on.
 
     Raises:
         OSError: it cannot listen there.
@@ -202,7 +202,7 @@ class MetricsServer:
         family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
         self._socket = socket.create_server(address, family=family, backlog=MOST_OPEN)
         self._shown: tuple[Status, float] | None = None
-        # The newest page, and until when it is served.
+        # The newest page, and the time until which it is served [s, monotonic].
         self._page, self._page_until = "", 0.0
         # Open connections, the oldest first.
         self._open: list[asyncio.StreamWriter] = []
@@ -242,7 +242,7 @@ class MetricsServer:
         except (TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, OSError):
             LOG.debug("metrics: a request is too long, or its client gone")
         finally:
-            # What a client does not take is discarded.
+            # Bytes that the client does not take are discarded.
             writer.transport.abort()
             with contextlib.suppress(ValueError):
                 self._open.remove(writer)
@@ -275,7 +275,7 @@ class MetricsServer:
 
 
 def serve_metrics(address: Address) -> MetricsServer | None:
-    """Return a server; None if it cannot listen: a robot also drives without."""
+    """Return a server; None if it cannot listen, as a robot can drive without metrics."""
     try:
         server = MetricsServer(address)
     except OSError as error:

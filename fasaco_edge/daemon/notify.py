@@ -19,34 +19,34 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Timeout for a busy manager, as at boot, for messages sent only once [s]; no other message may
-# delay the loop.
+# Timeout of messages sent only once, for a busy manager at boot [s]; other messages must not delay
+# the loop.
 PATIENCE_S = 1.0
-# `systemctl status` shows one line [characters].
-MOST_SAID = 500
-# Period as a share of the watchdog's timeout: a cycle may be late, and a message may get lost.
+# Limit on the line that `systemctl status` shows [characters].
+MOST_CHARS = 500
+# Period as a share of the watchdog's timeout, as a cycle may be late, and a message may be lost.
 SHARE = 0.25
 
 
 class ServiceManager:
-    """The manager that started this process; without effect outside of a service.
+    """The manager that started this process; without effect outside a service.
 
     Each notification is one datagram.
 
     Attributes:
-        is_there: whether there is one.
-        watchdog_s: timeout after which it considers this process hung [s]; 0 for none.
+        is_present: whether there is a manager.
+        watchdog_s: time without a notification after which it ends this process [s]; 0 for none.
     """
 
     def __init__(self, environ: MutableMapping[str, str] = os.environ) -> None:
-        """Take the variables out of ``environ``, so that no child process uses them."""
+        """Remove the variables from ``environ``, so that no child process uses them."""
         address = environ.pop("NOTIFY_SOCKET", "")
         silence_us = environ.pop("WATCHDOG_USEC", "0")
         is_ours = environ.pop("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
         # "@" stands for the NUL of a name in the abstract namespace.
         self._address = f"\0{address[1:]}" if address.startswith("@") else address
-        self.is_there = bool(address)
-        # Kept open: a process without free descriptors still has to feed the watchdog.
+        self.is_present = bool(address)
+        # Kept open, as a process without free descriptors still has to feed the watchdog.
         self._out = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) if address else None
         if self._out is not None:
             weakref.finalize(self, self._out.close)
@@ -59,15 +59,15 @@ class ServiceManager:
 
     def status(self, text: str) -> None:
         """Set the status line of the service."""
-        if text != self._status and self._send("STATUS=" + one_line(text, MOST_SAID)):
+        if text != self._status and self._send("STATUS=" + one_line(text, MOST_CHARS)):
             self._status = text
 
     def alive(self) -> None:
-        """Report progress; required at least every ``watchdog_s``."""
+        """Feed the watchdog; due at least every ``watchdog_s``."""
         self._send("WATCHDOG=1")
 
     def extend(self, seconds: float) -> None:
-        """Request this much more time to start [s]."""
+        """Extend the time allowed for startup [s]."""
         self._send(f"EXTEND_TIMEOUT_USEC={seconds * 1e6:.0f}")
 
     def reloading(self) -> None:

@@ -1,7 +1,7 @@
-"""Reload of the configuration on SIGHUP; an invalid one is refused as a whole.
+"""Reload of the configuration on SIGHUP; an invalid file is refused as a whole.
 
-A file with a mask that cannot be read is invalid. A mask that comes as a message is no part of the
-file: where it cannot be read, the last one stays in force, and the file is taken.
+A file whose mask cannot be read is invalid. A mask received as a message is not part of the file:
+if it cannot be read, the last mask stays in force, and the file is accepted.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from fasaco_edge.host.processes import memory_limit
 
 LOG = logging.getLogger(__name__)
 
-# Sections and keys that can change in a running daemon; not those with which session, ledger or
-# another process were opened.
+# Sections and keys that can change in a running daemon, without those that opened session, ledger
+# or another process.
 CHANGEABLE = frozenset(
     {
         "planner",
@@ -57,7 +57,7 @@ FIXED = frozenset({"planner.line"})
 
 
 def read_config(path: Path | None) -> DaemonConfig:
-    """Return a configuration as a daemon reads it, with the content of other files.
+    """Return a daemon's configuration, with the content of the mask's file.
 
     Raises:
         BadConfiguration: it is invalid, or its keep-out mask does not fit the memory.
@@ -67,11 +67,11 @@ def read_config(path: Path | None) -> DaemonConfig:
 
 
 class Reload:
-    """Reads the configuration again on request, on its own thread: a mask may take seconds.
+    """Reads the configuration again on request, on its own thread, as a mask may take seconds.
 
     Attributes:
         asked: set by the signal.
-        mask: a keep-out mask that comes as a message; None for none.
+        mask: the keep-out mask received as a message; None for none.
     """
 
     def __init__(self, read: Callable[[], DaemonConfig], manager: ServiceManager) -> None:
@@ -83,7 +83,7 @@ class Reload:
 
     @property
     def is_reading(self) -> bool:
-        """Whether it is reading, or its result was not taken yet."""
+        """Whether reading is under way, or its result has not been taken."""
         return self._reading is not None
 
     @property
@@ -93,13 +93,13 @@ class Reload:
 
     @property
     def is_wanted(self) -> bool:
-        """Whether the signal or a mask has come."""
-        return self.asked.is_set() or (self.mask is not None and self.mask.has_come)
+        """Whether the signal or a mask has arrived."""
+        return self.asked.is_set() or (self.mask is not None and self.mask.has_change)
 
     def begin(self, running: DaemonConfig, ended: Callable[[], None]) -> None:
         """Begin to read; ``ended`` is called afterwards, on the reading thread.
 
-        A mask changes only the running configuration, even if the file has changed since.
+        For a mask alone the file is not read.
         """
         read = self._read if self.asked.is_set() else lambda: running
         self.asked.clear()
@@ -119,7 +119,7 @@ class Reload:
     def take(self, running: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
         """Return the running configuration with the changeable values of the file.
 
-        Also return why the file or the newest mask is refused; no value of a refused file is taken.
+        Also return why the file or the newest mask is refused; a refused file changes no value.
         """
         assert self._reading is not None
         reading, self._reading = self._reading, None

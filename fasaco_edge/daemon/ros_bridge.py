@@ -1,8 +1,7 @@
 """The ROS 2 bridge: the daemon's samples under the keys of a ROS 2 graph, without ROS.
 
-Incoming samples go into the mailbox with samples of the native keys, and are decoded there;
-outgoing samples are encoded once. rmw_zenoh and zenoh-bridge-ros2dds differ only in keys,
-attachments and tokens.
+Incoming samples share the mailbox with samples of native keys; outgoing samples are encoded once
+for both. rmw_zenoh and zenoh-bridge-ros2dds differ only in keys, attachments and tokens.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from fasaco_edge.wire.messages.diagnostics import encode_diagnostics
 from fasaco_edge.wire.ros_keys import Endpoint, RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE, Topic
 
-# The request of a Trigger has five bytes.
+# Limit on a request [bytes]; that of a Trigger has five.
 MOST_REQUEST_BYTES = 1024
 
 
@@ -34,8 +33,8 @@ class RosBridge:
 
     Attributes:
         map: the map's subscription, to query a missing map.
-        publishers: by the native topic that is like each.
-        commands: command of each service, by the service's key.
+        publishers: publishers by the name of the native topic.
+        commands: commands by the key of their service.
     """
 
     def __init__(

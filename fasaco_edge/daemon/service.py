@@ -46,18 +46,19 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# SIGTERM to exit takes at most two seconds; the recorder's footer comes first. A recorder that
-# still works, on a slow computer, gets the rest of ``TimeoutStopSec=`` of the unit.
+# Time for the recorder's footer after SIGTERM, so that the daemon exits within two seconds [s]; and
+# limit for a recorder that still works, on a slow computer, within ``TimeoutStopSec=`` of the unit
+# [s].
 RECORDER_STOP_S, RECORDER_LONGEST_S = 1.2, 6.0
 WORKER_STOP_S = 0.4
-# Timeout for the ledger's disk, which writes while the other processes end: in all, and at least
-# after they have ended.
+# Timeout for the ledger's disk, which writes while the other processes end: in all, and least time
+# after they have ended [s].
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
-# Time after which the process exits even if it is blocked [s]: the unit's ``TimeoutStopSec=`` is
-# 10, and its SIGKILL would leave no trace of the cause.
+# Time after which a blocked process exits by itself [s]: SIGKILL, after the 10 s of
+# ``TimeoutStopSec=``, would leave no trace of the cause.
 END_S = 9.0
-# Thread switch interval of the interpreter [s]. Zenoh's threads call back with each sample; at
-# Python's default of 5 ms the loop waits for them several times a cycle.
+# Thread switch interval of the interpreter [s]. Zenoh's threads call back with each sample; with
+# Python's default of 5 ms the loop would wait for them several times in a cycle.
 SWITCH_S = 0.0005
 
 
@@ -74,19 +75,19 @@ def run_daemon(
     Args:
         config: the configuration.
         record_to: folder for recordings; None for no recordings.
-        state: folder of the coverage ledger, in place of the configuration's.
+        state: folder of the coverage ledger; None for the configured one.
         fresh: set the ledger aside, and cover everything again.
         read: reads the configuration again on SIGHUP from a service manager.
 
     Raises:
         BusUnavailable: no session could be opened.
         LedgerFileError: another process writes this robot's ledger.
-        BadConfiguration: there is no folder for it, or a file of bus.security is missing.
+        BadConfiguration: there is no folder for the ledger, or a file of bus.security is missing.
         ProcessEnded: a service's kernels could not be compiled.
     """
     started = time.monotonic()
     sys.setswitchinterval(SWITCH_S)
-    # Otherwise every thread keeps the memory of its largest map: 430 MB resident, not 250.
+    # Else every thread would keep the memory of its largest map: 430 MB resident, not 250.
     return_soon()
     stop = threading.Event()
 
@@ -98,11 +99,11 @@ def run_daemon(
     call_on(signal.SIGTERM, signal.SIGINT, call=end)
     manager = ServiceManager()
     reload = Reload(read, manager)
-    if manager.is_there:
+    if manager.is_present:
         # Without a service manager, SIGHUP comes from a closed terminal and ends the process.
         call_on(signal.SIGHUP, call=reload.asked.set)
     config = _afforded(config)
-    compiler = KernelCompiler(manager) if manager.is_there else None
+    compiler = KernelCompiler(manager) if manager.is_present else None
     try:
         folder = state or config.mission.state_folder()
         ledger = open_ledger(folder, config.robot.name, config.cell_m, fresh=fresh)
@@ -124,28 +125,27 @@ def run_daemon(
 
 
 def _joined(settings: BusSettings, stop: threading.Event, manager: ServiceManager) -> Bus | None:
-    """Open a session; a client waits for its router. None if stopped before.
+    """Open a session, for which a client waits for its router; None if stopped meanwhile.
 
     Raises:
-        BusUnavailable: no session can be opened, and waiting does not help.
+        BusUnavailable: no session can be opened, even by waiting.
     """
-    # Wrong addresses or credentials of its own cannot be fixed by waiting.
+    # Waiting does not help against wrong addresses or credentials of this daemon.
     if settings.mode != "client" or settings.secured:
         return open_bus(settings)
 
-    def tell(is_first: bool) -> None:
+    def report_wait(is_first: bool) -> None:
         if is_first:
-            # A service that is never ready is ended after a while; this one is as ready as it
-            # can be.
+            # The manager would end a service that does not report that it is ready.
             manager.ready()
             manager.status(f"waiting for the bus at {', '.join(settings.connect)}")
         manager.alive()
 
-    return join(settings, stop, tell)
+    return join(settings, stop, report_wait)
 
 
 def _metrics_of(config: DaemonConfig) -> MetricsServer | None:
-    """Return the server of metrics, if one is configured: a daemon without is smaller."""
+    """Return the server of metrics; None if none is configured."""
     if (address := config.metrics.address()) is None:
         return None
     from fasaco_edge.daemon.metrics import serve_metrics  # noqa: PLC0415

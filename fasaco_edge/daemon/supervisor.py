@@ -1,4 +1,4 @@
-"""The recorder's supervisor: starts it beside the daemon; its faults affect only the recording."""
+"""The recorder's supervisor: runs the recorder so that its faults affect only the recording."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from fasaco_edge.wire.documents.status import Recorder, SupervisedRecorder
 
 LOG = logging.getLogger(__name__)
 
-FIRST_PAUSE_S = 1.0
-LONGEST_PAUSE_S = 30.0
-# Timeout after which a running recorder without a report counts as hung; a recorder that is only
-# slow does not.
+# Pause before a restart [s], doubled with each restart.
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
+# Time without a report after which a running recorder counts as hung, longer than a slow one takes
+# [s].
 SILENT_AFTER_S = 30.0
-# Timeout of its first report: slow computers load its libraries for half a minute.
+# Timeout of its first report, as slow computers load its libraries for half a minute [s].
 START_WITHIN_S = 120.0
-# A recorder that uses less processor time than this in each wait hangs at its end [s].
+# Least processor time that an ending recorder uses in each wait; with less it hangs [s].
 WORKS_S = 0.01
 
 
@@ -75,8 +75,7 @@ class RecorderSupervisor:
     def _launch(self) -> None:
         """Start the process; this may fail without memory or process ids."""
         try:
-            # The configuration goes through a file in memory: a pipe would need concurrent writing
-            # and reading.
+            # A file in memory, as a pipe would need concurrent writing and reading.
             with open(os.memfd_create("configuration"), "w+b") as document:
                 document.write(self._config)
                 document.seek(0)
@@ -87,8 +86,7 @@ class RecorderSupervisor:
     def close(self, timeout_s: float, longest_s: float) -> None:
         """End the recorder; kill it if its footer is not written in ``timeout_s`` [s].
 
-        One that still works, on a slow or busy computer, gets up to ``longest_s`` [s] to write its
-        last samples.
+        A recorder that still works, on a slow or busy computer, gets up to ``longest_s`` [s].
         """
         if self._process is None or self._process.poll() is not None:
             return
@@ -118,14 +116,14 @@ class RecorderSupervisor:
             return
         if self._process is not None and report.pid == self._process.pid:
             self._report, self._reported_at = report, now
-            # A recorder that dies of its data has reported before.
+            # A report alone does not reset the pause: a recorder may report, then fail on its data.
             if now - self._began_at >= LONGEST_PAUSE_S:
                 self._pause_s = FIRST_PAUSE_S
 
     def _running(self, now: float) -> SupervisedRecorder:
         patience_s = SILENT_AFTER_S if self._report else START_WITHIN_S
         if now - self._reported_at > patience_s:
-            # The rest is the same as for a recorder that died.
+            # The next poll handles it as a recorder that died.
             assert self._process is not None
             self._process.kill()
             reason = f"no status for {patience_s:.0f} s"

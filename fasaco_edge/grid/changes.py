@@ -39,7 +39,7 @@ class LatticeChange:
         before: the previous lattice; None for the first.
         after: the lattice over the new map; the previous object if no cell has changed.
         cells: int32 (n, 2), read-only: (row, col) of each cell whose state or steps have
-            changed. Outside of its window a lattice is unknown: a cell that entered or left the
+            changed. Outside its window a lattice is unknown, so a cell that entered or left the
             window has changed if it is or was known.
     """
 
@@ -180,12 +180,12 @@ def cells_near_changes(
 ) -> NDArray[np.bool_]:
     """Return which cells of the new window are near changed pixels, bool (rows, cols).
 
-    Outside of a map all is unknown: growth by unknown pixels is no change.
+    Growth by unknown pixels is no change, as everything outside a map is unknown.
 
     Args:
         grids: the previous map and the new one.
         window: window of the lattice over the new map.
-        placement: position of its cells; ``reach_of`` gives how far away a pixel affects a cell.
+        placement: placement of its cells; ``reach_of`` is the distance at which pixels affect them.
         thresholds: thresholds of free and occupied.
         within: see ``LatticeChange.between``.
     """
@@ -215,9 +215,9 @@ def cells_near_changes(
 def new_cells(old: Window, new: Window) -> NDArray[np.bool_]:
     """Mark the cells of the new window that the old one lacks, bool (rows, cols).
 
-    They must be classified even if no pixel near them changed: a robot wider than its tool may have
-    been blocked where the old lattice did not reach. The other cells have no steps into the new
-    ones unless nearby pixels changed: outside of a window is outside of its map, and unknown.
+    They are classified even if no pixel near them changed, as a robot wider than its tool may be
+    blocked there. The other cells have no steps into them unless nearby pixels changed, as
+    everything outside a map is unknown.
     """
     return ~carried(np.ones((old.rows, old.cols), np.bool_), old, new)
 

@@ -1,8 +1,8 @@
-"""Fine raster of a map: its pixels, polygons on it, and which pixels a change of others affects.
+"""Fine raster of a map: its pixels, polygons on it, and the pixels that a change affects.
 
-The strip that a tool leaves along a wall is narrower than a pixel of most maps: pixels are divided,
-with a border of unknown ones. Pixel (i, j) of the raster is the unit square around the point
-(y = i, x = j).
+The strip that a tool leaves along a wall is narrower than a pixel of most maps, so pixels are
+divided. Unknown pixels form a border around the map. Pixel (i, j) of the raster is the unit square
+around the point (y = i, x = j).
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from fasaco_edge.kernels.floor.bits import Bits, packed
 from fasaco_edge.kernels.lattice.footprint import Placement
 from fasaco_edge.kernels.lattice.polygons import add_near, turn_inside
 
-# Pixels are divided to this size or smaller: the strip left along a wall is a few of them wide.
+# Largest edge of a fine pixel [m]: the strip left along a wall is a few of them wide.
 FINE_M = 0.025
 # Decimals of a polygon's corner [pixels].
 DECIMALS = 6
 # Approximate number of pixels processed at once in arrays of a byte or more per pixel.
 STRIP = 1 << 20
-# A step may bend over places this far from the centres of its two cells; one pixel for rounding.
+# Distance from the centres of its two cells within which a step may bend [cells], and an addition
+# for rounding [pixels].
 REACH_CELLS, REACH_PX = 2.5, 2.0
 
 
@@ -39,8 +40,8 @@ class RobotDiscs:
         radius_m: radius of the robot [m].
         tool_m: width of the tool [m].
         free_at_most: occupancy values up to this are free [percent].
-        clearance_m: distance of lines from all that is not free in addition to the radius, where
-            possible [m].
+        clearance_m: distance that lines keep from pixels that are not free, in addition to the
+            radius, where possible [m].
     """
 
     radius_m: float
@@ -65,13 +66,13 @@ def fine_geometry(
         coarse: the map.
         discs: robot and tool.
         most_pixels: limit on the pixels.
-        chunk: the raster spans whole chunks of this many pixels of the map if the limit allows it:
-            a map that grows within them keeps its raster.
+        chunk: the raster spans whole chunks of this many pixels of the map if the limit allows it,
+            so that a map that grows within them keeps its raster.
 
     Raises:
         MapTooLarge: it would exceed the limit even with undivided pixels.
     """
-    # Maps on the same pixels get the same raster, whatever the rounding of their origins.
+    # Maps on the same pixels get the same raster, regardless of rounding of their origins.
     shown = coarse.snapped(chunk), coarse.snapped()
     for parts in range(max(1, math.ceil(coarse.resolution / FINE_M - 1e-3)), 0, -1):
         unit = coarse.resolution / parts
@@ -220,9 +221,9 @@ def _touched_by(corners: NDArray[np.float64], part: Window) -> NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """Reach of a robot: which pixels and cells a change of others affects.
+    """Reach of a robot: the pixels and cells that a change nearby affects.
 
-    Disc and tool reach beyond the pixel or cell that they stand on, and a step may bend around a
+    Disc and tool reach beyond the pixel or cell that they are on, and a step may bend around a
     corner.
 
     Attributes:
@@ -238,7 +239,7 @@ class Reach:
 
         Args:
             cells: window of the lattice.
-            geometry: of the raster.
+            geometry: geometry of the raster.
             margin: added on each side [pixels].
         """
         placement = stand_placement(geometry, self.cell_m, self.discs.radius_m)
@@ -267,7 +268,7 @@ class Reach:
         Args:
             cells: bool (rows, cols) of the window.
             window: window of the lattice.
-            geometry: of the raster.
+            geometry: geometry of the raster.
         """
         found = Window.of(cells)
         if found is None:

@@ -1,12 +1,12 @@
 """Floor: the places of the robot on a fine raster of a map, and the floor its tool reaches there.
 
 The reachable floor is everything that the tool's disc touches while the robot's disc is at places
-connected to its start. All that the robot's disc covers is free. If the tool sticks out of it (side
-brushes, a wide deck, a lamp), a pixel of the tool's disc counts if free pixels, about inside that
-disc, connect it with the robot's disc.
+connected to its start. All pixels under the robot's disc are free. If the tool extends beyond it
+(side brushes, a wide deck, a lamp), a pixel of the tool's disc counts only if free pixels, about
+inside that disc, connect it with the robot's disc.
 
-The lattice over the floor has a cell wherever the robot has a place: its stand is the place nearest
-to the cell's centre, and a step may bend around a corner.
+A cell of the lattice over the floor is coverable if the robot has a place in it. Its stand is the
+place nearest to the cell's centre, and a step may bend around a corner.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Floor:
         discs: robot and tool.
         blocked: uint64 (rows, words), see ``kernels.floor.bits``: pixels not known free.
         places: likewise: pixels whose centre the robot can occupy and reach.
-        reachable: bool (rows, cols): pixels whose centre the tool reaches from these.
+        reachable: bool (rows, cols): pixels whose centre the tool reaches from these places.
         start: y, x of the place nearest to the start [pixels].
     """
 
@@ -198,7 +198,7 @@ class StandLattice:
         return self.line(walk)[0]
 
     def line(self, walk: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Return that line, and the index in the walk of each point's cell, int64 (m,).
+        """Return the line along a walk, and the index in the walk of each point's cell, int64 (m,).
 
         A bend belongs to the cell that the step leaves.
         """
@@ -218,10 +218,10 @@ class StandLattice:
 
 
 def tool_steps(radius: float, tool: float) -> int:
-    """Return how many steps over edges lead from the robot's disc to the rim of the tool's.
+    """Return the steps over pixels' edges from the robot's disc to the rim of the tool's.
 
-    0 for a tool within the robot's disc. Diagonal distances take more steps: the number allows for
-    that.
+    The number is enough for diagonal directions, which take most steps; 0 for a tool within the
+    robot's disc.
 
     Args:
         radius, tool: radii of robot and tool [pixels].

@@ -1,9 +1,9 @@
 """Floor map: places, stands and the lattice over them, for a map that changes.
 
-If the new map shows all of the previous one, on its raster, only cells near changed pixels are
-recomputed, see ``grid.changes``. The result equals that of the new map alone.
+If the new map shows all of the previous one on its raster, only cells near changed pixels are
+recomputed (``grid.changes``). The result equals that of the new map alone.
 
-The raster spans whole chunks of the map's pixels, so a growing map seldom moves it; and if it does,
+The raster spans whole chunks of the map's pixels, so that a growing map seldom moves it, and then
 by whole words of its bits.
 """
 
@@ -94,7 +94,7 @@ class FloorMap:
         Args:
             grid: the map.
             plain: the lattice of cell centres over it, which gives the unknown cells.
-            footprint, discs: of the robot.
+            footprint, discs: the robot and its tool.
             most_pixels: limit on the pixels of the raster.
             keep_out: polygons that the robot must not touch.
 
@@ -105,7 +105,7 @@ class FloorMap:
         self._footprint, self._most_pixels, self._keep_out = footprint, most_pixels, keep_out
         # The keep-out polygons on the raster, with the geometry they were converted for.
         self._kept_out: tuple[GridGeometry, PolygonsOnRaster] | None = None
-        self._see(grid, plain)
+        self._compute_all(grid, plain)
 
     def change(
         self,
@@ -127,7 +127,7 @@ class FloorMap:
         geometry, parts = self._geometry_of(grids[1])
         is_same_raster = geometry.resolution == self.geometry.resolution
         if not is_same_raster or shown_before(grids) is None:
-            self._see(grids[1], plain)
+            self._compute_all(grids[1], plain)
             return self._compared(before)
         wide = placement_of(grids[1].geometry, self._footprint)
         scale = self._footprint.cell_m / grids[1].geometry.resolution
@@ -136,17 +136,17 @@ class FloorMap:
         near = cells_near_changes(grids, plain.window, wide, self._footprint.thresholds, within)
         self.revision += 1
         self.shift = geometry.corner_of(self.geometry)
-        # A map that grows on two sides has new cells all along these, and little new floor.
+        # New cells are left out: along the sides of a grown map they contain little new floor.
         self.touched = self._reach.pixels_of(near, plain.window, geometry)
         is_same = geometry == self.geometry
         if self.touched is None and is_same and plain.window == before.window:
             return LatticeChange.to(before, self._with_states(plain))
         # Rounding may place a polygon differently on another raster.
         if not is_same and (not self._move(geometry, self.shift) or self._keep_out):
-            self._look(grids[1], parts, 0, geometry.rows)
+            self._compute_places(grids[1], parts, 0, geometry.rows)
         elif self.touched is not None:
-            self._look(grids[1], parts, self.touched.row0, self.touched.row1)
-        self._settle(plain, near | new_cells(before.window, plain.window))
+            self._compute_places(grids[1], parts, self.touched.row0, self.touched.row1)
+        self._compute_stands(plain, near | new_cells(before.window, plain.window))
         return self._compared(before)
 
     def stand_xy(self, cell: Cell) -> Point | None:
@@ -166,7 +166,7 @@ class FloorMap:
     def reached(self, cells: NDArray[np.bool_], part: Window) -> NDArray[np.bool_]:
         """Return the pixels in a window of the raster that the tool reaches from places in cells.
 
-        It reaches none through walls, see ``tool_reach``.
+        The tool reaches no pixel through walls (``tool_reach``).
 
         Args:
             cells: bool (rows, cols) of the lattice.
@@ -183,7 +183,7 @@ class FloorMap:
             part.row0 - margin, part.col0 - margin, part.row1 + margin, part.col1 + margin
         ).intersection(whole)
         assert around is not None
-        # Whole words; the pixels farther away do no harm.
+        # Whole words, as pixels farther away have no effect.
         first, end = around.col0 // WORD, -(-around.col1 // WORD)
         found = self.places[around.row0 : around.row1, first:end].copy()
         lattice = self.stands.lattice
@@ -217,13 +217,13 @@ class FloorMap:
         """
         return self._reach.pixels_of(cells, self.stands.lattice.window, self.geometry)
 
-    def _see(self, grid: OccupancyGrid, plain: CoverageLattice) -> None:
+    def _compute_all(self, grid: OccupancyGrid, plain: CoverageLattice) -> None:
         self.geometry, parts = self._geometry_of(grid)
         rows, cols = self.geometry.rows, self.geometry.cols
         self.revision += 1
         self.shift, self.touched = None, Window(0, 0, rows, cols)
-        self._look(grid, parts, 0, rows)
-        self._settle(plain, np.ones(plain.states.shape, np.bool_))
+        self._compute_places(grid, parts, 0, rows)
+        self._compute_stands(plain, np.ones(plain.states.shape, np.bool_))
 
     def _geometry_of(self, grid: OccupancyGrid) -> tuple[GridGeometry, int]:
         return fine_geometry(grid.geometry, self.discs, self._most_pixels, CHUNK)
@@ -240,7 +240,7 @@ class FloorMap:
         self.places = carried(self.places, old, new)
         return True
 
-    def _look(self, grid: OccupancyGrid, parts: int, first: int, end: int) -> None:
+    def _compute_places(self, grid: OccupancyGrid, parts: int, first: int, end: int) -> None:
         """Compute blocked pixels in rows of the raster, and the places there."""
         rows = self.geometry.rows
         keep_out = None
@@ -271,8 +271,8 @@ class FloorMap:
         """Placement of the lattice's cells on the raster."""
         return stand_placement(self.geometry, self._footprint.cell_m, self.discs.radius_m)
 
-    def _settle(self, plain: CoverageLattice, stale: NDArray[np.bool_]) -> None:
-        """Recompute stale cells; the others are those of the previous lattice."""
+    def _compute_stands(self, plain: CoverageLattice, stale: NDArray[np.bool_]) -> None:
+        """Recompute stale cells; the others are taken from the previous lattice."""
         self.stands = StandLattice.where(
             self.blocked,
             self.places,

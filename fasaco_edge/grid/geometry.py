@@ -1,6 +1,6 @@
 """Geometry: poses, the placement of grids in the map frame, and windows of cells.
 
-Does not import numpy at run time, so that a program that only needs poses stays small.
+The module does not import numpy at run time, so that programs that only need poses stay small.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
     _Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
     _Pixel = TypeVar("_Pixel", bound=np.generic)
 
-# A raster's corner is rounded to this fraction of a pixel: a map that grows by whole pixels stays
-# on its raster, even if its origin is rounded to float32.
+# Steps per pixel to which a raster's corner is rounded, so that a map that grows by whole pixels
+# stays on its raster, even if its origin is rounded to float32.
 RASTER_STEPS = 2048
 
-# The largest distance of a map, a pose or a path from the frame's origin [m]: UTM northings go up
-# to 10,000 km. ``protocol/limits.yaml`` has the same number.
+# Largest distance of a map, a pose or a path from the frame's origin [m]; UTM northings go up to
+# 10,000 km. ``protocol/limits.yaml`` has the same number.
 FARTHEST_M = 2e7
-# Limit of the indices of a lattice's cells: they, and sums of two of them, are int32.
+# Limit on the indices of a lattice's cells, so that sums of two of them are int32, too.
 MOST_INDEX = 2**30
 
 # Default limit of a lattice.
@@ -97,12 +97,8 @@ class Window:
 
     def in_chunks(self, chunk: int, rows: int, cols: int) -> Window:
         """Return the window rounded outward to chunks of a grid of ``rows`` x ``cols`` cells."""
-        return Window(
-            self.row0 // chunk * chunk,
-            self.col0 // chunk * chunk,
-            min(-(-self.row1 // chunk) * chunk, rows),
-            min(-(-self.col1 // chunk) * chunk, cols),
-        )
+        whole = self.rounded_out(chunk)
+        return Window(whole.row0, whole.col0, min(whole.row1, rows), min(whole.col1, cols))
 
     def rounded_out(self, chunk: int) -> Window:
         """Return the window rounded outward to whole chunks of an unbounded grid."""
@@ -154,7 +150,7 @@ class Window:
             and cols.min() >= 0
             and cols.max() < self.cols
         ):
-            # The usual case, kept fast for paths of tens of thousands of cells.
+            # The usual case, fast for paths of tens of thousands of cells.
             return values.ravel().take(rows.astype(int) * self.cols + cols)
         inside = (rows >= 0) & (rows < self.rows) & (cols >= 0) & (cols < self.cols)
         found = rows.astype(values.dtype)
@@ -206,7 +202,7 @@ class GridGeometry:
     def of_cells(cls, window: Window, cell_m: float) -> GridGeometry:
         """Return the placement of a window of the coverage lattice, cells ``cell_m`` [m] wide.
 
-        In the lattice's own frame, which may be rotated, see ``grid.rotation``.
+        The placement is in the lattice's own frame, which may be rotated (``grid.rotation``).
         """
         corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
         return cls(window.rows, window.cols, cell_m, corner)
@@ -228,11 +224,11 @@ class GridGeometry:
     ) -> NDArray[_Pixel]:
         """Return the values of the pixels at points (x, y) [m], float64 (n, 2).
 
-        ``values``: (rows, cols), of any dtype, which the result, (n,), has too; ``beyond`` the grid
-        it has that value.
+        ``values``: (rows, cols), any dtype. The result, (n,), has the same dtype, and the value
+        ``beyond`` outside the grid.
         """
         col, row = self.to_pixels(xy[:, 0], xy[:, 1])
-        # Without numpy, which processes that never get here do not load.
+        # Methods of the arrays, as this module does not import numpy.
         cols, rows = (col // 1).astype(int), (row // 1).astype(int)
         inside = (rows >= 0) & (cols >= 0) & (rows < self.rows) & (cols < self.cols)
         found = cols.astype(values.dtype)
@@ -258,7 +254,7 @@ class GridGeometry:
         """Return this grid moved exactly onto its raster, see ``on_raster``.
 
         Grids on the same pixels become equal, even if the origin of one was rounded, as float32 or
-        by a transform. The grid is extended to whole chunks of this many pixels of the raster.
+        by a transform. The grid is extended to whole chunks of ``chunk`` pixels of the raster.
         """
         raster, window = self.on_raster()
         window = window.rounded_out(chunk)
@@ -269,8 +265,7 @@ class GridGeometry:
         return GridGeometry(window.rows, window.cols, raster.resolution, origin)
 
     def corner_of(self, other: GridGeometry) -> tuple[int, int]:
-        """Return the pixel (row, col) at the corner of another grid, whose pixels' edges lie on
-        this grid's."""
+        """Return the pixel (row, col) at another grid's corner, which is a pixel's corner here."""
         col, row = self.to_pixels(other.origin.x, other.origin.y)
         return round(row), round(col)
 

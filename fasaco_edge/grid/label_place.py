@@ -1,6 +1,6 @@
-"""The place of a label in a polygon: the middle of where it is widest.
+"""Label place: the middle of the widest part of a polygon.
 
-Does not import numpy, so that small programs stay small.
+The module does not import numpy, so that small programs stay small.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 from fasaco_edge.grid.geometry import Point, Polygon
 
-# Lines of text looked at, and how much wider than tall a label is.
+# Number of horizontal lines tried, and ratio of a label's width to its height.
 LINES, ASPECT = 16, 3.0
 
 
 class LabelPlace(NamedTuple):
-    """A place for a label: its middle x, y [m], and how wide the polygon is there [m]."""
+    """A place for a label: its middle x, y [m], and the polygon's width there [m]."""
 
     x: float
     y: float
@@ -32,18 +32,18 @@ def label_place(polygon: Polygon) -> LabelPlace | None:
         y = low + (index + 0.5) / LINES * (high - low)
         for x0, x1 in _chords(corners, y):
             x = (x0 + x1) / 2
-            # Above and below the middle of the line there has to be place, too.
+            # A label needs room above and below the middle of the line, too.
             y0, y1 = next(((a, b) for a, b in _chords(turned, x) if a <= y <= b), (y, y))
             tall = 2 * min(y - y0, y1 - y)
             fits = min(x1 - x0, ASPECT * tall) + tall / 2
-            # Of lines as good as each other the first stays, whatever the last bit of a float says.
+            # Of equally good lines the first is kept, regardless of rounding.
             if fits > best + 1e-6:
                 best, found = fits, LabelPlace(x, y, x1 - x0)
     return found
 
 
 def _chords(corners: list[Point], y: float) -> Iterator[Point]:
-    """Yield where a horizontal line is in a polygon, from x to x [m]."""
+    """Yield the intervals (x, x) [m] of a horizontal line inside a polygon."""
     ends = sorted(
         ax + (y - ay) / (by - ay) * (bx - ax)
         for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True)

@@ -1,8 +1,8 @@
 """Coverage lattice: the planning grid, anchored to the map frame.
 
 Cells are as wide as the tool. Cell (row, col) is the square ``[col * cell_m, (col + 1) * cell_m) x
-[row * cell_m, (row + 1) * cell_m)`` of the map frame, whatever the origin, size or yaw of the map
-message: a cell keeps its index during the whole mission. Indices may be negative.
+[row * cell_m, (row + 1) * cell_m)`` of the map frame, independent of origin, size and yaw of the
+map message, so that a cell keeps its index during the whole mission. Indices may be negative.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footpr
 
 Cell = tuple[int, int]
 
-# A map that extends into a cell by less than this is taken to end before it [cells]: rounding.
+# Extension of a map into a cell that counts as rounding [cells].
 ROUNDING = 1e-6
 
 # Limit on the pixels that robot and tool may span: above it, the tables for classifying a map take
 # more memory than the map itself, see ``kernels.lattice.classification``.
 MOST_REACH_PX = 400
 
-# A robot exactly as wide as a corridor fits; float32 rounding of resolutions must not decide
-# otherwise.
+# Tolerance for a robot exactly as wide as a corridor, which fits in spite of float32 rounding of
+# resolutions.
 TOUCH_TOLERANCE_PX = 1e-3
 
 
@@ -51,9 +51,9 @@ class Footprint:
     Attributes:
         cell_m: edge of a lattice cell, the width of the tool [m].
         robot_radius_m: radius of the robot's disc [m].
-        free_at_most: occupancy values up to this are free [percent].
-        occupied_at_least: occupancy values from this on are occupied [percent];
-            values between the two count as unknown.
+        free_at_most: largest occupancy of free pixels [percent].
+        occupied_at_least: least occupancy of occupied pixels [percent]; values between the two
+            count as unknown.
     """
 
     cell_m: float
@@ -153,8 +153,7 @@ class CoverageLattice:
 def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Window:
     """Return the window of the unbounded lattice, cells ``cell_m`` [m] wide, that a map spans.
 
-    Cells have int32 indices, and everything published of them lies within ``FARTHEST_M`` of the
-    origin.
+    Cells have int32 indices, and lie within ``FARTHEST_M`` of the origin.
 
     Raises:
         MapTooLarge: it has more than ``max_cells`` cells.
@@ -188,7 +187,7 @@ def lattice_window(geometry: GridGeometry, cell_m: float, max_cells: int) -> Win
 
 
 def mask_of(cells: Iterable[Cell], window: Window) -> NDArray[np.bool_]:
-    """Return which cells of a window are among some, bool (rows, cols)."""
+    """Return which cells of a window are among ``cells``, bool (rows, cols)."""
     found = np.zeros((window.rows, window.cols), np.bool_)
     for row, col in cells:
         if window.row0 <= row < window.row1 and window.col0 <= col < window.col1:
@@ -197,9 +196,9 @@ def mask_of(cells: Iterable[Cell], window: Window) -> NDArray[np.bool_]:
 
 
 def beside(cells: NDArray[np.bool_], *, beyond: bool = False) -> NDArray[np.bool_]:
-    """Return which cells share an edge with some, bool (rows, cols).
+    """Return which cells share an edge with a marked cell, bool (rows, cols).
 
-    ``beyond``: whether those beyond the border are among these.
+    ``beyond``: whether cells beyond the border count as marked.
     """
     around = np.pad(cells, 1, constant_values=beyond)
     found: NDArray[np.bool_] = around[:-2, 1:-1] | around[2:, 1:-1]

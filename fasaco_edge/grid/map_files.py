@@ -2,9 +2,9 @@
 
 A map file is interpreted as by nav2_map_server (map_io.cpp). Its releases differ on transparent
 pixels in trinary mode: older ones average the alpha channel into the brightness, so that opaque
-black is 75 % occupied (navigation2 issue 4233); newer ones take a transparent pixel for unknown, as
-scale mode always did. Here alpha is never a brightness, and a transparent pixel is unknown. Keys
-that contradict the image, or leave never-seen ground free, are logged (``map_images``).
+black is 75 % occupied (navigation2 issue 4233); in newer ones a transparent pixel is unknown, as it
+always was in scale mode. Here, alpha is never a brightness, and a transparent pixel is unknown.
+Keys that contradict the image, or make never-seen ground free, are logged (``map_images``).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from fasaco_edge.text import nearest, shown
 LOG = logging.getLogger(__name__)
 
 IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
-# Thresholds of ROS 1's map_saver: its grey for unknown, 205, is not free by these.
+# Thresholds of ROS 1's map_saver, by which its grey for unknown, 205, is not free.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
 MODES = ("trinary", "scale", "raw")
@@ -109,8 +109,8 @@ def read_map_rows(
     image = read_image(Path(file), most_bytes)
     geometry = GridGeometry(image.rows, image.cols, resolution, origin)
     values = values_of(mode, thresholds, image.white, negate)
-    said = settle(image, values, mode, negate=negate, is_mask=is_mask)
-    for text in filter(None, (yaw_in_degrees(origin.yaw), said)):
+    conflict = settle(image, values, mode, negate=negate, is_mask=is_mask)
+    for text in filter(None, (yaw_in_degrees(origin.yaw), conflict)):
         LOG.warning("%s: %s", path, text, extra={"event": "map_file"})
     return geometry, _cells(image, values, mode)
 
@@ -154,7 +154,7 @@ def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
 def _cells(image: MapImage, values: NDArray[np.int8], mode: str) -> Iterator[NDArray[np.int8]]:
     """Yield the rows of a map, int8 (some, cols), from the smallest y up.
 
-    ``values``, int8 (white + 1,), are the cell values of levels.
+    ``values``: int8 (white + 1,), the cell value of each level.
     """
     for stripe in image.stripes():
         cells = values[stripe.levels]
@@ -192,7 +192,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
     """
     try:
         check_plain(path)
-        # Memory-mapped first: a header that claims a huge array costs nothing.
+        # Memory-mapped first, so that a header that claims a huge array costs nothing.
         array = np.load(path, mmap_mode="r", allow_pickle=False)
     except (OSError, ValueError, EOFError, OverflowError, TypeError) as error:
         raise MapFileError(
@@ -211,7 +211,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
             hint=OF_A_GRID,
         )
     check_size(path, array.shape[1], array.shape[0])
-    # Another program may write any byte but 0 for True; kernels read only the lowest bit.
+    # Other programs may write any byte except 0 for True; kernels read only the lowest bit.
     cells: NDArray[np.bool_] = np.ascontiguousarray(array).view(np.uint8) != 0
     return cells
 

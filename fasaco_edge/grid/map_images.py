@@ -1,12 +1,12 @@
-"""Images of maps: decoded at once, processed in stripes of rows; the cell values of their levels.
+"""Map images: decoded at once, processed in stripes of rows; and the cell values of their levels.
 
-Pillow's decoded image takes a byte per pixel of grey and four of colour. Everything derived from it
-is made in stripes, which bounds the additional memory.
+Pillow's decoded image takes one byte per grey pixel, and four per colour pixel. Everything derived
+from it is made in stripes, which bounds the additional memory.
 
 ROS 2's map_saver writes three greys in trinary mode: black, 254, and 205 for never seen. Until
-2025 it wrote ``free_thresh: 0.25`` beside them, by which map_server takes 205, 19.6 % occupied, for
-free; since then it writes 0.196, as in ROS 1 (navigation2 PR 5278). Here that grey is unknown if
-map_saver wrote it: a robot must not drive over ground that was never seen.
+2025 it also wrote ``free_thresh: 0.25``, by which 205, 19.6 % occupied, is free for map_server;
+since then it writes 0.196, as in ROS 1 (navigation2 PR 5278). Here, that grey is unknown if
+map_saver wrote it, as a robot must not drive over ground that was never seen.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 MAX_PIXELS = 64_000_000
 
-# nav2's three recommended formats, and JPEG, in which published maps come; PPM is Pillow's name for
-# the PGM family. JPEG artefacts at sharp edges may turn unknown pixels beside walls free.
+# nav2's three recommended formats, and JPEG, used for published maps; PPM is Pillow's name for the
+# PGM family. JPEG artefacts at sharp edges may turn unknown pixels beside walls free.
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 # Size of a stripe, rounded to 8 rows: pixels, and memory per pixel [bytes].
 STRIPE_PIXELS = 500_000
@@ -41,8 +41,8 @@ STRIPE_BYTES = 16
 _DECODED = {"1": 1, "L": 1, "P": 1, "I;16": 2, "I;16B": 2}
 # Progressive JPEG also keeps the coefficients of all channels [bytes per channel].
 _COEFFICIENTS = 2
-# Limit for rare formats that Pillow decodes in Python: a microsecond per pixel, on a slow computer
-# ten.
+# Limit on the pixels of rare formats that Pillow decodes in Python, at a microsecond per pixel, or
+# ten on a slow computer.
 SLOW_PIXELS = 1_000_000
 
 _OF_SIZE = "save the part of the map that is to be covered, or the map with larger pixels"
@@ -219,10 +219,10 @@ def settle(
     """Return a contradiction of keys and image, with its remedy; "" for none.
 
     Args:
-        image, mode, negate: of the map file.
+        image, mode, negate: content of the map file.
         values: int8 (white + 1,), the cell value of each level. Changed in place: map_saver's grey
             for never seen becomes unknown.
-        is_mask: whether unknown is the same as free.
+        is_mask: whether unknown counts as free.
     """
     never_seen = NEVER_SEEN * image.white // 255
     given = values[never_seen]
@@ -237,7 +237,7 @@ def settle(
     if negate:
         is_savers = unseen and counts[SEEN_FREE] and given == OCCUPIED
         return NEGATED.format(unseen) if is_savers else ""
-    # The grey is from map_saver, and not one of many shades, if most grey pixels have it.
+    # If most grey pixels have it, the grey is map_saver's, not one of many shades.
     is_grey = (values[:: image.white // 255] != OCCUPIED) & (np.arange(256) < SEEN_FREE)
     if is_mask or 2 * unseen <= counts[is_grey].sum():
         return ""
@@ -246,7 +246,7 @@ def settle(
 
 
 def _counts(image: MapImage) -> NDArray[np.int64]:
-    """Return how many pixels have each level, int64 (256,), rounded down to one of 0 .. 255."""
+    """Return the number of pixels of each level, scaled down to 0 .. 255, int64 (256,)."""
     counts = np.zeros(256, np.int64)
     for stripe in image.stripes():
         levels = stripe.levels // np.uint16(image.white // 255)

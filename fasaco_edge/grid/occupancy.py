@@ -20,7 +20,7 @@ UNKNOWN = -1
 FREE = 0
 OCCUPIED = 100
 
-# Pixels processed at once: a mask over all would take as much memory as the map.
+# Pixels processed at once, as a mask of all would take as much memory as the map.
 BLOCK_PIXELS = 1_000_000
 
 
@@ -111,7 +111,7 @@ class UpdatedGrid:
 
 
 def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
-    """Return a map of about this many pixels at most: each has the highest value that it joins."""
+    """Return a map of at most about ``most_pixels``, each the highest of those it joins."""
     factor = math.ceil(math.sqrt(grid.cells.size / most_pixels))
     if factor <= 1:
         return grid
@@ -125,8 +125,8 @@ def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
 
 
 def highest(values: NDArray[_Value], factor: int) -> NDArray[_Value]:
-    """Return blocks of ``factor`` x ``factor`` values joined: the highest of each."""
-    # Slice by slice: many times faster than the maximum over two axes of a reshaped array.
+    """Return the highest value of each block of ``factor`` x ``factor`` values."""
+    # Slice by slice, which is many times faster than a maximum over two axes.
     rows = reduce(np.maximum, (values[first::factor] for first in range(factor)))
     return reduce(np.maximum, (rows[:, first::factor] for first in range(factor)))
 

@@ -12,14 +12,14 @@ from fasaco_edge.grid.geometry import Point, Polygon
 
 # A polygon with a smaller area is a mistake [m2].
 LEAST_AREA_M2 = 1e-4
-# Pairs of edges compared at once: larger blocks take more memory, and no less time.
+# Pairs of edges compared at once; larger blocks take more memory without being faster.
 MOST_PAIRS = 65536
 
 
 def polygon_flaw(polygon: Polygon) -> str:
     """Return why ``polygon`` has no well-defined interior; "" if it has.
 
-    Its points are finite; the last is joined to the first.
+    Its points must be finite; the last is joined to the first.
     """
     if len(polygon) < 3:
         return f"must have at least 3 points, got {len(polygon)}"
@@ -37,7 +37,7 @@ def polygon_flaw(polygon: Polygon) -> str:
 
 
 def is_near(polygon: Polygon, point: Point, reach_m: float) -> bool:
-    """Return whether a point (x, y) [m] lies in a polygon, or nearer to it than ``reach_m`` [m]."""
+    """Return whether a point (x, y) [m] lies in a polygon, or within ``reach_m`` [m] of it."""
     x, y = point
     is_inside = False
     for (ax, ay), (bx, by) in _edges(polygon):
@@ -56,7 +56,7 @@ def _edges(polygon: Polygon) -> Iterator[tuple[Point, Point]]:
 
 def area_m2(polygon: Polygon) -> float:
     """Return the area of a polygon, of points (x, y) [m]."""
-    # Relative to a corner: far from the origin rounding would swamp the differences.
+    # Relative to a corner, as far from the origin rounding would exceed the differences.
     x0, y0 = polygon[0]
     twice = math.fsum(
         (ax - x0) * (by - y0) - (bx - x0) * (ay - y0) for (ax, ay), (bx, by) in _edges(polygon)

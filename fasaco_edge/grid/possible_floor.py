@@ -1,9 +1,8 @@
 """Possible floor: the floor that the tool would reach if walls were thinner than on the map.
 
-A pixel of a map is occupied if a wall passes through it, or if the noise of scans and poses put one
-there. So walls and furniture are thicker on a map than in the building: by about a pixel on the
-maps of a scan matcher. No such map shows how much more floor there is; this is an estimate of its
-upper limit.
+A pixel of a map is occupied if a wall passes through it, or by noise of scans and poses. So walls
+and furniture are thicker on a map than in the building, by about a pixel on the maps of a scan
+matcher. The map does not show the floor that they hide; this module estimates its upper limit.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from fasaco_edge.grid.geometry import Point
 from fasaco_edge.kernels.floor.bits import Bits, packed, unpacked
 from fasaco_edge.kernels.floor.places import connected, disc_rows, keep_in_cells, places_of
 
-# Largest raster on which this is computed [pixels]: a larger one would take more than a quarter of
-# a second.
+# Largest raster for the estimate [pixels]; a larger one would take more than a quarter of a second.
 MOST_PIXELS = 8_000_000
 
 
@@ -34,12 +32,12 @@ def possible_m2(
     None on a raster of more than ``MOST_PIXELS``, or if the robot would fit nowhere.
 
     Args:
-        floor: of the newest map.
-        thinner_m: by how much walls would be thinner: the edge of a pixel of the map [m].
-        at: where the robot is, x, y [m].
+        floor: the floor of the newest map.
+        thinner_m: reduction of walls on each side, the edge of a pixel of the map [m].
+        at: the robot's position x, y [m].
         asked: bool (rows, cols) of the lattice: the cells whose floor counts.
-        cut_off: likewise: cells that were reachable once and are no more. They count together with
-            the cells connected to them.
+        cut_off: likewise: cells that were reachable once and are no more; cells connected to them
+            count, too.
     """
     geometry = floor.geometry
     if geometry.rows * geometry.cols > MOST_PIXELS:

@@ -1,9 +1,9 @@
 """Rooms of an occupancy grid: regions of free floor that doors separate.
 
-Furniture that stands free is ignored. Doors are narrow gaps between the ends of walls
-(``kernels.rooms.doors``); each is cut, and what then hangs together is a region. A region that is
-too small for a room is joined to a neighbour through the least certain door. Half-seen maps are
-served too: a room is one as soon as enough of its floor has been seen through the door.
+Free-standing furniture is ignored. Doors are narrow gaps between the ends of walls
+(``kernels.rooms.doors``); each is cut, and each connected part is a region. A region too small for
+a room is joined to a neighbour through the least certain door. A room on an incomplete map is found
+as soon as enough of its floor has been seen through the door.
 """
 
 from __future__ import annotations
@@ -25,40 +25,41 @@ from fasaco_edge.kernels.rooms.doors import DoorLimits, Pixels, find_doors
 from fasaco_edge.kernels.rooms.islands import Limits, furniture
 from fasaco_edge.kernels.rooms.regions import beside_cuts, draw_cuts, grow
 
-# Finer pixels are joined to about this [m].
+# Approximate edge to which finer pixels are joined [m].
 PIXEL_M = 0.05
-# Widest door, thickest wall with a door, how far beside a door the floor has to widen [m].
+# Widest door; thickest wall with a door; distance beside a door in which floor has to widen [m].
 DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
 # Smallest room [m2].
 ROOM_M2 = 1.5
-# Furniture: longest edge; shorter than this in any case; else thicker than this [m].
+# Furniture: longest edge; edge up to which anything is furniture; least thickness of the rest [m].
 LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
-# Unknown pixels nearer than this to floor that is open to them are yet to be seen [m].
+# Distance from adjoining free floor within which unknown pixels are still to be seen [m].
 OPEN_M = 0.5
-# With more unknown pixels beside free ones than this many times those of walls, a map marks no
-# walls, and all that is not free is wall.
+# Ratio of unknown to wall pixels beside free ones, above which a map marks no walls, so that all
+# pixels that are not free are wall.
 MOST_UNMARKED = 4
-# Clearance beyond which nothing can be a door [m].
+# Largest clearance in a door [m].
 CLEAR_M = 2.0
-# Directions of chords, integers on half a square: their unit vectors are equal on all machines.
+# Directions of chords, from integers on half a square, so that their unit vectors are equal on all
+# machines.
 _HALF = 6
 _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
     (_HALF, col) for col in range(_HALF - 1, -_HALF - 1, -1)
 ]
 _DIRECTIONS = np.array(_RING) / np.sqrt((np.array(_RING) ** 2).sum(axis=1, keepdims=True))
-# How certain a cut by hand is: more than any door.
+# Certainty of a cut by hand, above that of any door.
 _BY_HAND = 9.0
-# Pixels worked on at once, where arrays of other types are made of them.
+# Pixels processed at once in arrays of larger types.
 BLOCK = 1 << 16
 _NO_LINK = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FoundRooms:
-    """Rooms of a map, numbered by their first pixels, row by row, those in doors aside.
+    """Rooms of a map, numbered by their first pixels outside doors, row by row.
 
     Attributes:
-        geometry: of the labels' pixels, a part of the map.
+        geometry: geometry of the labels' pixels, a part of the map.
         labels: int32 (rows, cols), the room of each free pixel, from 1; 0 for none.
         count: number of rooms.
     """
@@ -98,7 +99,7 @@ def find_rooms(grid: OccupancyGrid, cuts: Sequence[tuple[Point, Point]] = ()) ->
 def _solid_and_doors(
     kinds: NDArray[np.uint8], pixel_m: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-    """Return the pixels that are not free, furniture excepted, and the doors between them."""
+    """Return the pixels that are neither free nor furniture, and the doors between them."""
     free = kinds == _FREE
     things = furniture(
         ~free, Limits(round(LONGEST_M / pixel_m), SMALL_M / pixel_m, THICK_M / pixel_m)
@@ -115,7 +116,7 @@ def _solid_and_doors(
 
 
 def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return how many free pixels each region has, float64 (n,)."""
+    """Return the number of free pixels of each region, float64 (n,)."""
     counts = np.zeros(int(labels.max()) + 1)
     whole = Window(0, 0, *labels.shape)
     for strip in whole.strips(BLOCK):
@@ -125,7 +126,7 @@ def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.f
 
 
 def _numbered(rooms: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
-    """Return the rooms of regions, numbered by their first regions, and how many there are."""
+    """Return the rooms of regions, numbered by their first regions, and their number."""
     names = dict.fromkeys(room for room in rooms.tolist() if room)
     numbers = np.zeros(len(rooms), np.int32)
     numbers[list(names)] = np.arange(1, len(names) + 1)
@@ -136,7 +137,7 @@ _UNKNOWN, _FREE, _WALL = 0, 1, 2
 
 
 def _kinds(grid: OccupancyGrid) -> tuple[GridGeometry, NDArray[np.uint8]]:
-    """Return what the pixels of the known part are, joined to about ``PIXEL_M``."""
+    """Return the kinds of pixels of the known part, uint8 (rows, cols), joined to ``PIXEL_M``."""
     given, cells = grid.geometry, grid.cells
     known = Window.of(cells >= 0)
     if known is None:
@@ -158,7 +159,7 @@ def _kinds(grid: OccupancyGrid) -> tuple[GridGeometry, NDArray[np.uint8]]:
 
 
 def _beside_free(kinds: NDArray[np.uint8], kind: int) -> int:
-    """Return how many sides free pixels share with those of another kind."""
+    """Return the number of edges that free pixels share with pixels of another kind."""
     is_free, is_kind = kinds == _FREE, kinds == kind
     return sum(
         int(np.count_nonzero(one & other))
@@ -168,9 +169,9 @@ def _beside_free(kinds: NDArray[np.uint8], kind: int) -> int:
 
 
 def _unseen(kinds: NDArray[np.uint8], pixel_m: float) -> NDArray[np.bool_]:
-    """Return unknown pixels that belong to parts of the building yet to be seen, bool (rows, cols).
+    """Return unknown pixels of parts of the building still to be seen, bool (rows, cols).
 
-    Free floor is open to those parts nearby; walls alone border on what is behind furniture.
+    Free floor adjoins them nearby, whereas only walls adjoin unknown pixels behind furniture.
     """
     unknown, free = kinds == _UNKNOWN, kinds == _FREE
     reach = round(OPEN_M / pixel_m)
@@ -191,16 +192,16 @@ def _by_hand(cuts: Sequence[tuple[Point, Point]], geometry: GridGeometry) -> NDA
 def _joined(
     doors: NDArray[np.float64], beside: NDArray[np.int32], sizes: NDArray[np.float64]
 ) -> NDArray[np.int32]:
-    """Return the room of each region, int32 (n,), 0 for none: small ones are joined to others.
+    """Return the room of each region, int32 (n,), 0 for none, with small ones joined to others.
 
     Args:
         doors: float64 (m, 5), see ``find_doors``.
-        beside: int32 (m, 2), the regions on both sides of each.
+        beside: int32 (m, 2), the regions on both sides of each door.
         sizes: float64 (n,), free floor of each region [m2]; that of region 0 has no meaning.
     """
     downs, rights = doors[:, 2] - doors[:, 0], doors[:, 3] - doors[:, 1]
     squares = downs * downs + rights * rights
-    # By region, the most certain door to each other one.
+    # For each region, the most certain door to each other region.
     links: list[dict[int, tuple[float, float]]] = [{} for _ in sizes]
     certain = zip(beside.tolist(), doors[:, 4].tolist(), (-squares).tolist(), strict=True)
     for (one, other), kind, narrow in certain:
@@ -212,7 +213,7 @@ def _joined(
     heapq.heapify(small)
     while small:
         size, room = heapq.heappop(small)
-        # Joined or grown since, or with nothing beside it any more.
+        # Outdated: joined or grown since, or without neighbours now.
         if into[room] != room or size != floor[room] or not links[room]:
             continue
         (kind, _), _, other = min(

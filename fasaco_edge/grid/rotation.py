@@ -1,6 +1,6 @@
 """Rotations about the map frame's origin, which align a building's walls with the lattice's axes.
 
-To rotate the lattice over a map is to rotate the map below it. Pixels keep their values; only their
+Instead of the lattice, the map below it is rotated: pixels keep their values, and only their
 placement changes.
 """
 
@@ -36,22 +36,6 @@ def rotated_polygon(polygon: Polygon, by_deg: float) -> Polygon:
 def rotated_pose(pose: Pose2D, by_deg: float) -> Pose2D:
     """Return a pose rotated by ``by_deg`` [deg]."""
     return Pose2D(*rotated_point(pose.x, pose.y, by_deg), pose.yaw + math.radians(by_deg))
-
-
-def composed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return ``pose``, given in a frame, in the parent of that frame; yaw in [-pi, pi]."""
-    cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
-    return Pose2D(
-        frame.x + pose.x * cos - pose.y * sin,
-        frame.y + pose.x * sin + pose.y * cos,
-        math.remainder(frame.yaw + pose.yaw, math.tau),
-    )
-
-
-def inverse(pose: Pose2D) -> Pose2D:
-    """Return the inverse pose: the origin as seen from the frame at ``pose``."""
-    cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
-    return Pose2D(-pose.x * cos - pose.y * sin, pose.x * sin - pose.y * cos, -pose.yaw)
 
 
 def rotated_geometry(geometry: GridGeometry, by_deg: float) -> GridGeometry:

@@ -1,15 +1,14 @@
 """Wall direction: the angle of a building's walls on its map.
 
 Cells of the coverage lattice are aligned with the map frame. If walls are at an angle to it, each
-lane meets them obliquely. Over a map rotated back by the walls' angle, cells are aligned with the
-walls.
+lane meets them obliquely. If the map is rotated back by that angle, cells are aligned with walls.
 
 Method: a histogram of gradient directions, used by O'Gorman and Clowes (1976) to find straight
 edges. Each edge between a free and an occupied pixel contributes a unit vector across it. Smoothed,
 these are normal to the wall; their directions modulo a quarter-turn peak at the direction of most
-walls. The angle is that of the sum of all vectors around the peak: along a straight wall they add
-up to its normal, however its pixels are stepped. The sums are of integers, so the same pixels give
-the same angle on any machine.
+walls. The angle is that of the sum of all vectors around the peak, as along a straight wall of
+stepped pixels they add up to its normal. The sums are of integers, so the same pixels give the same
+angle on any machine.
 
 Source: F. O'Gorman, M. B. Clowes, "Finding picture edges through collinearity of feature points",
 IEEE Transactions on Computers C-25(4), 1976. Deviation: only directions vote, not lines.
@@ -30,7 +29,7 @@ from fasaco_edge.kernels.lattice.footprint import Thresholds
 
 THRESHOLDS = Thresholds(free=25, occupied=65)
 
-# Fine pixels are joined to about this size: finer ones show a scanner's noise [m].
+# Approximate size to which finer pixels are joined, as they show a scanner's noise [m].
 UNIT_M = 0.05
 # Edge of the tiles that are processed at once [joined pixels].
 TILE = 512
@@ -44,21 +43,21 @@ REACH = sum(SHIFTS) + 1
 # Threshold on the square of a voting vector; along a straight wall vectors reach 0.15 of EDGE.
 LEAST_SQUARE = (EDGE // 128) ** 2
 
-# Bins of the histogram per quarter-turn; half-widths in bins: of a peak, and of the sum for the
-# angle. At steps of a wall nearly parallel to the pixels, vectors deviate by up to 9 degrees.
+# Bins of the histogram per quarter-turn; half-width of a peak, and of the sum for the angle [bins].
+# At steps of a wall nearly parallel to the pixels, vectors deviate by up to 9 degrees.
 BINS, PEAK, AROUND = 180, 14, 20
 MOST_ROUNDS = 8
 
 # Least evidence of a direction: share of all wall (0.16 if directions are uniform), length [m].
 LEAST_SHARE, LEAST_WALL_M = 0.3, 2.0
-# Another direction replaces the map frame's axes if it has this many times as much wall as they
-# have.
+# Least ratio of wall along another direction to wall along the map frame's axes for it to replace
+# them.
 BETTER = 1.25
-# Tolerances [deg]: walls this close to the pixels' axes are parallel to them; this close to 45
-# degrees the angle is 45, so that nearly equal maps do not rotate by 45 and by -45.
+# Tolerance within which walls are parallel to the pixels' axes, or at 45 degrees to the map frame,
+# so that nearly equal maps do not rotate by 45 and by -45 [deg].
 NEAR_DEG = 0.3
-# A smaller rotation gains nothing [deg]. A rotation of 1 degree leaves a seventh of the patches, in
-# the same time; from 2 degrees on it also saves time.
+# Least rotation that gains anything [deg]. A rotation by 1 degree leaves a seventh of the patches,
+# in the same time; from 2 degrees on it also saves time.
 LEAST_ROTATION_DEG = 0.5
 
 
@@ -88,8 +87,8 @@ class WallDirection:
 def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
     """Return the direction of most walls of a map; None if there are few, or none is straight.
 
-    A wall is an edge between free and occupied pixels. On maps that hardly have these, as those of
-    free space only, it is any edge of free space.
+    A wall is an edge between free and occupied pixels; on maps with few of these, as maps of free
+    space only, any edge of free space.
     """
     votes = _Votes.of(grid)
     if is_of_rim := votes.rim > 4 * votes.edges:
@@ -151,9 +150,9 @@ class _Votes:
         return cls(np.stack([lengths.sum(axis=0), turned_x, turned_y]), edges, rim)
 
     def peak(self, axes_deg: float) -> _Peak | None:
-        """Return the direction of most walls: ``axes_deg`` [deg] or near it, unless one is better.
+        """Return the direction of most walls; None without walls.
 
-        None without walls.
+        It is the direction near ``axes_deg`` [deg] unless another has ``BETTER`` times the wall.
         """
         lengths, x, y = self.sums
         total = int(lengths.sum())
@@ -205,7 +204,7 @@ def _tiles(grid: OccupancyGrid) -> Iterator[NDArray[np.int8]]:
             here = values[max(-top, 0) :, max(-left, 0) :][: cells.shape[0], : cells.shape[1]]
             here[free] = _FREE
             here[cells >= THRESHOLDS.occupied] = _WALL
-            # Wall if one of them is, else free if one is.
+            # A joined pixel is wall if any of its parts is, else free if any is.
             yield highest(values, parts)
 
 
@@ -224,8 +223,8 @@ def _vote(east: NDArray[np.int16], north: NDArray[np.int16], sums: NDArray[np.in
     squares = x.astype(np.int32) ** 2 + y.astype(np.int32) ** 2
     kept = np.flatnonzero(squares >= LEAST_SQUARE)
     x, y, squares = x.ravel()[kept], y.ravel()[kept], squares.ravel()[kept]
-    # Rounding decides nothing: bins end at odd multiples of a quarter of a degree, whose tangents
-    # are irrational, and no fraction of such small numbers is close enough to one.
+    # Rounding has no effect: bins end at odd multiples of a quarter of a degree, whose tangents are
+    # irrational, and no fraction of such small integers is close enough to one.
     degrees = np.degrees(np.arctan2(y, x, dtype=np.float64))
     bins = np.floor((degrees + 45.0) * (BINS / 90) + 0.5).astype(np.intp) % (4 * BINS)
     for kind, values in enumerate((np.rint(np.sqrt(squares)), x, y)):

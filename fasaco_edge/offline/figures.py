@@ -53,7 +53,7 @@ FLOOR = {
 
 
 def floor_document(floor: FloorFigures | None) -> dict[str, float | None] | None:
-    """Return the figures of the floor that a line sweeps, as values that JSON has too."""
+    """Return the figures of the floor that a line sweeps, as JSON values."""
     if floor is None:
         return None
     values = {name: getattr(floor, name) for name in FLOOR}
@@ -63,7 +63,7 @@ def floor_document(floor: FloorFigures | None) -> dict[str, float | None] | None
 
 
 def floor_words(floor: FloorFigures) -> str:
-    """Return the floor that a line sweeps and leaves, for tables and pictures."""
+    """Return as text the floor that a line sweeps and leaves."""
     if floor.swept_share is None:
         return "none is reachable"
     words = f"{swept_words(floor.swept_m2, floor.reachable_m2)} swept"
@@ -80,7 +80,7 @@ def floor_words(floor: FloorFigures) -> str:
 
 
 def patches_left(floor: FloorFigures) -> str:
-    """Return how many patches of floor a line leaves."""
+    """Return as text the patches of floor that a line leaves."""
     count = floor.patches_over_4_dm2
     if not count:
         return "no patch over 4 dm2 left"
@@ -89,12 +89,12 @@ def patches_left(floor: FloorFigures) -> str:
 
 
 def above_bound(path: CoveragePath) -> str:
-    """Return how far a walk is above its lower bound; "" if unknown."""
+    """Return as text how far a walk is above its lower bound; "" if unknown."""
     return "" if path.gap is None else f", at most {100 * path.gap:.1f} % above its bound"
 
 
 def curve_document(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> dict[str, object]:
-    """Return the figures of a robot's curve, as values that JSON has too."""
+    """Return the figures of a robot's curve, as JSON values."""
     return {
         "turn_radius_m": robot.turn_radius_m,
         "reverses": robot.reverses,
@@ -107,7 +107,7 @@ def curve_document(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> di
 
 
 def curve_words(robot: RobotConfig, curve: Curve, judged: FloorFigures) -> str:
-    """Return a robot's curve, for tables and pictures."""
+    """Return a robot's curve as text."""
     changes = "1 change" if judged.reversals == 1 else f"{judged.reversals} changes"
     words = (
         f"arcs of {robot.turn_radius_m:g} m or more, {judged.length_m:,.1f} m in "

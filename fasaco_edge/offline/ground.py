@@ -1,7 +1,7 @@
 """Ground of a plan: its cells, and the floor that a line along a walk sweeps.
 
-A line is float64 (n, 2), n >= 1: points (x, y) [m] in the map frame joined by straight segments:
-the centres of a walk's cells, or a line over their stands.
+A line is float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, joined by straight segments.
+It leads through the centres of a walk's cells, or over their stands.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from fasaco_edge.offline.settings import AXES, HOME, WALLS
 from fasaco_edge.planners.line import LINES, LineSearch
 
 Line = NDArray[np.float64]
-# Unswept floor by the judge relative to that by the line's own raster: 1.2 to 1.5, more if little
-# is left.
+# Ratio of unswept floor by the judge to unswept floor on the line's own raster; measured: 1.2 to
+# 1.5, more if little is left.
 LEFT_BY_JUDGE = 1.6
 
 
@@ -63,13 +63,12 @@ class Ground:
             grid: the map.
             robot: size of the robot, and overlap of its lanes.
             start_xy: start of the robot [m].
-            align: what the rows of cells are parallel to: walls, axes, or an angle [deg].
+            align: direction of the rows of cells: walls, axes, or an angle [deg].
 
         Raises:
             StartOutsideMap, StartBlocked: the robot cannot stand there.
             MapTooLarge, MapTooFar: see ``Floor.around``, ``StandLattice.over``.
         """
-
         discs = RobotDiscs(robot.radius_m, robot.tool_width_m, clearance_m=robot.clearance_m)
         floor = Floor.around(grid, discs, start_xy)
         cell_m = robot.lane_m
@@ -110,11 +109,11 @@ class Ground:
         return row + window.row0, col + window.col0
 
     def only(self, cells: NDArray[np.bool_], *, beyond: bool) -> Ground:
-        """Return this ground with no more floor to sweep than lies in some cells.
+        """Return this ground with only the floor in some cells to sweep.
 
         Args:
             cells: bool (rows, cols) of the lattice.
-            beyond: whether floor in cells without a stand, as along walls, is to be swept, too.
+            beyond: whether floor in cells without a stand, as along walls, is included.
         """
         if self.floor is None:
             return self
@@ -140,10 +139,10 @@ class Ground:
 
         Args:
             walk: int32 (n, 2), n >= 1.
-            name: of ``planners.line.LINES``.
+            name: a name in ``planners.line.LINES``.
             robot: its driving parameters.
             ends: whether the line must end where the walk does.
-            swept: share of the floor to sweep, by the judge; None for as much as pays.
+            swept: share of the floor to sweep, by the judge; None for floor worth its time.
         """
         assert self.floor is not None
         assert self.stands is not None
@@ -154,7 +153,6 @@ class Ground:
 
 def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
     """Return the requested angle, or that of the walls [deg]."""
-
     if align == WALLS:
         walls = wall_direction(grid)
         return walls.rotation_deg if walls else 0.0
@@ -163,8 +161,7 @@ def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
 
 def _stands(floor: Floor, cell_m: float, lattice_deg: float) -> StandLattice:
     """Return the stands in cells whose rows are at an angle to the map frame's x axis."""
-    # Rotating the lattice over a map is the same as rotating the map below it. Stands are pixels of
-    # it.
+    # Instead of the lattice, the map below it is rotated; stands are pixels of the map.
     below = replace(floor, geometry=rotated_geometry(floor.geometry, -lattice_deg))
     return StandLattice.over(below, cell_m)
 

@@ -1,4 +1,4 @@
-"""Plans of several passes over a map, each from where the one before ends, and their figures."""
+"""Plans of several passes over a map, each begun where the previous one ends; their figures."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ from PIL import Image
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.host.outputs import whole
 from fasaco_edge.judge.floor import FloorFigures
 from fasaco_edge.offline.figures import floor_document, floor_words, judged_floor
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.plan import plan
-from fasaco_edge.offline.result import Drive, Plan, picture_of, png_of
+from fasaco_edge.offline.result import Drive, Plan, picture_of, png_of, saved
 from fasaco_edge.offline.settings import ANYWHERE, CELLS, HOME, Search
 from fasaco_edge.planners.passes import Pass, laid, read_pass
 from fasaco_edge.planners.planner import SearchProgress, StoppingCriterion
@@ -32,7 +31,7 @@ class PassPlans:
     """Passes over a map, one plan each.
 
     Attributes:
-        passes: what was asked for.
+        passes: the passes.
         plans: their plans, in order.
     """
 
@@ -66,7 +65,7 @@ class PassPlans:
 
     @property
     def drive(self) -> Drive:
-        """What driving the lines takes: sums over the passes, without a gap."""
+        """The effort of driving the lines: sums over the passes, without a gap."""
         drives = [plan.drive for plan in self.plans]
         metres, turns, seconds = (
             math.fsum(getattr(drive, name) for drive in drives)
@@ -81,14 +80,14 @@ class PassPlans:
         judged = judged_floor(first.map.grid, self.xy, first.robot)
         if judged is None:
             return None
-        # Each pass has its own speed; a lower bound of the time is known for single passes only.
+        # Each pass has its own speed; a lower bound of the time is only known for single passes.
         seconds, swept_m2 = self.drive.seconds, judged.figures.swept_m2
         each = seconds / swept_m2 if swept_m2 else None
         return replace(judged.figures, least_s=0.0, seconds=seconds, seconds_per_m2=each)
 
     @property
     def figures(self) -> dict[str, object]:
-        """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
+        """All figures of ``fasaco-edge plan --json`` as JSON values."""
         first = self.plans[0]
         return {
             "map": first.map.name,
@@ -118,10 +117,7 @@ class PassPlans:
         for each in pictures:
             picture.paste(each, (left, 0))
             left += each.width
-        if file is not None:
-            with whole(Path(file)) as new:
-                picture.save(new, "PNG")
-        return picture
+        return saved(picture, file)
 
 
 def plan_passes(
@@ -138,18 +134,18 @@ def plan_passes(
     stop: StoppingCriterion | None = None,
     watch: Callable[[SearchProgress], None] = lambda _: None,
 ) -> PassPlans:
-    """Plan several passes over a map, each from where the one before ends.
+    """Plan several passes over a map, each begun where the previous one ends.
 
     Args:
-        map, robot, start, start_xy, line, align, search, stop, watch: see ``plan``; the budget is
-            that of each pass.
+        map, robot, start, start_xy, line, align, search, stop, watch: see ``plan``; each pass has
+            the whole budget.
         passes: what each covers, and the direction of its lanes: "edge", "rest", "auto", "cross",
             an angle as "30deg", "rest:cross", "cross%30@0.15" with an overlap [percent] and a
             speed [m/s]; or a ``Pass``.
         end: where the last pass ends: "anywhere", "home", or a cell.
 
     Raises:
-        BadConfiguration: a value is invalid; further errors are those of ``plan``.
+        BadConfiguration: a value is invalid; ``plan`` raises further errors.
     """
     robot = RobotConfig() if robot is None else robot
     if robot.turn_radius_m > 0.0:
@@ -207,7 +203,7 @@ def _robot_in(each: Pass, robot: RobotConfig) -> RobotConfig:
 
 
 def _end(end: str | Cell, plans: Sequence[Plan]) -> str | Cell:
-    """Return the end of the last pass: home is where the first one began."""
+    """Return the end of the last pass, where home is the start of the first pass."""
     if end != HOME or not plans:
         return end
     first = plans[0]

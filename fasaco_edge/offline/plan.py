@@ -76,24 +76,24 @@ def plan(
         map: what to cover.
         robot: its size and driving parameters; None for the defaults of the configuration.
         start: start cell (row, col), as wide as the tool, aligned with the map frame.
-        start_xy: start point (x, y) [m] instead. Without either a built-in map names its own;
-            otherwise the start is in the largest area, near the map frame's origin.
+        start_xy: start point (x, y) [m] instead. Without either, the start is that of a built-in
+            map, or else in the largest area, near the map frame's origin.
         end: "anywhere", "home", or a cell.
         line: "cells": through their centres, as the paper's planners do; "quick" or "thorough":
             over the floor, with 60 or 180 s as the value of a square metre. None for "thorough",
             and for "cells" on a coverage grid or by a planner other than colony-search.
-        align: what the rows of cells are parallel to, with a line over the floor: "walls", "axes"
-            or an angle [deg]; None for walls.
-        covers: "all" cells; "edge", those along walls and furniture; or "rest", all others.
+        align: direction of the rows of cells for a line over the floor: "walls", "axes" or an angle
+            [deg]; None for walls.
+        covers: "all" cells; "edge", cells along walls and furniture; or "rest", all others.
         lanes: preferred direction of the walk: along the "rows" of cells, or the "columns"; "" for
-            what is cheapest.
+            the cheapest.
         search: settings of the search; None for the defaults.
         planner: a planner of your own instead of a search: a function that takes a ``GridProblem``
             and returns the walk's cells (row, col) in order; or a class, or an object, with such a
-            method ``plan``. Of ``search`` it gets the seed, and is ended after ``budget_s``: 60 s
-            without one; there is no limit in other threads than the main one.
+            method ``plan``. It gets the seed of ``search``, and is ended after ``budget_s``, by
+            default 60 s, if it runs in the main thread.
         stop: stopping criterion.
-        watch: called with the progress of the search for a walk; a second walk begins anew.
+        watch: called with the progress of each search for a walk.
         observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
             once at the end of colony-search; not by planners without pheromone.
 

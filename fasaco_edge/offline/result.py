@@ -1,4 +1,4 @@
-"""Result of planning: a walk, and the line along it, with all their figures and pictures."""
+"""Result of planning: a walk and the line along it, with figures and pictures."""
 
 from __future__ import annotations
 
@@ -43,11 +43,12 @@ LIMITS = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
 
 
 class Drive(NamedTuple):
-    """What driving a line takes: its length [m], quarter-turns, and time [s].
+    """The effort of driving a line: its length [m], quarter-turns, and time [s].
 
     Attributes:
-        gap: how far the time is above the least of any line, as a share of it; None if unknown.
-        counts_turns: whether turns take any of the time: not with ``quarter_turn_s=0``.
+        gap: excess of the time over the least time of any line, as a share of that; None if
+            unknown.
+        counts_turns: whether turns take time; False with ``quarter_turn_s=0``.
     """
 
     metres: float
@@ -113,7 +114,7 @@ class Plan:
 
     @property
     def drive(self) -> Drive:
-        """What driving the line takes; of a coverage grid, the walk."""
+        """The effort of driving the line; for a coverage grid, the walk."""
         counts_turns = self.robot.cost().quarter_turn_s > 0.0
         if self.judged is not None:
             judged = self.judged.figures
@@ -179,7 +180,7 @@ class Plan:
 
     @property
     def figures(self) -> dict[str, object]:
-        """All figures, as values that JSON has too: those of ``fasaco-edge plan --json``."""
+        """All figures of ``fasaco-edge plan --json`` as JSON values."""
         path, problem, search, floor = self.path, self.problem, self.search, self.floor
         cell_m = problem.lattice.cell_m
         curve = {}
@@ -200,7 +201,7 @@ class Plan:
             "start": list(problem.start),
             "end": path.cells[-1].tolist(),
             **asdict(walk_figures(problem.lattice, path.cells)),
-            # Only cells to cover; the walk may pass over others.
+            # Only the cells to cover, as the walk may pass over others.
             "cells": problem.cells,
             "length_m": round(path.steps * cell_m, 3),
             "cost_s": path.cost_s,
@@ -221,21 +222,17 @@ class Plan:
 
     @cached_property
     def rooms(self) -> RoomsUnderLine | None:
-        """The rooms of the map, and what the line does in each; None for a coverage grid."""
+        """The rooms of the map, with figures of the line in each; None for a coverage grid."""
         if self.map.grid is None or self.judged is None:
             return None
         return RoomsUnderLine.of(self.map.grid, self.xy, self.judged)
 
     def plot(self, file: str | Path | None = None, *, rooms: bool = False) -> Image.Image:
-        """Return a picture, RGB, of the walk or the line over the map; as PNG, too.
+        """Return an RGB picture of walk or line over the map; also write it to ``file`` as PNG.
 
-        ``rooms``: each room in its colour, in place of the floor that is swept.
+        ``rooms``: whether it shows each room in its colour, in place of the swept floor.
         """
-        picture = picture_of(self, rooms=rooms)
-        if file is not None:
-            with whole(Path(file)) as new:
-                picture.save(new, "PNG")
-        return picture
+        return saved(picture_of(self, rooms=rooms), file)
 
 
 def driving(robot: RobotConfig) -> dict[str, float | None]:
@@ -248,6 +245,14 @@ def driving(robot: RobotConfig) -> dict[str, float | None]:
     }
 
 
+def saved(picture: Image.Image, file: str | Path | None) -> Image.Image:
+    """Return a picture, also written to ``file`` as PNG unless that is None."""
+    if file is not None:
+        with whole(Path(file)) as new:
+            picture.save(new, "PNG")
+    return picture
+
+
 def png_of(picture: Image.Image) -> bytes:
     """Return a picture as PNG."""
     png = BytesIO()
@@ -256,7 +261,7 @@ def png_of(picture: Image.Image) -> bytes:
 
 
 def picture_of(plan: Plan, of: str = "", *, rooms: bool = False) -> Image.Image:
-    """Return a picture, RGB, of a plan, with its rooms or not; its title begins with ``of``."""
+    """Return an RGB picture of a plan, with its rooms or not; its title begins with ``of``."""
     path, ground, judged = plan.path, plan.ground, plan.judged
     has_search = plan.search.has_local_search
     search = f", {path.work.perturbations} perturbations" if has_search else ""
@@ -292,7 +297,7 @@ def picture_of(plan: Plan, of: str = "", *, rooms: bool = False) -> Image.Image:
 
 
 def pheromone_picture_of(plan: Plan, tau: Tau) -> Image.Image:
-    """Return a picture, RGB, of the trail left by a plan's colony."""
+    """Return an RGB picture of the trail left by a plan's colony."""
     ground = plan.ground
     # Ants visit no other cells.
     tau = np.where(plan.problem.to_cover[..., np.newaxis], tau, np.float32(0))

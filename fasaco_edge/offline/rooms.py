@@ -1,4 +1,4 @@
-"""Rooms under a planned line: how much of each it sweeps, and how often it enters it."""
+"""Rooms under a planned line: the swept share of each, and how often the line enters it."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.offline.ground import Line
 
-# Longest piece of the line between two places whose room is looked up [m].
+# Largest distance of points along the line whose rooms are looked up [m].
 PIECE_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedRoom:
-    """A room and what a line does in it, as in ``plan --rooms --json``.
+    """A room with figures of a line in it, as in ``plan --rooms --json``.
 
     Attributes:
         room: its number on this map, by its first pixel.
         area_m2: its free floor [m2].
-        reachable_m2: the part of it that the tool can reach.
-        swept_share: share of that which the line sweeps; None if nothing is reachable.
-        entered: how often the line enters it, its start included.
+        reachable_m2: the part of that floor that the tool can reach [m2].
+        swept_share: swept share of the reachable floor; None if nothing is reachable.
+        entered: number of times that the line enters it, or starts in it.
     """
 
     room: int
@@ -38,14 +38,14 @@ class PlannedRoom:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RoomsUnderLine:
-    """The rooms of a map, and what a line does in each."""
+    """The rooms of a map, with figures of a line in each."""
 
     found: FoundRooms
     rooms: tuple[PlannedRoom, ...]
 
     @classmethod
     def of(cls, grid: OccupancyGrid, line_xy: Line, judged: JudgedFloor) -> RoomsUnderLine:
-        """Return the rooms under a line, points (x, y) [m], that was judged on the same map."""
+        """Return the rooms under a line, points (x, y) [m], judged on the same map."""
         found = find_rooms(grid)
         labels, pixel_m2 = found.labels, found.geometry.resolution**2
         rows, cols = np.nonzero(labels)
@@ -73,9 +73,9 @@ class RoomsUnderLine:
 
 
 def _entries(found: FoundRooms, line_xy: Line) -> NDArray[np.int32]:
-    """Return the rooms that a line enters, one after the other, int32 (n,)."""
+    """Return the rooms that a line enters, in sequence, int32 (n,)."""
     passed = found.geometry.values_at(found.labels, in_pieces(line_xy, PIECE_M))
-    # Between rooms, in doors and beside furniture, it is in none.
+    # In doors and beside furniture, a point is in no room.
     passed = passed[passed > 0]
     entered: NDArray[np.int32] = passed[np.diff(passed, prepend=0) != 0]
     return entered

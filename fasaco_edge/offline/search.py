@@ -1,11 +1,10 @@
 """Search of an offline plan: for walks, and for the line along the best of them, within a budget.
 
-A line is laid along each of two walks, and annealed three times; the better one is improved until
-the budget is used up. The first walk and line are always completed, and each step follows from
-those before it, whatever the budget: more of it is never worse, by the seconds of the line and the
-price of floor that is left. If a share of the floor is asked for, the first line is always annealed
-three times: the price of floor is found meanwhile. All that does not hold without local search:
-then there is one walk, which the budget ends.
+A line is laid along each of two walks and annealed three times; then the better line is improved
+until the budget ends. The first walk and line are always completed. The steps do not depend on the
+budget, so that a larger budget never gives a worse line, by its seconds and the price of floor left
+unswept. If a share of the floor is asked for, the first line is always annealed three times, which
+finds the price of floor. Without local search there is one walk, which the budget ends.
 """
 
 from __future__ import annotations
@@ -35,29 +34,30 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
-# Limit on the proposals per cell of a search for a walk: more of them gain a line less than the
-# search for the line does; and on all of the first one, which no budget ends: five seconds.
+# Limit on the proposals per cell of a search for a walk: beyond it, the search for the line gains
+# more. Limit on all proposals of the first walk, which has no budget: some five seconds.
 PROPOSALS_A_CELL, FIRST_PROPOSALS = 10_000, 25_000_000
-# Stages after which two lines are compared.
+# Number of stages after which two lines are compared.
 COMPARED = 3
-# What is different in the seed of the second walk.
+# Bit that differs in the seed of the second walk.
 SECOND_SEED = 1 << 20
 
 
 class Ending:
-    """What ends the searches for walks, and for the line along one.
+    """Decides when the searches for walks, and for the line along one, end.
 
     Args:
         stop: ends all searches; None for never.
-        budget: ends all but the search for the first line over the floor; None for no limit.
+        budget: ends all searches except for the first walk and line over the floor; None for no
+            limit.
         watch: called with the progress.
         bound: see below.
 
     Attributes:
         by: what ended them.
         bound: the problem's lower bound, for planners that have none of their own.
-        is_walk_limited, is_walk_cut: whether the last search for a walk ended by its proposals, or
-            by the budget or by ``stop``.
+        is_walk_limited: whether the limit on proposals ended the last search for a walk.
+        is_walk_cut: whether ``budget`` or ``stop`` ended it.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Ending:
         self._limit: StoppingCriterion | None = None
 
     def limit_walk(self, proposals: int, *, is_first: bool) -> None:
-        """End the next search for a walk after this many proposals; the first has no budget."""
+        """End the next search for a walk after ``proposals``; the first has no budget."""
         self._limit = WorkLimit(SearchWork(proposals=proposals))
         self.is_walk_limited = self.is_walk_cut = False
         self._is_first = is_first
@@ -91,7 +91,7 @@ class Ending:
         return self.is_walk_limited
 
     def is_stopped(self) -> bool:
-        """Return whether something else than the budget ends the first line."""
+        """Return whether ``stop`` ends the search for the first line, which has no budget."""
         return self._progress is not None and self._is_over(self._progress)
 
     def is_line_over(self) -> bool:
@@ -112,7 +112,7 @@ class Ending:
 
 @dataclass(frozen=True, slots=True)
 class _Laid:
-    """A walk with the running search for the line along it, and the colony's pheromone."""
+    """A walk, the running search for the line along it, and the colony's pheromone."""
 
     path: CoveragePath
     line: LineSearch
@@ -120,7 +120,7 @@ class _Laid:
     snapshots: list[ColonySnapshot]
 
     def complete(self, stages: int, stop: Callable[[], bool] = lambda: False) -> bool:
-        """Complete a number of stages in all; return False if it is stopped before."""
+        """Search to the end of stage number ``stages``; return False if stopped before."""
         for _ in self.pieces:
             if self.line.stages >= stages:
                 return True
@@ -129,7 +129,7 @@ class _Laid:
         return True
 
     def improve(self, stop: Callable[[], bool]) -> None:
-        """Search on until stopped; without moves there is nothing to search."""
+        """Search until stopped, or until no moves are left."""
         if not stop():
             for _ in self.pieces:
                 if stop():
@@ -178,9 +178,9 @@ class Planning:
         return laid.path, laid.line.best.xy
 
     def _begin(self, line: str, robot: RobotConfig) -> _Laid:
-        """Return the better of two walks, by the line along it; the first is always laid.
+        """Return the walk with the better line of two walks.
 
-        There is one alone without local search, or if the first search came to its end by itself.
+        There is only one walk without local search, or if the first search ended by itself.
         """
         search, ending = self._search, self._ending
         has_two = search.has_local_search
@@ -201,7 +201,7 @@ class Planning:
     def _lay(self, line: str, robot: RobotConfig, seed: int, *, is_one_of_two: bool) -> _Laid:
         """Search for a walk, and prepare the search for the line along it.
 
-        The pheromone of one of two walks is shown once it is known which is the better one.
+        With two walks, the pheromone is shown once the better walk is known.
         """
         snapshots: list[ColonySnapshot] = []
         is_shown_later = is_one_of_two and self._observe is not ignore

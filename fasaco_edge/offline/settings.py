@@ -14,13 +14,13 @@ from fasaco_edge.planners.registry import PLANNERS
 ANYWHERE, HOME = "anywhere", "home"
 # The line through cell centres, and the default line over the floor; see ``planners.line``.
 CELLS, THOROUGH = "cells", "thorough"
-# What the rows of cells are parallel to, for a line over the floor; or an angle [deg].
+# Directions of the rows of cells for a line over the floor, other than an angle [deg].
 WALLS, AXES = "walls", "axes"
-# Default time budget of a planner with local search [s], and the threshold of equation (4) that
-# suits it best. The others have the paper's, and walk to their end.
+# Default time budget of a planner with local search [s]; other planners have none. Thresholds of
+# equation (4): the best one with local search, and the paper's.
 BUDGET_S = 2.0
 SEARCH_Q0, PAPER_Q0 = 0.9, 0.7
-# A planner of the user's own has the settings of this one.
+# Planner whose settings apply to a planner of the user's own.
 LIKE_OWN = "fasaco"
 
 # Type checks by annotation, including NumPy's numbers.
@@ -37,16 +37,15 @@ class Search:
 
     Attributes:
         planner: one of ``planners.registry``.
-        ants, velocities, visibility, beta, alpha, tau0, seed: of the colony, see
-            ``ColonyConfig``; velocities as text, like 8:1.
+        ants, velocities, visibility, beta, alpha, tau0, seed: see ``ColonyConfig``; velocities as
+            text, like 8:1.
         q0: likewise; None for the value that suits the planner.
         threads: number of threads of the ants; the walk is the same for any number.
         budget_s: time limit of the search for walks and the line along one [s]; with local search a
             first walk and line are always completed; None for 2 s, or without local search for no
             limit. A planner of your own is ended after it; None for 60 s.
-        swept: share of the reachable floor that a line is to sweep, in the least time, for which
-            three stages are completed whatever the budget; None for as much as its seconds are
-            worth.
+        swept: share of the reachable floor that the line has to sweep in the least time; three
+            stages are completed regardless of the budget. None for floor worth its time.
 
     Raises:
         BadConfiguration: a value is invalid.

@@ -16,7 +16,7 @@ Rows = list[tuple[str, str]]
 
 
 def rows_of(plan: Plan) -> Rows:
-    """Return the figures that matter, as names and words."""
+    """Return the main figures of a plan, as names and words."""
     drive, path, floor = plan.drive, plan.path, plan.floor
     rows = [("map", f"{plan.map.name}, {plan.problem.cells} cells of {_metres(plan)}")]
     line = "centres of cells" if plan.line == CELLS else plan.line
@@ -41,7 +41,7 @@ def rows_of(plan: Plan) -> Rows:
 
 
 def rows_of_passes(plans: PassPlans) -> Rows:
-    """Return the same of several passes together."""
+    """Return the main figures of several passes together."""
     first, floor, drive = plans.plans[0], plans.floor, plans.drive
     rows = [("map", f"{first.map.name}, {first.problem.cells} cells in the first pass")]
     rows.append(("line", f"{drive.metres:,.1f} m in {len(plans.plans)} passes, {drive.time}"))
@@ -51,7 +51,7 @@ def rows_of_passes(plans: PassPlans) -> Rows:
 
 
 def line_words(drive: Drive) -> str:
-    """Return what driving a line takes, in words."""
+    """Return the effort of driving a line in words."""
     return f"{drive.metres:,.1f} m, {drive.turns:,.0f} quarter-turns, {drive.time}"
 
 
@@ -67,7 +67,7 @@ def _metres(plan: Plan) -> str:
 
 
 def _swept(floor: FloorFigures) -> str:
-    """Return what a line sweeps and leaves, in words."""
+    """Return in words the floor that a line sweeps and leaves."""
     if floor.swept_share is None:
         return "no floor is reachable"
     pace = "" if floor.seconds_per_m2 is None else f", {floor.seconds_per_m2:.1f} s a square metre"

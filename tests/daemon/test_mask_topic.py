@@ -137,11 +137,11 @@ class Mask:
     """A mask that has come, and what is wrong with it."""
 
     def __init__(self, *faults):
-        self.has_come = True
+        self.has_change = True
         self.faults = list(faults)
 
     def added_to(self, config):
-        self.has_come = False
+        self.has_change = False
         return config, self.faults
 
 
@@ -177,10 +177,10 @@ def test_what_is_written_does_not_take_the_mask_out_of_force():
     take(Sample("keep_out_mask", payload, GRID))
     mask.map_frame = "map"
     mask.choose(0.0)
-    assert mask.has_come
+    assert mask.has_change
     in_force, faults = mask.added_to(config)
     assert faults == []
     assert in_force.mission.keep_out_mask
-    assert not mask.has_come
+    assert not mask.has_change
     written = DaemonConfig()
     assert mask.added_to(written)[0].mission.keep_out_mask == in_force.mission.keep_out_mask

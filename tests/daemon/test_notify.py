@@ -27,7 +27,7 @@ def listening(request, tmp_path) -> Iterator[tuple[socket.socket, str]]:
 def test_each_word_is_one_datagram(listening):
     heard, name = listening
     manager = ServiceManager({"NOTIFY_SOCKET": name})
-    assert manager.is_there
+    assert manager.is_present
     manager.status("waiting")
     manager.ready()
     manager.alive()
@@ -124,5 +124,5 @@ def test_a_busy_manager_hears_that_it_is_ready(tmp_path):
 def test_without_one_nothing_is_said(caplog):
     manager = ServiceManager({})
     manager.ready()
-    assert not manager.is_there
+    assert not manager.is_present
     assert caplog.text == ""

@@ -95,7 +95,7 @@ def test_two_anonymous_publishers_are_found_by_alternating_maps(tmp_path):
     ):
         in_turn(one, other, "map", (map_bytes(ROOM, 2), map_bytes(WALLED, 3)))
         status = outsider.wait_status(has_two)
-        assert text_of(status) == "maps change to and fro, as those of two publishers"
+        assert text_of(status) == "maps alternate, as from two publishers"
 
 
 def test_poses_and_masks_of_a_second_publisher_do_not_count(tmp_path):

@@ -12,7 +12,7 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.events import FollowerBlocked, PatchReceived
-from fasaco_edge.mission.map.obstacles import AGAIN_S, CLOSED_S, Obstacles
+from fasaco_edge.mission.map.obstacles import CLOSED_S, WIDEN_AFTER_S, Obstacles
 from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
 
 # The follower keeps this far from things [m], and says after so long that it stands [s].
@@ -160,7 +160,7 @@ def test_floor_closes_longer_each_time_never_under_the_robot():
     now, closed = 10.0, []
     for _ in range(3):
         assert obstacles.close([point], here, now)
-        assert not obstacles.close([point], here, now + AGAIN_S / 2)
+        assert not obstacles.close([point], here, now + WIDEN_AFTER_S / 2)
         drawn = obstacles.on(grid)
         rows, cols = np.nonzero(drawn.cells)
         assert len(rows) > 10

@@ -43,7 +43,7 @@ def test_one_map_in_another_frame_costs_nothing(driven):
     again = restarted(driven, ODOM)
     assert again.mission.state is State.WAITING_FOR_MAP
     assert again.mission.reason == (
-        "no map in frame 'map' yet, that of the progress kept: the newest is in 'odom'"
+        "no map in frame 'map' yet, in which progress is kept: the newest is in 'odom'"
     )
     decision = again.tell(MAP, HERE)
     assert decision.faults == ()
@@ -104,7 +104,7 @@ def test_progress_is_set_aside_only_once_it_is_certain(driven):
     faults = told_for(again, PATIENCE_S - 1.5, ODOM, THERE)
     assert {type(fault) for fault in faults} == {WrongFrame}
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
-    assert "counts once map and poses have come in it for 10 s" in again.mission.reason
+    assert "is used once map and poses have arrived only in it for 10 s" in again.mission.reason
     mismatch = [
         fault
         for fault in told_for(again, 3.0, ODOM, THERE)

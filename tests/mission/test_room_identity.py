@@ -12,11 +12,11 @@ from numpy.random import PCG64, Generator
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.grid.rooms import find_rooms
-from fasaco_edge.grid.rotation import composed
 from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.map.room_raster import centres
 from fasaco_edge.mission.map.room_watch import update
 from tests.benchmarks.rooms.homes import home, seen
+from tests.support.poses import composed
 
 SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)
 LOOKS = 8

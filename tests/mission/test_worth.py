@@ -220,7 +220,7 @@ def test_one_slow_path_does_not_count_in_later_passes():
     worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
     worth.take(dirt(90).grid)
     worth.allow(300.0)
-    assert worth.is_other_first(everything, window, 2000.0)
+    assert worth.puts_other_first(everything, window, 2000.0)
     worth.begin()
     worth.choose(everything, window)
     assert worth.least == 0

@@ -19,18 +19,18 @@ Little endian:
     places     int64 (row, col) of each tile
     tiles      uint16 (TILE, TILE) of each tile
     floor      int64 (row, col) of each tile of floor
-    swept      uint8 (FLOOR_TILE, FLOOR_TILE / 8) of each: a bit for each pixel of 0.025 m, the
-               first of eight the highest
+    swept      uint8 (FLOOR_TILE, FLOOR_TILE / 8) of each: a bit for each pixel of 0.025 m, most
+               significant bit first
     corner     int64 (row, col) where the trail begins
-    trail      uint8 (2, rows, cols, 4): the high bytes of the pheromone, then the low ones, of its
-               first 16 bits as float32, rounded
+    trail      uint8 (2, rows, cols, 4): pheromone as float32, rounded to the upper 16 bits: all
+               high bytes, then all low bytes
     fleet      cells swept by other robots, JSON (``fleet.mission.shared``)
     note       UTF-8, up to the end: JSON of the order, with a version of its own; may be empty
 
-Earlier versions are read, too. Version 4, written if the cells lie along the axes of the map
-frame, lacks ``angle``. Version 3, written if there is also no fleet, lacks ``fleet`` and its count,
-too. Version 2 also lacks the trail: its counts, ``corner`` and ``trail``. Version 1 also lacks the
-floor: the fourth count, ``floor`` and ``swept``.
+Earlier versions are read, too; each lacks more than the one after it. Version 4, written if the
+cells are aligned with the axes of the map frame, lacks ``angle``. Version 3, written if there is
+also no fleet, lacks ``fleet`` and its count. Version 2 lacks the trail: its counts, ``corner`` and
+``trail``. Version 1 lacks the floor: the fourth count, ``floor`` and ``swept``.
 """
 
 from __future__ import annotations
@@ -70,11 +70,11 @@ MOST_BYTES = (
     + 16_000_000
 )
 """Limit on the bytes of a body, and of a file, which is smaller; longer ones are not read."""
-# Cells look alike after a quarter-turn [deg].
+# Largest angle of the cells, which are symmetric under a quarter-turn [deg].
 MOST_LATTICE_DEG = 90.0
 # Pheromone values rounded at a time.
 _AT_ONCE = 1 << 18
-# Mostly zeros and ones: the fastest level takes a hundredth of the size.
+# The fastest level: it packs the bytes, mostly zeros and ones, to a hundredth.
 _LEVEL = 1
 
 
@@ -96,7 +96,7 @@ def _version_of(snapshot: LedgerSnapshot) -> int:
 def _parts(snapshot: LedgerSnapshot) -> Iterator[bytes]:
     frame, floor = snapshot.frame.encode(), snapshot.floor.tiles
     counts = (len(frame), len(snapshot.under_tool), len(snapshot.tiles), len(floor))
-    # A larger note would make the ledger unreadable.
+    # A larger trail would make the ledger unreadable.
     trail = snapshot.trail if snapshot.trail.tau.size <= 4 * MAX_LATTICE_CELLS else NO_TRAIL
     version = _version_of(snapshot)
     more = (*trail.tau.shape[:2], len(snapshot.fleet), snapshot.lattice_deg)[: version - 1]
@@ -123,12 +123,12 @@ def decode_ledger(payload: bytes, cell_m: float | None) -> LedgerSnapshot:
 
     Args:
         payload: the bytes.
-        cell_m: edge of the cells of the configuration [m]. A ledger of other cells can be continued
-            by its swept floor. None to take any.
+        cell_m: configured edge of a cell [m]; a ledger of other cells is accepted if it has swept
+            floor. None accepts any.
 
     Raises:
         LedgerFileError: the bytes are damaged.
-        LedgerMismatchError: it is of another version, or has cells of another edge and no floor.
+        LedgerMismatchError: it has another version, or other cells and no floor.
     """
     if len(payload) < _ENVELOPE.size:
         raise LedgerFileError(f"torn: {len(payload)} bytes")

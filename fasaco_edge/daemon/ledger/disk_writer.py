@@ -16,23 +16,23 @@ LOG = logging.getLogger(__name__)
 
 # Time before a retry after a failure [s].
 RETRY_S = 2.0
-# Timeout of a command's reply on a slow disk [s].
+# Longest time that a command's reply waits for a slow disk [s].
 MOST_WAIT_S = 1.0
-# A disk that has not taken anything for this long hangs [s]; memory cards pause for some.
+# Duration of a write above which a disk hangs [s]; memory cards pause for some seconds.
 HANGS_S = 10.0
 
 Item = TypeVar("Item")
 
 
 class DiskWriter(Generic[Item]):
-    """Writes the newest item it was given; one that cannot be written is retried.
+    """Writes the newest item; retries an item that cannot be written.
 
     Args:
-        name: of what is written, for logs.
+        name: name of the items, for logs.
         write: writes an item; raises any error.
         fault_of: returns an error as a fault that says what to do.
-        merge: returns an item and the one given after it, of which neither was written, as one; by
-            default the later one.
+        merge: joins an item that is not written yet with the next one; by default returns the next
+            one.
 
     Attributes:
         trouble: the present reason not to write; "" for none.
@@ -67,7 +67,7 @@ class DiskWriter(Generic[Item]):
             self._thread.start()
 
     def _wait(self, item: Item, *, is_older: bool = False) -> None:
-        """Have an item wait, with the one that waits; the caller holds the lock."""
+        """Let an item wait, merged with one that waits already; the caller holds the lock."""
         if self._waiting is not None:
             pair = (item, self._waiting) if is_older else (self._waiting, item)
             item = self._merge(*pair)

@@ -1,10 +1,10 @@
 """A robot's ledger on disk: two generations, each complete or absent.
 
-``<robot>.ledger`` is the newest, ``<robot>.ledger.previous`` the one before. A new one is
-written to ``<robot>.ledger.new``, fsynced, and then the files are renamed: at every moment one of
-them is a complete ledger, and ``load`` finds the newest. Unusable files are set aside under a name
-that contains the reason: the newest few and the largest of each kind are kept, unless they have no
-covered cell and no swept floor.
+``<robot>.ledger`` is the newest ledger, ``<robot>.ledger.previous`` the one before. A new ledger is
+written to ``<robot>.ledger.new`` and fsynced, and then the files are renamed: at every moment one
+of them is complete, and ``load`` finds the newest. Unusable files are set aside under a name that
+contains the reason. Of each kind the newest few and the largest are kept, except files without
+covered cell and swept floor.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fasaco_edge.host.durable import make_folder, sync_folder, write_through
 from fasaco_edge.host.files import FileTooLongError, open_own, read_own
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
-# Number of renamed files of each kind that are kept, beside the largest.
+# Number of renamed files of each kind that are kept, besides the largest.
 KEPT_ASIDE = 3
 
 
@@ -49,7 +49,7 @@ def lock_file(folder: Path, robot: str) -> Path:
 def why_no_lock(name: Path) -> str:
     """Return what blocks the path of the lock file, "" for nothing.
 
-    It is not set aside: a link made by another user would then get a ledger of ours.
+    Nothing is set aside here, as a link of another user must not receive our ledger.
     """
     kind = "a link" if name.is_symlink() else "a folder" if name.is_dir() else ""
     return f"{kind} lies in place of {name}" if kind else ""
@@ -89,7 +89,7 @@ class LedgerFile:
         """Return the newest complete ledger, and finish an interrupted write.
 
         Args:
-            cell_m: edge of the cells of the configuration [m].
+            cell_m: configured edge of a cell [m].
         """
         broken: dict[Path, str] = {}
         for path in self._generations:
@@ -114,17 +114,15 @@ class LedgerFile:
                 hint="everything has to be covered again; check the disk",
             )
             return LoadedLedger(fault=self._after_aside(lost, broken, "broken"))
-        # A file that appears later (on a disk mounted late) was not read and is not overwritten.
+        # A file that appears later, on a disk mounted late, must not be overwritten.
         self._unwanted = [(path, "unread") for path in (self.path, self._previous)]
         return LoadedLedger()
 
     def write(self, ledger: LedgerSnapshot) -> list[str]:
-        """Write a ledger; once this returns, it survives a power failure.
-
-        Returns the new names of files that were in its place.
+        """Write a ledger that survives a power failure; return new names of files set aside.
 
         Raises:
-            LedgerFileError: another process holds the lock, unknown to ``lock``.
+            LedgerFileError: another process has taken the lock since ``lock``.
             OSError: the write failed; the previous ledger is intact.
         """
         payload = encode_ledger(ledger)
@@ -138,7 +136,7 @@ class LedgerFile:
             self._take_lock()
         kept = self._rename_unwanted()
         if self._moving and self._new.exists():
-            self._move_on()  # it may be the only complete one beside its predecessor
+            self._move_on()  # it may be the newest complete ledger
         try:
             write_through(self._new, payload)
         except OSError:
@@ -222,7 +220,7 @@ class LedgerFile:
                 kept.append(move_aside(path, why))
             self._unwanted.pop()
         if kept:
-            # Otherwise they may have their old names after a power failure.
+            # So that the new names survive a power failure.
             sync_folder(self.path.parent)
         return kept[::-1]
 

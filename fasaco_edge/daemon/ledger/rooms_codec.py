@@ -1,6 +1,6 @@
 """The rooms' file as bytes: JSON with a version; squares of rooms as base64 of zlib.
 
-Nothing in it is trusted: a file that this writer could not have written is refused as a whole.
+No content is trusted: a file that ``encode_rooms`` cannot have written is refused as a whole.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _Corner = tuple[_Length, _Length]
 
 
 class _Note(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Unknown members are errors."""
+    """An object without unknown members."""
 
 
 class RasterNote(_Note, frozen=True):
@@ -100,9 +100,9 @@ class BookNote(_Note, frozen=True):
 
 
 def snapshot_of(book: RoomBook) -> RoomBook:
-    """Return a book as it is now, which another thread can encode.
+    """Return a copy of a book that another thread can encode.
 
-    The book replaces the rooms and rasters of its sheets, and changes none of them.
+    Rooms and rasters are shared, as a book replaces them and never changes them.
     """
     sheets = [replace(each, rooms=dict(each.rooms), cuts=list(each.cuts)) for each in book.sheets]
     return RoomBook(sheets, book.next_id)
@@ -153,7 +153,7 @@ def decode_rooms(payload: bytes) -> RoomBook:
     """Return the book in ``payload``.
 
     Raises:
-        RoomsFileError: it is no book, of another version, or not as ``encode_rooms`` writes it.
+        RoomsFileError: ``encode_rooms`` of this version cannot have written it.
     """
     try:
         note = msgspec.json.decode(payload, type=BookNote)
@@ -217,7 +217,7 @@ def _raster(note: RasterNote, square_m: float) -> RoomRaster:
     if count > MOST_SQUARES:
         raise ValueError(f"at most {MOST_SQUARES} squares, got {note.rows} x {note.cols}")
     unpacking = zlib.decompressobj()
-    # One byte more, which a longer one would fill.
+    # One byte more than expected, to detect longer data.
     octets = unpacking.decompress(note.ids, 2 * count + 1)
     if len(octets) != 2 * count or not unpacking.eof or unpacking.unused_data:
         raise ValueError(f"squares of {note.rows} x {note.cols} need {2 * count} bytes")

@@ -1,7 +1,8 @@
 """Rooms on disk: a file beside the ledger, written when rooms change.
 
-A new file is written beside the old one, fsynced, and renamed over it: at every moment there is a
-complete one. A file that cannot be read is set aside, and the rooms begin anew.
+A new file is written beside the old one, fsynced, and renamed over it, so that a complete file
+exists at every moment. A file that cannot be read is set aside, and the daemon begins without
+rooms.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from fasaco_edge.mission.map.room_book import RoomBook
 
 LOG = logging.getLogger(__name__)
 
-# Least time between two writes without a command that waits [s]: memory cards wear out.
+# Least time between two writes that no command waits for [s], as memory cards wear out.
 PERIOD_S = 5.0
 
 
@@ -39,7 +40,7 @@ class RoomsFile:
     def __init__(self, folder: Path, robot: str) -> None:
         self.path = folder / f"{robot}.rooms.json"
         self._new = folder / f"{robot}.rooms.json.new"
-        # Why a file that was not read is set aside before the first write; "" for no such file.
+        # Why a file that was not read is set aside before the first write; "" for none.
         self._unwanted = ""
 
     def load(self) -> tuple[bytes, RoomBook, RoomsFileError | None]:
@@ -48,7 +49,7 @@ class RoomsFile:
             payload = read_own(self.path, MOST_BYTES)
             return payload, decode_rooms(payload), None
         except (FileNotFoundError, NotADirectoryError):
-            # One that appears later, on a disk mounted late, is not overwritten.
+            # A file that appears later, on a disk mounted late, must not be overwritten.
             self._unwanted = "unread"
             return b"", RoomBook(), None
         except (OSError, RoomsFileError) as error:
@@ -63,7 +64,7 @@ class RoomsFile:
         """Write the file; once this returns, it survives a power failure.
 
         Raises:
-            OSError: the write failed; the file before is intact.
+            OSError: the write failed; the previous file is intact.
         """
         make_folder(self.path.parent)
         if self._unwanted and os.path.lexists(self.path):
@@ -83,13 +84,13 @@ class RoomsFile:
         """Rename the file that must not be overwritten; return its new name."""
         name = move_aside(self.path, self._unwanted)
         self._unwanted = ""
-        # Otherwise it may have its old name after a power failure.
+        # So that the new name survives a power failure.
         sync_folder(self.path.parent)
         return name
 
 
 class RoomsKeeper:
-    """Keeps the rooms of a daemon, through all its missions.
+    """Keeps the rooms of a daemon over all its missions.
 
     Attributes:
         book: the rooms.
@@ -114,7 +115,7 @@ class RoomsKeeper:
         self._writer.put(snapshot_of(self.book))
 
     def is_kept(self, now: float) -> bool:
-        """Return whether the last change passed on is on disk, or has waited for long enough."""
+        """Return whether the last change is on disk, or its timeout is over."""
         return not self._writer.is_behind() or now - self._kept_at > MOST_WAIT_S
 
     def take_faults(self) -> list[FasacoError]:
@@ -122,7 +123,7 @@ class RoomsKeeper:
         return self._writer.take_faults()
 
     def close(self, timeout_s: float) -> None:
-        """Write what has changed, within ``timeout_s`` [s]."""
+        """Write pending changes, within ``timeout_s`` [s]."""
         self.keep(float("inf"))
         self._writer.close(timeout_s)
 

@@ -1,4 +1,4 @@
-"""The ledger's keeper: when progress is written, and what is restored of it."""
+"""The ledger's keeper: writes progress when it is due, and restores it."""
 
 from __future__ import annotations
 
@@ -29,29 +29,28 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Period of writes: coverage is on disk within a second, though a cycle takes up to 0.1 s and a
-# memory card some tenths more.
+# Period of writes [s]: coverage is on disk within a second, with a cycle of up to 0.1 s and some
+# tenths for a memory card.
 PERIOD_S = 0.5
-# Period if only floor and trail changed: they change with every pose or path, and memory cards
+# Period if only floor and trail have changed, as every pose or path changes them [s]: memory cards
 # wear out.
 FLOOR_PERIOD_S = 1.0
-# Period if only time was spent, as in a dock.
+# Period if only time was spent, as in a dock [s].
 SPENT_PERIOD_S = 30.0
 
 
 class _Kept(NamedTuple):
-    """The state last passed to the writer: visits, changes of floor, trail and fleet, the order,
-    and its time spent in whole periods."""
+    """The state last passed to the writer; ``spent``: time of the order in whole periods."""
 
     visits: int
     floor_changes: int
     trail_changes: int
-    heard: int
+    fleet_version: int
     order_state: OrderState
     spent: int = 0
 
     def may_wait_s(self, before: _Kept) -> float:
-        """Return how long this may wait after the previous one [s]."""
+        """Return the least time between writing ``before`` and this state [s]."""
         if self.order_state != before.order_state:
             return 0.0
         return PERIOD_S if self.visits != before.visits else FLOOR_PERIOD_S
@@ -61,7 +60,7 @@ class LedgerKeeper:
     """Keeps coverage and order in the ledger; also before there is a mission.
 
     Attributes:
-        order_state: the initial order: the order in progress before, if any.
+        order_state: the order to begin with: the one from before the restart, if any.
     """
 
     def __init__(self, writer: LedgerWriter, cell_m: float, *, autostart: bool) -> None:
@@ -124,7 +123,7 @@ class LedgerKeeper:
                 self._begin_anew(fault, "mismatch")
 
     def check_loss(self, command: str) -> None:
-        """Check that there is nothing to forget; which zone it lies in is not known yet.
+        """Check that no covered cell is forgotten; without a map, zones are not considered.
 
         Raises:
             WouldForget: there is a loss; the text gives its size.
@@ -144,7 +143,7 @@ class LedgerKeeper:
         self._kept, self._kept_at = _Kept(-1, -1, -1, -1, OrderState()), float("-inf")
 
     def _first_order_state(self, autostart: bool) -> OrderState:
-        """Return the order that was under way, or the initial one."""
+        """Return the order from before the restart, or the initial one."""
         kept = OrderState.idle(NO_ORDER)
         try:
             if self._before.note:
@@ -176,18 +175,18 @@ def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False)
     file.lock()
     found = file.load(cell_m)
     if not fresh:
-        return _writing_on(file, found, cell_m)
+        return _continued(file, found, cell_m)
     try:
         kept = file.set_aside("fresh")
         if kept:
             LOG.info("started over; what was covered before is kept as %s", ", ".join(kept))
         note = found.ledger.note if found.ledger else found.note
-        return _writing_on(file, LoadedLedger(note=note), cell_m)
+        return _continued(file, LoadedLedger(note=note), cell_m)
     except OSError as error:
         return LedgerWriter(file, LoadedLedger(fault=_cannot_write(file, error)))
 
 
-def _writing_on(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerWriter:
+def _continued(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerWriter:
     """Continue a ledger; if it is set aside, start one with the operator's keep-outs alone."""
     keep_outs: KeepOuts = ()
     with suppress(OrderError):
@@ -199,26 +198,26 @@ def _writing_on(file: LedgerFile, found: LoadedLedger, cell_m: float) -> LedgerW
     note = replace(OrderState.idle(NO_ORDER), keep_out=keep_outs).to_json()
     begun = LedgerSnapshot(cell_m, "", 0, {}, note=note)
     writer = LedgerWriter(file, replace(found, ledger=begun))
-    # The files with them were set aside: a kill must not lose them.
+    # Written at once, as the files that contained the keep-outs were set aside.
     writer.put(begun)
     return writer
 
 
 class _Pending(NamedTuple):
-    """What is to be written: files to set aside for these reasons, and then a ledger, if any."""
+    """Pending work: reasons for which to set the files aside, then a ledger to write, if any."""
 
     unwanted: tuple[str, ...]
     ledger: LedgerSnapshot | None
 
     def and_then(self, later: _Pending) -> _Pending:
-        """Return both as one: a later ledger replaces this one."""
+        """Return both as one, with the later ledger."""
         return _Pending(self.unwanted + later.unwanted, later.ledger)
 
 
 class LedgerWriter:
-    """Writes the newest ledger it was given.
+    """Writes the newest ledger.
 
-    A ledger that cannot be written stays in memory and is retried; meanwhile the status reports it.
+    A ledger that cannot be written stays in memory and is retried; the status reports the failure.
 
     Attributes:
         restored: the ledger to continue with, if any.
@@ -234,7 +233,7 @@ class LedgerWriter:
         self.disk = DiskWriter[_Pending](
             "ledger", self._write, lambda error: _cannot_write(file, error), _Pending.and_then
         )
-        # The fault of the files at the start.
+        # The fault found when the files were read.
         self._finding = "" if found.fault is None else self.disk.note(found.fault)
 
     def put(self, ledger: LedgerSnapshot) -> None:
@@ -242,9 +241,9 @@ class LedgerWriter:
         self.disk.put(_Pending((), ledger))
 
     def begin_anew(self, fault: FasacoError | None, why: str) -> None:
-        """Set the files aside, with ``why`` in their names: a new ledger follows.
+        """Set the files aside, with ``why`` in their names; a new ledger follows.
 
-        ``fault`` is for the status; None for a reset by command.
+        ``fault``: reported in the status; None for a reset by command.
         """
         self._finding = fault_text(fault) if fault is not None else ""
         self._restored_cells = 0

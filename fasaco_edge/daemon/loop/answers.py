@@ -1,7 +1,7 @@
-"""Replies to queries for configuration, versions and commands, and their common functions.
+"""Replies to queries for configuration, versions and commands.
 
-Queries for configuration and versions get their reply on Zenoh's thread, without the loop; commands
-get it once the mission has decided.
+Queries for configuration and versions are answered on a Zenoh thread, without the loop; commands
+are answered once the mission has decided.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from fasaco_edge.wire.messages.ros_services import (
     response_attachment,
 )
 
-# Rate limit of replans by request: a path that keeps changing is hard to follow [s].
+# Least period of requested replans, as a path that keeps changing is hard to follow [s].
 REPLAN_PERIOD_S = 1.0
-# A JSON document, and its query.
+# Limit on a query with its JSON document [bytes].
 QUERY_BYTES = MAX_JSON_BYTES + 4096
-Said = Reply | Shared
+AnyReply = Reply | Shared
 
 _NO_WILDCARD = "ask by the whole key, without *"
 
@@ -52,10 +52,10 @@ def error_reply(error: FasacoError) -> Reply:
     return Reply(encode_error(error), is_error=True)
 
 
-def answering(answer: Callable[[Request], Said]) -> Callable[[Request], Said]:
+def answering(answer: Callable[[Request], AnyReply]) -> Callable[[Request], AnyReply]:
     """Wrap ``answer`` so that an error it raises becomes the reply."""
 
-    def answered(request: Request) -> Said:
+    def answered(request: Request) -> AnyReply:
         try:
             return answer(request)
         except FasacoError as error:
@@ -68,7 +68,7 @@ def check(request: Request, *parameters: str, payload: bool = False) -> None:
     """Check that a query has no other parameters, and a payload only if it takes one.
 
     Raises:
-        BadQuery: a parameter or a payload that the query does not take; the error names it.
+        BadQuery: the query does not take a parameter or payload; the text names it.
     """
     name = request.key.rpartition("/")[2]
     takes = ", ".join(parameters) or "none"
@@ -91,7 +91,7 @@ def serve_about(bus: Bus, keys: Keys, config: Callable[[], DaemonConfig]) -> Non
         "version": lambda: version,
     }
     for name, document in documents.items():
-        bus.serve(keys.rpc(name), answering(partial(_tell, document)))
+        bus.serve(keys.rpc(name), answering(partial(_document_reply, document)))
     bus.serve(f"{keys.prefix}/@rpc/*", partial(_unknown, keys), complete=False)
 
 
@@ -117,13 +117,13 @@ def _shown(value: object) -> object:
     return value
 
 
-def _tell(document: Callable[[], object], request: Request) -> Reply:
+def _document_reply(document: Callable[[], object], request: Request) -> Reply:
     check(request)
     return Reply(encode_json(document()))
 
 
 def _unknown(keys: Keys, request: Request) -> Reply | None:
-    """Reply to queries that no other queryable serves: this one gets every query."""
+    """Reply to queries that no other queryable serves, as this one gets every query."""
     if any(matches(request.key, keys.rpc(name)) for name in topics.RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]
@@ -135,8 +135,7 @@ def _unknown(keys: Keys, request: Request) -> Reply | None:
 class Commands:
     """Serves ``@rpc/mission`` and ``@rpc/replan``; a query waits until the loop replies.
 
-    ``services`` maps keys of ROS 2 services to commands: their requests come into the mailbox,
-    too.
+    ``services``: commands of ROS 2 services by key; their requests arrive in the mailbox, too.
     """
 
     def __init__(

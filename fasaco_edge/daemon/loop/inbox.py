@@ -50,14 +50,14 @@ PLURALS = {
     topics.BATTERY: "charges of the battery",
     topics.PRIORITY: "priorities",
 }
-# Least period of queries for the map: updates without their map come in bursts [s].
+# Least period of queries for the map, as updates without their map come in bursts [s].
 ASK_FOR_MAP_S = 2.0
-# Rate limit of maps [s]: a flood of maps must not take a core. No mapper is that fast.
+# Least period of maps, shorter than any mapper's: a flood of maps must not take a core [s].
 MAP_SPACING_S = 0.05
-# Limit on the poses of a cycle: other samples must not wait for a thousand poses. A command waits
-# for the poses before it: floor swept before a reset must not count after it.
+# Limit on the poses of a cycle, as other samples must not wait for a thousand poses. A command
+# waits for all earlier poses, as floor swept before a reset must not count after it.
 MOST_POSES = 32
-# Limit on the commands of a cycle: an order of a hundred zones takes as long as a map.
+# Limit on the commands of a cycle, as an order of a hundred zones takes as long as a map.
 MOST_COMMANDS = 1
 
 
@@ -84,11 +84,11 @@ class Batch:
     """The input of one cycle.
 
     Attributes:
-        samples: in order of arrival for each kind.
-        oversized: samples dropped by their size alone.
+        samples: samples, each kind in order of arrival.
+        oversized: samples dropped for their size.
         questions: commands that wait for a reply.
         plans: results of the planning thread, good or not.
-        updates_lost: map updates dropped by the full queue.
+        updates_lost: number of map updates dropped by the full queue.
     """
 
     samples: list[Received] = field(default_factory=list)
@@ -124,11 +124,10 @@ def take_batch(mailbox: Mailbox[object], timeout_s: float) -> Batch:
 def make_mailbox(
     max_pixels: int, map_spacing_s: float = MAP_SPACING_S, most_poses: float = MOST_POSES
 ) -> Mailbox[object]:
-    """Return the mailbox of a daemon; in a replay, with another clock, there are no rate limits.
+    """Return the mailbox of a daemon; a replay, with another clock, sets no rate limits.
 
-    Poses are queued, because each adds to the swept floor; some seconds of them are enough. A
-    map does not replace the one before it, because it may be malformed. An update changes the
-    map before it, so it waits with that map.
+    Poses are queued for some seconds, as each adds to the swept floor. A map does not replace the
+    previous map, as it may be malformed. An update waits with the map that it changes.
     """
     spacing = Spacing("map", map_spacing_s, followers=("map_update",))
     bounds = queues(max_pixels)
@@ -138,7 +137,7 @@ def make_mailbox(
 
 
 def _refuse(lost: object) -> None:
-    """Reject a command dropped by a full queue; its client must not take it as done."""
+    """Reject a command dropped by a full queue, so that its client does not take it as done."""
     if isinstance(lost, Question):
         error = CommandError("too many commands at once: not carried out", hint="ask again")
         lost.answer(error_reply(error))
@@ -165,10 +164,10 @@ class Inbox:
     """Subscribes to the mission's inputs, and decodes them.
 
     Args:
-        bus, keys: where to subscribe to the native keys.
-        mailbox: where samples wait for the loop.
+        bus, keys: the session and the native keys.
+        mailbox: holds samples for the loop.
         poses: decodes poses.
-        max_pixels: of a map or an update.
+        max_pixels: largest map or update [pixels].
         maps: further subscriptions that deliver maps.
         fleet: receives messages of a fleet's other robots; None without one.
 
@@ -203,8 +202,8 @@ class Inbox:
             for topic, many in PLURALS.items()
         }
 
-    def leave_out(self, batch: Batch, now: float) -> None:
-        """Leave out of a batch what a second publisher of an input sent, see ``one_publisher``."""
+    def drop_second_publishers(self, batch: Batch, now: float) -> None:
+        """Drop the samples in a batch that ``bus.one_publisher`` refuses."""
         batch.samples = [one for one in batch.samples if self._counts(one)]
         if self._publishers[topics.MAP.name].takes_over(now):
             for subscription in self._maps:
@@ -225,7 +224,7 @@ class Inbox:
         return self._publishers[kind].takes(sample.sender, received.at)
 
     def ask_for_map(self, now: float) -> None:
-        """Query the publishers of the map for their newest one, with a rate limit."""
+        """Query the publishers of maps for the newest map, with a rate limit."""
         if now - self._asked_for_map_at < ASK_FOR_MAP_S:
             return
         self._asked_for_map_at = now
@@ -237,9 +236,9 @@ class Inbox:
     ) -> tuple[list[Event], list[FasacoError]]:
         """Return the events in a batch, and the faults; a malformed sample affects no other.
 
-        For each frame the newest readable map counts. It replaces earlier updates of that frame,
-        lost ones included. Messages of a fleet wait in their receiver until there is a mission.
-        From then on the turn log has them, so that a replay can read them.
+        In each frame the newest readable map counts; it replaces earlier updates of that frame,
+        also lost ones. Messages of a fleet wait in their receiver until there is a mission, as the
+        turn log contains them only from then on.
         """
         maps, faults = self._newest_maps(batch.samples)
         events = list[Event](MapReceived(grid) for grid, _ in maps.values())
@@ -262,7 +261,7 @@ class Inbox:
             self.refused.pop(received.kind, None)
             if isinstance(event, PatchReceived):
                 if received.at < map_at.get(event.patch.frame, float("-inf")):
-                    lost = 0  # the lost ones were even older
+                    lost = 0  # lost updates were even older
                     continue
                 if lost:
                     events.append(PatchesLost(lost))
@@ -280,7 +279,7 @@ class Inbox:
     ) -> tuple[dict[str, tuple[OccupancyGrid, float]], list[FasacoError]]:
         """Return the newest readable map of each frame with its time of arrival, oldest first.
 
-        The mission decides which frame counts, and a map may come only once.
+        The mission decides which frame counts, and a map may be sent only once.
         """
         maps: dict[str, tuple[OccupancyGrid, float]] = {}
         faults: list[FasacoError] = []
@@ -300,7 +299,7 @@ class Inbox:
         return dict(reversed(maps.items())), faults
 
     def _event(self, received: Received) -> Event | None:
-        """Return the event in a sample; None for none, as for transforms without a new pose."""
+        """Return the event in a sample; None for transforms without a new pose."""
         kind, sample = received.kind, received.sample
         if kind == topics.FLEET.name:
             return self._fleet.event(sample) if self._fleet else None
@@ -333,8 +332,8 @@ def blocked_of(payload: bytes) -> FollowerBlocked:
 def _bare(error: FasacoError) -> FasacoError:
     """Return the error without its traceback.
 
-    The traceback would hold the payload until garbage collection: gigabytes in a flood of
-    malformed maps.
+    The traceback would keep the payload until garbage collection, which a flood of malformed maps
+    turns into gigabytes.
     """
     return error.with_traceback(None)
 

@@ -1,7 +1,7 @@
 """Loader: imports the planner and makes mission and planning thread, in a thread of its own.
 
-Importing numba costs 60 MB, and compiling on a new machine takes many seconds: the loop keeps
-replying meanwhile.
+Importing numba takes 60 MB, and compiling on a new machine takes many seconds, during which the
+loop keeps replying.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Loader:
         return self._loaded
 
     def drop(self) -> None:
-        """End the worker, now or once it is loaded: it is not needed."""
+        """End the worker, now or once it is loaded."""
         self._is_dropped = True
         if self._loaded is not None:
             self._loaded[1].disown()
@@ -65,7 +65,7 @@ class Loader:
         self._mailbox.post("loaded", None)
 
     def _load(self) -> tuple[Mission, PlanningWorker]:
-        # Before they are imported, which decides where they come from.
+        # Before the kernels are imported, as the import decides where they are loaded from.
         compile_missing(self._report)
         from fasaco_edge.daemon.loop.worker import PlanningWorker  # noqa: PLC0415
         from fasaco_edge.mission.core.mission import Mission  # noqa: PLC0415

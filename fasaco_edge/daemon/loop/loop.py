@@ -113,7 +113,7 @@ class Loop:
             self._reload_config(batch)
         now = time.monotonic()
         has_mission = self._runner.mission is not None
-        self._ports.inbox.leave_out(batch, now)
+        self._ports.inbox.drop_second_publishers(batch, now)
         self._status.conflicts = self._conflicts(now)
         events, faults = self._ports.inbox.decode(batch, has_mission=has_mission)
         self._count_faults(faults)
@@ -126,7 +126,7 @@ class Loop:
             turns.end("a batch could not be published")
         self._ports.outbox.commands(commands, decision.answers)
         self._keeper.keep(mission, now)
-        # An order may hold numbers of rooms, which must not be lost while the ledger has them.
+        # The ledger's order may name rooms by number, so these must not be lost.
         at_once = any(asked.room is not None or asked.command == "start" for asked in commands)
         self._rooms.keep(now, at_once=at_once)
         self._guard.attempt("status", partial(self._publish_status, now))
@@ -138,7 +138,7 @@ class Loop:
         self._status.turns.note(ended - taken)
 
     def announce(self) -> None:
-        """Publish a first status, so that queries for it have a reply from the start."""
+        """Publish a first status, so that queries for it are answered from the start."""
         self._publish_status(time.monotonic())
 
     def close(self, timeout_s: float) -> None:
@@ -166,7 +166,7 @@ class Loop:
                 self._void_path("this daemon plans from now on")
             claim.announce()
         elif claim.rival_yielded:
-            # The robot may have received the other's path after ours.
+            # The robot may have received the other daemon's path after ours.
             self._void_path("another daemon planned, too")
             if mission is not None:
                 self._restart("another daemon planned, too")
@@ -177,7 +177,7 @@ class Loop:
     def _begin_reload(self) -> None:
         """Start to read the configuration again, if requested.
 
-        Maps wait meanwhile: reading a keep-out mask uses their share of the memory.
+        Maps wait meanwhile, as reading a keep-out mask uses their share of the memory.
         """
         reload, mailbox = self._ports.reload, self._ports.mailbox
         if reload.mask is not None:
@@ -190,13 +190,13 @@ class Loop:
     def _reload_config(self, batch: Batch) -> None:
         """Apply the configuration that was read; restart the mission if it has changed."""
         reload, watchdog = self._ports.reload, self._ports.watchdog
-        self._ports.mailbox.let_go()
+        self._ports.mailbox.release()
         config, faults = reload.take(self.config)
         self._status.faults.count(faults, is_logged=True)
         watchdog.remark = f"configuration refused: {faults[0]}" if faults else ""
         if config != self.config:
             self._restart("the configuration has changed", config)
-            batch.plans.clear()  # they are the previous mission's
+            batch.plans.clear()  # plans of the previous mission
         reload.done()
 
     def _restart(
@@ -260,12 +260,12 @@ class Loop:
         if mission is None:
             if self.config.mission.waits_for_mask:
                 self._status.waits = "no keep-out mask yet"
-            self._send_path()  # a stop that could not be sent
+            self._send_path()  # sends a stop that could not be sent before
             return Decision(answers=self._runner.answer(commands, self._status.yield_reason))
         self._status.waits = "no map yet"
         if not self._has_begun:
-            # Modules and kernels stay: scanning them for garbage would delay the loop by 80 ms;
-            # so would objects of the first plan.
+            # Modules, kernels and objects of the first plan stay: scanning them for garbage would
+            # delay the loop by 80 ms.
             gc.freeze()
             self._has_begun = True
         maps = mission.map_revision
@@ -299,8 +299,8 @@ class Loop:
     def _recover(self, commands: Sequence[CommandReceived], error: Exception) -> Decision:
         """Stop the robot, and let another mission continue from the ledger.
 
-        Exiting would not help: a latched map comes again after a restart. The map gets a second
-        chance; a mission that fails again soon continues with the next map.
+        Exiting would not help, as a latched map arrives again after a restart. The new mission gets
+        the same map; if it fails again soon, the next one waits for another map.
         """
         LOG.exception("mission", extra={"event": "mission_broke"})
         fault = MissionBroke(f"the mission failed: {type(error).__name__}: {error}")
@@ -315,7 +315,7 @@ class Loop:
     # Publishing.
 
     def _void_path(self, reason: str) -> None:
-        """Replace any path that followers may have from elsewhere by an empty one."""
+        """Replace the path that followers may have from another daemon by an empty one."""
         self._runner.paths.void(reason, self._runner.map_frame or DEFAULT_FRAME)
         self._send_path()
 
@@ -350,7 +350,7 @@ class Loop:
         status.faults.count(self._guard.take_faults(), is_logged=True)
         due = status.due(runner, now)
         if due is not None:
-            # First, so that the metrics are never older than the status on the ports.
+            # First, so that the metrics are never older than the published status.
             if self._ports.metrics is not None:
                 self._ports.metrics.show(due)
             self._ports.outbox.status(due)

@@ -84,7 +84,7 @@ def battery_report(mission: Mission | None, now: float) -> BatteryReport | None:
 
 
 def drive_report(mission: Mission | None, cost: CoverageCost) -> DriveReport:
-    """Return the measured driving, beside the cost that paths are planned by."""
+    """Return the measured driving, with the planned duration of a quarter-turn."""
     planned_s = round(cost.quarter_turn_s, 3)
     if mission is None:
         return DriveReport(planned_s)
@@ -123,7 +123,7 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     swept_m2, to_sweep = round(mission.covered.floor.swept_m2, 3), mission.line.left.areas
     if to_sweep is None:
         return FloorReport(swept_m2)
-    # Before the first path no floor has been judged; on the way home the line is set aside.
+    # Before the first path no floor is planned; on the way home the line is set aside.
     order, is_planned = mission.order_state, mission.route.revision > 0
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
@@ -144,8 +144,8 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
 
 def _largest_first(*parts: tuple[float, str]) -> tuple[FloorLeft, ...]:
     """Return the floor left by reason [m2], without empty reasons."""
-    told = (FloorLeft(round(m2, 3), reason) for m2, reason in parts)
-    return tuple(sorted((part for part in told if part.m2), key=lambda part: -part.m2))
+    left = (FloorLeft(round(m2, 3), reason) for m2, reason in parts)
+    return tuple(sorted((part for part in left if part.m2), key=lambda part: -part.m2))
 
 
 def plan_counts(mission: Mission | None) -> PlanCounts:
@@ -166,7 +166,7 @@ def trouble_reports(mission: Mission, now: float) -> tuple[TroubleReport, ...]:
 
 
 def rounded(value: float | None) -> float | None:
-    """Return a value as it is reported, to three digits."""
+    """Return a value rounded to three digits."""
     return None if value is None else round(value, 3)
 
 
@@ -200,7 +200,7 @@ def mission_report(
 
 
 def _keep_outs(order_state: OrderState) -> Iterator[KeepOutReport]:
-    """Yield the keep-outs of the operator, then those of the order, in the map frame."""
+    """Yield the keep-outs of the operator, then of the order, in the map frame."""
     for keep_out in order_state.keep_out:
         yield KeepOutReport(keep_out.name, _corners(keep_out.polygon))
     if order_state.order is not None:
@@ -255,7 +255,7 @@ def _centre(mission: Mission, cell: tuple[int, int], cell_m: float) -> tuple[flo
 
 def zone_progress(mission: Mission) -> list[ZoneProgress]:
     """Return the progress of each zone of the order."""
-    # With kernels, which a daemon without a mission does not load.
+    # Imports kernels, which a daemon without a mission does not load.
     from fasaco_edge.mission.coverage import progress  # noqa: PLC0415
 
     return progress.zone_progress(mission.order_state, mission.map.area, mission.covered)

@@ -1,7 +1,7 @@
 """The mission runner: owner of the mission and its planning thread, from startup to replacement.
 
 The first map starts the loading of kernels; until then the daemon is small. Events that arrive
-before the mission are held for it.
+before the mission is loaded are held for it.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ if TYPE_CHECKING:
 
 
 class MissionRunner:
-    """Starts a mission once there is a map, and replaces it by another that continues its ledger.
+    """Starts a mission once there is a map; replaces it by another that continues its ledger.
 
     Attributes:
         config: the configuration in force.
         rooms: the rooms, kept from each mission to the next.
-        paths: through it the paths of its missions reach the bus.
+        paths: passes the paths of its missions to the bus.
         mission: the mission; None during startup.
         worker: its planning thread; None during startup.
     """
@@ -97,10 +97,9 @@ class MissionRunner:
     def mission_for(
         self, events: list[Event], claim: ClaimState
     ) -> tuple[Mission | None, list[Event], list[FasacoError]]:
-        """Return the mission, once it is loaded and this daemon plans, and the events for it.
+        """Return the mission once it is loaded and this daemon plans, its events, and faults.
 
-        Until then events are held; a new mission gets all of them. The faults are those of unusable
-        events.
+        Until then events are held; a new mission gets all of them. Faults are of unusable events.
         """
         if self.mission is not None:
             return self.mission, events, []
@@ -118,15 +117,15 @@ class MissionRunner:
                 self.mission.succeed(self._before)
             self._before = None
             if self.config.fleet:
-                # This order is new: it belongs to no ledger that was set aside.
+                # Sets the order apart from orders of ledgers that were set aside.
                 self.mission.covered.shared.begin(time.time_ns() // 1_000_000)
             self._held = HeldEvents()
         return self.mission, held, faults
 
     def answer(self, commands: Sequence[CommandReceived], rival: str = "") -> tuple[Answer, ...]:
-        """Take commands during startup as the mission would, and return the replies.
+        """Carry out commands during startup as the mission would; return the replies.
 
-        ``rival`` is the reason to command another daemon; "" for none.
+        ``rival``: why another daemon has to be commanded; "" for none.
         """
         return tuple(Answer(asked.number, self._carry_out(asked, rival)) for asked in commands)
 
@@ -172,9 +171,9 @@ class MissionRunner:
         return decision
 
     def restart(self, config: DaemonConfig, held: Sequence[Event], why: str) -> None:
-        """Go back to startup, with these events; coverage and order continue from the ledger.
+        """Go back to startup with these events; coverage and order continue from the ledger.
 
-        The path of the mission that ends is withdrawn for the reason given.
+        ``why``: why the path of the present mission is withdrawn.
         """
         self.paths.withdraw(why)
         if self.mission is not None and self.worker is not None:
@@ -188,8 +187,10 @@ class MissionRunner:
         self._held = HeldEvents(held)
 
     def stand_by(self) -> None:
-        """Send nothing more: another daemon plans; keep a mission only if its building is in
-        doubt."""
+        """Stop publishing, as another daemon plans.
+
+        The previous mission is kept only if its building is in doubt.
+        """
         self.paths.forget()
         if self._before is not None and not self._before.is_in_doubt:
             self._before = None
@@ -214,11 +215,10 @@ _LOST = (PatchesLost, "")
 
 
 class HeldEvents:
-    """The first events of a mission; bounded, however long loading takes.
+    """The first events of a mission, bounded for any duration of loading.
 
-    Holds the newest map, with its updates applied, and the newest pose of each of the newest
-    two frames: the mission decides which frame counts. A loss of updates is noted until the next
-    map.
+    Holds the newest map, with its updates applied, and the newest pose of each of the newest two
+    frames, as the mission decides which frame counts. A loss of updates is held until the next map.
     """
 
     def __init__(self, events: Sequence[Event] = ()) -> None:
@@ -256,7 +256,7 @@ class HeldEvents:
         return faults
 
     def _hold(self, event: Event) -> None:
-        """Hold an event; it replaces events of its type, except the newest in another frame."""
+        """Hold an event in place of others of its type, except the newest in another frame."""
         frame = _frame(event)
         before = [other for kind, other in self._held if kind is type(event)]
         kept = [other for other in before if other not in ("", frame)][-1:]
@@ -277,7 +277,7 @@ class HeldEvents:
         faults: list[FasacoError] = []
         newest = next(reversed(maps))
         for frame, grid in maps.items():
-            # An update in neither frame goes to the newest map, which reports the mismatch.
+            # An update in no held frame goes to the newest map, which reports the mismatch.
             theirs = [p for p in patches if (p.frame if p.frame in maps else newest) == frame]
             updated = grid.with_updates(theirs)
             self._held[MapReceived, frame] = MapReceived(updated.grid)

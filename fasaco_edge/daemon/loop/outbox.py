@@ -1,6 +1,6 @@
-"""The outbox: a publisher for each topic that the daemon sends, and the last samples for queries.
+"""The outbox: a publisher for each topic that the daemon sends, and replies to queries.
 
-Messages that are sent from time to time are made in ``daemon.loop.periodic``.
+Periodic messages are made in ``daemon.loop.periodic``.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.queries import Request, Shared
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.figures import log_fault
-from fasaco_edge.daemon.loop.answers import Said, answering, check
+from fasaco_edge.daemon.loop.answers import AnyReply, answering, check
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import FasacoError, NotPublished, NotYet
 from fasaco_edge.mission.core.events import Answer, CommandReceived
@@ -42,20 +42,20 @@ LOG = logging.getLogger(__name__)
 LOG_PERIOD_S = 10.0
 # Limit on the failures that wait to be counted.
 MOST_FAULTS = 100
-# What is sent here; the turn log and the fleet have publishers of their own.
+# The topics sent here; the turn log and the fleet have publishers of their own.
 SENT = tuple(
     topic
     for topic in topics.TOPICS
     if topic.direction == "out" and topic not in (topics.TURNS, topics.FLEET)
 )
-# Parameter of the query for a path, and what is kept for it.
+# Parameter of the query for a path, and the name of its kept reply.
 BEFORE_STOP = "before_stop"
 
 
 class Outbox:
     """The publishers of a daemon.
 
-    A query, or one on the topic itself, gets the last sample of a topic that has its name.
+    A query by a topic's name or key gets the last sample of the topic.
 
     Attributes:
         guard: publishes all messages.
@@ -68,7 +68,7 @@ class Outbox:
         self._publishers = {topic.name: bus.advertise(keys, topic) for topic in SENT}
         self._ros_publishers = {} if ros is None else ros.publishers
         self._lock = threading.Lock()
-        self._kept: dict[str, Callable[[], Said]] = {}
+        self._kept: dict[str, Callable[[], AnyReply]] = {}
         for topic in SENT:
             if topic.name in topics.RPC_NAMES:
                 answer = answering(partial(self._answer, topic.name))
@@ -84,19 +84,19 @@ class Outbox:
         self._publishers[topic.name].put(payload, attachment)
 
     def send(self, topic: Topic, payload: bytes, attachment: bytes = b"") -> None:
-        """Send a message, under ROS 2 too, and keep it for queries; the caller catches failures."""
+        """Send a message, also to ROS 2, and keep it for queries; the caller catches failures."""
         message = Shared.of(payload, topic.schema, attachment)
         self.keep(topic.name, lambda: message)
         self._publishers[topic.name].put(message.payload, attachment)
         if (publisher := self._ros_publishers.get(topic.name)) is not None:
             publisher.put(message.payload)
 
-    def keep(self, name: str, reply: Callable[[], Said]) -> None:
-        """Keep the reply to queries of a name; it is made on a thread of Zenoh's."""
+    def keep(self, name: str, reply: Callable[[], AnyReply]) -> None:
+        """Set the function that makes the reply to queries of a name, on a Zenoh thread."""
         with self._lock:
             self._kept[name] = reply
 
-    def _answer(self, name: str, request: Request) -> Said:
+    def _answer(self, name: str, request: Request) -> AnyReply:
         check(request, *((BEFORE_STOP,) if name == topics.PATH.name else ()))
         with self._lock:
             kept = self._kept.get(BEFORE_STOP if BEFORE_STOP in request.parameters else name)
@@ -114,7 +114,7 @@ class Outbox:
             publisher.forget()
 
     def path(self, path: PublishedPath) -> bool:
-        """Publish a path, by default facing along the way; return whether that succeeded."""
+        """Publish a path, by default with headings along it; return whether that succeeded."""
         return self.guard.attempt("path", lambda: self._put_path(path))
 
     def _put_path(self, path: PublishedPath) -> None:
@@ -149,7 +149,7 @@ class Outbox:
 
 
 def headings(xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the heading [rad], float64 (n,), at each point of a path: towards the next one."""
+    """Return the heading from each point of a path to the next, float64 (n,) [rad]."""
     if len(xy) < 2:
         return np.zeros(len(xy))
     ahead = np.diff(xy, axis=0)

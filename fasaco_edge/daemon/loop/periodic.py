@@ -38,16 +38,17 @@ if TYPE_CHECKING:
 
 # Least period of the coverage [s].
 COVERAGE_PERIOD_S = 0.5
-# Least period of the swept floor [s], and limit on its squares: a large floor gets larger squares.
+# Least period of the swept floor [s], and limit on its squares; a large floor gets larger squares.
 FLOOR_PERIOD_S = 2.0
 MOST_SQUARES = 1_000_000
-# A raster of more pixels is looked at for unswept floor less often: 8 million take the loop 25 ms.
+# Least period of the unswept floor, as pixels of its raster per second: 8 million pixels take the
+# loop 25 ms.
 PIXELS_PER_S = 1_000_000
-# Period at which a message is published again unchanged [s]: a listener that comes while others
-# listen is not noticed.
+# Period at which an unchanged message is repeated [s], as a publisher does not notice further
+# listeners.
 REPEAT_S = 10.0
-# Least period of the trail [s]; a large one, which takes the loop some milliseconds per 100,000
-# cells, is published less often.
+# Least period of the trail [s], and cells per second of a large trail, which takes the loop some
+# milliseconds per 100,000 cells.
 TRAIL_PERIOD_S = 0.5
 CELLS_PER_S = 200_000
 # Least period of changed rooms, and of swept shares alone while the robot drives [s].
@@ -55,7 +56,7 @@ ROOMS_PERIOD_S, SWEPT_PERIOD_S = 1.0, 5.0
 
 
 class Due:
-    """When a message is due: on change of a key, and again, with a least period.
+    """Decides when a message is due: on change of a key or as a repetition, with a least period.
 
     Attributes:
         next_at: earliest time of the next one [s, monotonic].
@@ -66,7 +67,7 @@ class Due:
         self._key: tuple[object, ...] = ()
 
     def is_due(self, key: tuple[object, ...], now: float, *, repeats: bool) -> bool:
-        """Return whether it is due now; ``repeats``: also if the key has not changed for long."""
+        """Return whether it is due now; ``repeats``: also as a repetition."""
         is_new = key != self._key or (repeats and now - self._at >= REPEAT_S)
         return is_new and now >= self.next_at
 
@@ -100,7 +101,7 @@ class CoveragePublisher:
 
 
 class FloorPublisher:
-    """Publishes the swept floor if it has subscribers: on change, every two seconds at most."""
+    """Publishes the swept floor if it has subscribers: on change, at most every two seconds."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox, self._due = outbox, Due()
@@ -122,7 +123,7 @@ class FloorPublisher:
 
 
 class UnsweptPublisher:
-    """Publishes why floor is not swept while that has subscribers: on change, as the floor."""
+    """Publishes why floor is unswept if that has subscribers: on change, as the swept floor."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox, self._due = outbox, Due()
@@ -151,10 +152,10 @@ class TrailPublisher:
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish or keep the trail if due."""
-        is_heard = any(map(self._outbox.has_listeners, (PHEROMONE, DIRECTIONS)))
+        is_wanted = any(map(self._outbox.has_listeners, (PHEROMONE, DIRECTIONS)))
         trail, lattice, grid = mission.trail, mission.lattice, mission.grid
-        key = (trail, trail.changes, is_heard)
-        if grid is None or lattice is None or not self._due.is_due(key, now, repeats=is_heard):
+        key = (trail, trail.changes, is_wanted)
+        if grid is None or lattice is None or not self._due.is_due(key, now, repeats=is_wanted):
             return
         held = trail.snapshot()
         cells = held.window.rows * held.window.cols
@@ -172,7 +173,7 @@ class TrailPublisher:
             mission.rotation.deg,
         )
         self._outbox.keep(PHEROMONE.name, shown.reply)
-        if is_heard:
+        if is_wanted:
             self._outbox.put(PHEROMONE, *shown.field())
             self._outbox.put(DIRECTIONS, shown.directions())
 
@@ -185,11 +186,11 @@ class ShownTrail:
         held: the trail.
         ants: number of ants that have walked on it so far.
         cell_m: edge of a cell [m].
-        frame: of the map.
-        revision: of the path in force.
-        steps: steps of the path still to drive.
-        stamp_ns: of the moment [ns].
-        lattice_deg: the angle of the cells to the map frame [deg].
+        frame: frame of the map.
+        revision: revision of the path in force.
+        steps: number of steps of the path still to drive.
+        stamp_ns: time of the trail [ns].
+        lattice_deg: angle of the cells to the map frame [deg].
     """
 
     held: TrailSnapshot
@@ -233,11 +234,11 @@ OF_MISSION: dict[str, Callable[[Outbox], PeriodicMessage]] = {
     "unswept": UnsweptPublisher,
     "pheromone": TrailPublisher,
 }
-"""The messages of a mission; the names are those of failures in the log."""
+"""The publishers of a mission's messages, by the name that failures have in the log."""
 
 
 class RoomsPublisher:
-    """Publishes the rooms of a book: on change, and as they are swept; also without a mission."""
+    """Publishes the rooms of a book on change, and as they are swept; also without a mission."""
 
     def __init__(self, outbox: Outbox, book: RoomBook) -> None:
         self._outbox, self._book = outbox, book
@@ -249,12 +250,12 @@ class RoomsPublisher:
     def publish(self, mission: Mission | None, now: float) -> None:
         """Publish the rooms if that is due."""
         book, progress_id = self._book, None if mission is None else _progress_of(mission)
-        # Another order may have forgotten what was swept for the one before.
+        # Another order may have forgotten the coverage of the previous order.
         order = None if mission is None else mission.order_state.order
         is_new = book.version != self._version or order is not self._order
         if not is_new and (progress_id == self._progress or not book.rooms):
             return
-        # Shares at the end of an order are not to be missed by who ends with it.
+        # At the end of an order shares are published sooner, as listeners may end with it.
         is_over = mission is not None and mission.state.is_at_rest
         if now - self._published_at < (ROOMS_PERIOD_S if is_new or is_over else SWEPT_PERIOD_S):
             return
@@ -266,7 +267,7 @@ class RoomsPublisher:
 
 
 def _progress_of(mission: Mission) -> tuple[object, int, bool]:
-    """Return what shares, and times to go, change with."""
+    """Return a key that changes with shares and times to go."""
     route = mission.route
     return mission.covered.version, route.revision, len(route.path.ahead) > 1
 

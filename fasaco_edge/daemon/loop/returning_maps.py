@@ -1,4 +1,4 @@
-"""Maps that alternate: a sign of two publishers if samples do not identify their sender."""
+"""Alternating maps, which show two publishers if samples do not identify their sender."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 
 from fasaco_edge.grid.occupancy import OccupancyGrid
 
-# So many maps within this time [s] that each equal the last but one, byte for byte, show two
-# publishers. A door that opens and shuts is slower.
+# Number of maps within PERIOD_S [s], each equal to the last but one, that shows two publishers. A
+# door that opens and shuts is slower.
 RETURNS, PERIOD_S = 3, 10.0
-# Least difference of the two maps, as pixels flicker: the free pixels in a wall of this length [m].
+# Least difference of the two maps, above flickering pixels: free pixels along this length [m].
 LEAST_WALL_M = 0.5
 
-# Frame, geometry and sum of the pixels; and how many of them are free.
+# Frame, geometry and checksum of the pixels; and the number of free pixels.
 _Seen = tuple[tuple[object, ...], int]
 
 
 class ReturningMaps:
-    """Watches for maps that return."""
+    """Detects maps that alternate."""
 
     def __init__(self) -> None:
         self._last: _Seen | None = None
@@ -28,7 +28,7 @@ class ReturningMaps:
         self._returned = deque[float](maxlen=RETURNS)
 
     def note(self, grid: OccupancyGrid, now: float) -> None:
-        """Note a map that came at ``now`` [s, monotonic]."""
+        """Note a map that arrived at ``now`` [s, monotonic]."""
         pixels = np.ascontiguousarray(grid.cells)
         name = grid.frame, grid.geometry, zlib.crc32(pixels.data)
         seen = name, int(np.count_nonzero(pixels == 0))
@@ -42,7 +42,7 @@ class ReturningMaps:
         self._before, self._last = last, seen
 
     def conflict(self, now: float) -> str:
-        """Return that maps change to and fro; "" if they do not."""
+        """Return the text of a conflict; "" for none."""
         if len(self._returned) < RETURNS or now - self._returned[0] > PERIOD_S:
             return ""
-        return "maps change to and fro, as those of two publishers"
+        return "maps alternate, as from two publishers"

@@ -1,6 +1,6 @@
 """The daemon's status: one JSON document, published on change and once a second.
 
-The mission's parts of it are in ``mission_reports``.
+``mission_reports`` makes the mission's parts of it.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from fasaco_edge.mission.core.path_exit import PublishedPath
 
 HEARTBEAT_S = 1.0
-# A mission that has not begun after this time is a trouble [s].
+# Time after which a mission that has not begun is a trouble [s].
 BEGUN_S = 30.0
-# The kind of samples that a state, or a trouble, lacks.
+# Kind of the samples that a state or a trouble lacks.
 LACKING = {
     "waiting for map": "map",
     "waiting for pose": "pose",
@@ -59,7 +59,7 @@ TO_DO = {
     "two_publishers": "stop one of the two",
     "no_effect": "check their unit, sign and origin; a map that still grows may reach them",
 }
-# Changes closer together than this go out as one.
+# Least time between two messages [s]; closer changes are sent as one.
 LEAST_INTERVAL_S = 0.05
 
 
@@ -69,7 +69,7 @@ class StatusBoard:
     Attributes:
         claim: id of this daemon and whether it plans, as in the status.
         yield_reason: reason why another daemon plans instead; "" if this one plans.
-        conflicts: which inputs come from two publishers.
+        conflicts: texts on inputs with two publishers.
         refused: kinds of samples whose newest one was refused, and why.
     """
 
@@ -91,7 +91,7 @@ class StatusBoard:
         self._started = time.monotonic()
         self._sent_at = float("-inf")
         self._sent_key: tuple[object, ...] = ()
-        # Since when there is no mission and nothing is loaded for one; None while there is.
+        # Start of the time without a mission or its loading [s]; None while there is either.
         self._unbegun_at: float | None = None
         self._since: dict[str, float] = {}
 
@@ -104,7 +104,7 @@ class StatusBoard:
     def due(self, runner: MissionRunner, now: float) -> Status | None:
         """Return the status if it changed or a second has passed, else None.
 
-        A daemon that waits for another one leaves the heartbeat to it.
+        A daemon that waits for another daemon sends no heartbeat.
         """
         mission, order_state = runner.mission, runner.order_state
         state, reason = self._state(runner)
@@ -115,7 +115,7 @@ class StatusBoard:
         troubles = self._troubles(runner, now)
         faults = (*(each.code for each in troubles), self.ledger.fault)
         key = (state, reason, revision, recorder, faults, order_state, claim)
-        # Many small faults do not get a message each: the heartbeat has their count.
+        # A new fault sends no message of its own, as the heartbeat has the count of faults.
         heartbeat_s = float("inf") if self.yield_reason else HEARTBEAT_S
         wait = LEAST_INTERVAL_S if key != self._sent_key else heartbeat_s
         if now - self._sent_at < wait:
@@ -186,13 +186,13 @@ class StatusBoard:
         return f"{text}; the newest {kind} was refused: {why}" if why else text
 
     def _troubles(self, runner: MissionRunner, now: float) -> tuple[TroubleReport, ...]:
-        """Return all troubles; only the mission's own troubles make it degraded."""
+        """Return all troubles; only the mission's own ones make it degraded."""
         own = self._of_mission(runner, now)
         if self.yield_reason:
             return own
         idle = runner.mission.idle_places(now) if runner.mission else ""
         texts = {"two_publishers": "; ".join(self.conflicts), "no_effect": idle}
-        # Start of the report of each [s].
+        # Time at which each trouble began [s].
         self._since = {code: self._since.get(code, now) for code, text in texts.items() if text}
         return own + tuple(
             TroubleReport(code, texts[code], TO_DO[code], round(now - since, 1))
@@ -203,7 +203,7 @@ class StatusBoard:
         is_unbegun = runner.mission is None and not runner.loading and not self.yield_reason
         if not is_unbegun or runner.order_state.order is None:
             self._unbegun_at = None
-            # A mission whose daemon yields takes in nothing more.
+            # The mission of a daemon that yields takes no more inputs.
             ran = None if self.yield_reason else runner.mission
             reports = trouble_reports(ran, now) if ran is not None else ()
             return tuple(replace(each, text=self._why(each.code, each.text)) for each in reports)

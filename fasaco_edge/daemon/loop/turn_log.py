@@ -1,8 +1,8 @@
 """The turn log: inputs and decisions of each cycle of the loop, published for the recorder.
 
-It is complete from the first cycle or not published at all: a replay cannot do without the start.
-Samples that arrived before there was a subscriber are embedded in the log. A replay compares its
-own decisions in the same form (``DecisionFilter``).
+It is complete from the first cycle, which a replay needs, or not published at all. Samples that
+arrived before the first subscriber are embedded in the log. A replay compares its own decisions in
+the same form (``DecisionFilter``).
 """
 
 from __future__ import annotations
@@ -47,16 +47,18 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 PERIOD_S = 0.5
-# The log waits for a recorder, which takes some seconds to start, at most this many cycles.
+# Limit on the cycles in which the log waits for a recorder, which takes some seconds to start.
 WAITING_TURNS = 2048
-# Earlier samples are embedded in the log, deflated, up to this size; more would delay the loop.
+# Limits on the samples from before the first subscriber, which are embedded deflated: more would
+# delay the loop [bytes].
 EMBEDDED_BYTES, DEFLATED_BYTES = 8_000_000, 500_000
-# Longer poses and batteries are only named; the log waits for a recorder up to this many bytes of
-# them.
+# Longest pose or battery message that is embedded, not referred to by checksum; limit on them while
+# the log waits for a recorder [bytes].
 POSE_BYTES, POSES_BYTES = 1024, 500_000
-# A busy link drops maps, too. Larger ones are only named: copying them costs the loop time.
+# Longest map that is embedded, as a busy link may drop it; copying a longer one delays the loop
+# [bytes].
 MAP_BYTES = 100_000
-# A batch of this size is published at once.
+# Size from which a batch is published at once [bytes].
 FULL_BYTES = 4_000_000
 # Time until a new subscriber surely receives all samples itself [s].
 MARGIN_S = 0.2
@@ -69,10 +71,10 @@ class TurnLog:
     """Publishes the log in batches.
 
     Args:
-        publisher: of the log's key.
-        config: in force.
-        restored: the ledger the daemon began with, if any.
-        rooms: the file of rooms it began with; b"" for none.
+        publisher: publisher of the log's key.
+        config: the configuration in force.
+        restored: the ledger that the daemon began with, if any.
+        rooms: the file of rooms that it began with; b"" for none.
     """
 
     def __init__(
@@ -174,11 +176,11 @@ class TurnLog:
 
     @property
     def _is_waiting(self) -> bool:
-        """Whether there was no subscriber yet."""
+        """Whether there has been no subscriber yet."""
         return self._embed_until == float("inf")
 
     def end(self, why: str) -> None:
-        """End the log: later cycles could not be replayed."""
+        """End the log, as later cycles could not be replayed."""
         if not self._is_open:
             return
         LOG.info("the turn log ends: %s", why)

@@ -1,4 +1,4 @@
-"""The planning thread; its kernels release the interpreter lock, so the loop keeps running."""
+"""The planning thread; its kernels release the interpreter lock, so that the loop keeps running."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class PlanningWorker:
     """Plans one request at a time and posts the result.
 
     Attributes:
-        progress: counts the thread's actions: stop checks of a search and waits for a request.
-            It stands still only if the thread hangs.
+        progress: counter of the thread's actions, which are stop checks of a search and waits for a
+            request; it stops only if the thread hangs.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class PlanningWorker:
         self._requests.put(request)
 
     def interrupt(self) -> None:
-        """End the current search with its best walk: a newer request waits."""
+        """End the current search with its best walk, as a newer request waits."""
         self._interrupt.set()
 
     def disown(self) -> None:
@@ -85,10 +85,9 @@ class PlanningWorker:
         budget_s = most_s(problem) if problem.only_better else self._budget_s
         stop = StopRecorder(AnyOf(self._count, TimeBudget(budget_s), Interrupt(self._interrupt)))
         try:
-            # This takes some percent of a full plan, nothing for a repair.
             path = self._planner.plan(problem, stop, ignore)
         except Exception as error:
-            # The same map comes again after a restart: exiting would not help.
+            # Exiting would not help, as the same map arrives again after a restart.
             LOG.exception("plan %d", request.number, extra={"event": "plan_failed"})
             why = f"plan {request.number} failed: {type(error).__name__}: {error}"
             self._post("plan", PlanBroken(request.number, PlanFailed(why)))

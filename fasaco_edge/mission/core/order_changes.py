@@ -154,7 +154,7 @@ class OrderChanges:
                     what = f"the outline of {zone.name!r} has changed"
                     self.route.want(what if zone.polygon else "other rooms are left out")
                 is_other = zone.ranked != (state.current_zone or zone).ranked
-                if is_other and self.orders.scope.worth.choose_anew():
+                if is_other and self.orders.scope.worth.choose_again():
                     self.route.want(OTHERS_FIRST)
         self._followed = book.version, order
 

@@ -1,15 +1,16 @@
 """Driving by poses: the robot's speed and turn durations, and the poses it can have driven to.
 
-Turn duration = time from ``BESIDE_S`` before to ``BESIDE_S`` after the turn, minus the travel time
-of that distance at full speed: braking and starting count, as in ``robot.quarter_turn_s``. Only
-turns between two straight stretches count, and no rate below ``TURNS_RAD_S``. Medians are reported,
-so a robot that waits at a turn changes them little. Times are those of the poses' stamps.
+The duration of a turn is the time from ``BESIDE_S`` before it to ``BESIDE_S`` after it, minus the
+time of that distance at full speed, so it includes braking and starting, as
+``robot.quarter_turn_s`` does. Only turns between two straight stretches count, faster than
+``TURNS_RAD_S``. The results are medians, which waits at turns change little. Times are by the
+poses' stamps.
 
-Swept floor uses only poses to which the robot can have driven. A localiser sometimes errs by more
-than its noise: one pose lies beside the track, the next one lies on it again. A pose farther away
-than the robot can have driven since the previous pose is held until the next one. If the robot can
-have driven to the next pose without it, it was an error. Otherwise the robot is there, and its
-track from the previous pose is unknown.
+Swept floor uses only poses that the robot can have driven to. Localisation sometimes errs by more
+than its noise: one pose lies beside the track, and the next pose lies on it again. A pose farther
+away than the robot can have driven since the previous pose is held until the next pose. If the
+robot can have driven directly to the next pose, the held pose was an error. Otherwise the held pose
+counts, and the track to it is unknown.
 """
 
 from __future__ import annotations
@@ -25,16 +26,16 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 
 # Straight driving required before and after a turn [s].
 BESIDE_S = 1.5
-# Threshold of the turning rate [rad/s], measured over this time, as headings are noisy [s].
+# Least turning rate of a turn [rad/s]; time over which it is measured, as headings are noisy [s].
 TURNS_RAD_S, OVER_S = 0.12, 0.5
-# A larger gap between poses breaks the track; poses closer in time are ignored [s].
+# Longest time between poses of one track; poses closer than LEAST_S are ignored [s].
 GAP_S, LEAST_S = 1.0, 0.05
-# Poses are kept for this long [s]: a robot that takes longer to turn is waiting, or lost.
+# Time for which poses are kept [s]: a robot that turns for longer waits, or is lost.
 KEPT_S = 40.0
-# Greatest deviation from straight driving at constant speed, as a share of the distance of
-# ``BESIDE_S``. The poses of a standing robot are noise and exceed it.
+# Largest deviation from straight driving at constant speed, as a share of the distance driven in
+# ``BESIDE_S``. The noise of a standing robot's poses exceeds it.
 UNEVEN = 0.2
-# Ranges of a quarter-turn and of a half turn [rad].
+# Ranges of a quarter-turn and a half-turn [rad].
 QUARTER = math.radians(70.0), math.radians(110.0)
 HALF = math.radians(150.0), math.radians(180.0)
 # Medians are over the NEWEST values; at least FEWEST are needed.
@@ -95,7 +96,7 @@ class DriveMeter:
         """Take in the next pose; a pose that is hardly newer is ignored."""
         at, pose, seen = stamped.stamp_ns * 1e-9, stamped.pose, self._seen
         if seen and 0.0 <= at - seen[-1].at < LEAST_S:
-            return  # the newest pose is repeated with each map
+            return  # with each map the newest pose is repeated
         if seen and not 0.0 < at - seen[-1].at <= GAP_S:
             self.break_track()
         before = next((old for old in reversed(seen) if at - old.at >= OVER_S), None)
@@ -172,7 +173,7 @@ def _is_even(seen: list[_Seen]) -> bool:
 
 
 def _apart(a: _Seen, b: _Seen) -> float:
-    # Straight distance: along all poses their noise would add up.
+    # Straight distance, as a sum over all poses would add up their noise.
     return math.hypot(b.x - a.x, b.y - a.y)
 
 
@@ -180,10 +181,10 @@ def _median(values: deque[float]) -> float | None:
     return median(values) if len(values) >= FEWEST else None
 
 
-# A base may be faster than configured by this factor. Between two poses farther apart in time its
-# track is unknown, for any timeout of the pose [s].
+# Largest ratio of a base's speed to the configured one; longest time between two poses for which
+# the track between them is known [s].
 SPEED_MARGIN, LONGEST_S = 1.2, 3.0
-# Largest excess of two poses' distance over the drive, by noise and corrections [cells].
+# Largest excess of the distance of two poses over the distance driven, by noise [cells].
 NOISE_CELLS = 0.5
 
 
@@ -192,8 +193,8 @@ class Driven(NamedTuple):
 
     Attributes:
         pose: the pose.
-        farthest_m: longest possible drive to it from the previous pose; 0 if not known [m].
-        is_joined: whether it has driven from there.
+        farthest_m: longest possible drive to it from the previous pose; 0 if unknown [m].
+        is_joined: whether the robot has driven to it from the previous pose.
     """
 
     pose: Pose2D
@@ -202,10 +203,10 @@ class Driven(NamedTuple):
 
 
 class DrivenPoses:
-    """Holds a pose that may be an error until the next one comes."""
+    """Holds a pose that may be an error until the next pose."""
 
     def __init__(self, speed_m_s: float, cell_m: float) -> None:
-        """Start without a pose; ``speed_m_s``: of the robot [m/s], 0 if not known."""
+        """Start without a pose; ``speed_m_s``: speed of the robot [m/s], 0 if unknown."""
         self._speed_m_s, self._noise_m = speed_m_s, NOISE_CELLS * cell_m
         self._sure: StampedPose | None = None
         self._held: StampedPose | None = None
@@ -216,11 +217,11 @@ class DrivenPoses:
         return self._held is not None
 
     def break_track(self) -> None:
-        """Note that the next pose counts wherever it is, as after a motion of the map."""
+        """Note that the next pose counts anywhere, as after a motion of the map."""
         self._sure = self._held = None
 
     def farthest_m(self, before: StampedPose, after: StampedPose) -> float:
-        """Return how far the robot can have driven between two poses; 0 if not known [m]."""
+        """Return how far the robot can have driven between two poses; 0 if unknown [m]."""
         took_s = (after.stamp_ns - before.stamp_ns) * 1e-9
         return SPEED_MARGIN * self._speed_m_s * took_s if 0.0 < took_s <= LONGEST_S else 0.0
 

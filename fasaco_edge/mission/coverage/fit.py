@@ -1,23 +1,23 @@
 """Fit of a ledger and a map: whether a ledger from before a restart is of the map's building.
 
-On the map of another building, obstacles are as frequent on covered cells as around them; in the
-same building they are rare there. So the number of blocked covered cells is compared with the
-number expected by chance: the obstacle density among the other known cells around them. Above
-``OTHER_FROM`` times that, and too many to be new furniture, the ledger belongs to another building;
-also if ``MANY_BLOCKED`` of the known covered cells are blocked, whatever is around them.
+On a map of another building, obstacles are as frequent on covered cells as around them; on a map of
+the same building they are rare on covered cells. So the number of blocked covered cells is compared
+with the number expected by chance, from the share of obstacles among the other known cells around
+them. The ledger belongs to another building if the number exceeds ``OTHER_FROM`` times that, and is
+too large for new furniture; also if ``MANY_BLOCKED`` of the known covered cells are blocked.
 
-A map that changes in mid-mission is compared with the map before (``map.building_watch``), and with
-the ledger where their walls leave it open.
+A map that changes during a mission is compared with the previous map (``map.building_watch``), and
+with the ledger if the walls do not decide.
 
-Unknown cells, and cells outside of the map, are no contradiction: a restarted mapper has seen next
-to nothing. A map that knows half of the covered cells without contradiction confirms them for good.
+Unknown cells, and cells outside the map, do not contradict, as a restarted mapper has seen little.
+A map that knows half of the covered cells without contradiction confirms the ledger for good.
 
 Measured on 13 buildings, 10 to 100 % of them covered, all robots starting at the same place of the
-frame. Rejected by complete maps of another building: 66 % (most of the rest overlap too little); by
-single scans there of 3.5 m and 8 m: 32 % and 47 % at once, more as the map grows. Rejected by maps
-of the same building: none, also with the map moved by 0.1 m; moved by 0.22 m and a degree 2 %; with
-obstacles on 3 and 10 % of the covered cells none and 8 %. Moved by more than a cell, the ledger is
-as wrong as in another building, and may be rejected.
+frame. In another building, complete maps reject 66 % of the ledgers (most of the rest overlap too
+little), and single scans of 3.5 m and 8 m reject 32 % and 47 %, more as the map grows. In the same
+building, maps reject no ledger, also if moved by 0.1 m; 2 % if moved by 0.22 m and 1 degree; none
+and 8 % with obstacles on 3 and 10 % of the covered cells. On a map that has moved by more than a
+cell, a ledger is as wrong as in another building, and may be rejected.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 
-# Nothing is decided unless this many covered cells are blocked, or expected to be by chance.
+# Least number of covered cells blocked, or expected to be blocked by chance, for a decision.
 LEAST_CELLS = 10
-# Ratio of blocked covered cells to those expected by chance: up to the first the ledger belongs
-# to this building, above the second to another; between the two the next map decides.
+# Ratio of blocked covered cells to the number expected by chance: up to SAME_UP_TO the ledger is of
+# this building, above OTHER_FROM of another; in between the next map decides.
 SAME_UP_TO, OTHER_FROM = 0.3, 0.6
-# Share of blocked among the known covered cells: below the first it may be this building, above the
-# second it cannot be.
+# Share of blocked cells among the known covered cells: up to LEAST_BLOCKED the ledger may be of
+# this building, from MANY_BLOCKED on it cannot be.
 LEAST_BLOCKED, MANY_BLOCKED = 0.05, 1 / 3
-# Margin around the covered cells in which the map is compared [cells]: includes the walls.
+# Margin around the covered cells in which the map is compared, to include walls [cells].
 AROUND_CELLS = 2
 
 
@@ -57,9 +57,9 @@ class Fit:
 
     Attributes:
         covered: number of covered cells.
-        known: number of those that the map knows, blocked or coverable.
-        blocked: number of those that are blocked.
-        chance: share of blocked cells among the known ones around that are not covered.
+        known: number of these that the map knows, blocked or coverable.
+        blocked: number of these that are blocked.
+        chance: share of blocked cells among the known uncovered cells around them.
     """
 
     covered: int

@@ -1,6 +1,6 @@
-"""Tiles: rasters without bounds, copied on write; tiles of floor, and lookup from other rasters.
+"""Tiles: unbounded rasters, copied on write; tiles of floor, and lookup from other rasters.
 
-Tiles of floor have one bit per pixel. The pixels lie fixed in the map frame, whatever a map's
+Tiles of floor have one bit per pixel. The pixels are fixed in the map frame, independent of a map's
 origin, yaw and resolution: pixel (row, col) begins at y = row * PIXEL_M, x = col * PIXEL_M.
 """
 
@@ -25,8 +25,8 @@ FLOOR_TILE = 128
 # Bytes in a row of a tile.
 ROW_BYTES = FLOOR_TILE // 8
 
-# A centre of another raster this close to the border of two pixels is assigned to the farther one,
-# so that the result does not depend on the queried window [pixels].
+# Distance from a border of two pixels within which a centre of another raster is assigned to the
+# farther one, so that the result does not depend on the queried window [pixels].
 TIE = 1e-6
 
 # Edges of the squares in which swept floor is published [pixels]: whole bytes that divide a tile.
@@ -37,7 +37,7 @@ _BITS = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
 Place = tuple[int, int]
 """Index of a tile: (i, j) begins at pixel (FLOOR_TILE * i, FLOOR_TILE * j)."""
 Bits = NDArray[np.uint8]
-"""Eight pixels of a row per byte, the first highest; a tile is (FLOOR_TILE, ROW_BYTES)."""
+"""Eight pixels of a row per byte, most significant bit first; (FLOOR_TILE, ROW_BYTES)."""
 Tiles = Mapping[Place, Bits]
 Mask = NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -46,7 +46,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 class SharedTiles(dict[Place, NDArray[Scalar]]):
     """Tiles by place (row, col), shared with snapshots until they change.
 
-    Only tiles with content are stored, so a map that jumps far away costs nothing in between.
+    Only tiles with content are stored, so distant parts of a map cost nothing in between.
 
     Args:
         most: limit on the number of tiles.
@@ -75,7 +75,7 @@ class SharedTiles(dict[Place, NDArray[Scalar]]):
         return MappingProxyType(dict(self))
 
     def make_room(self, place: Place) -> list[NDArray[Scalar]]:
-        """Drop the tiles farthest from ``place`` if there is no room for one there; return them."""
+        """Drop the tiles farthest from ``place`` if the limit allows no tile there; return them."""
         if place in self or len(self) < self._most:
             return []
 
@@ -172,8 +172,8 @@ class FloorSnapshot:
     def shown(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
         """Return the swept share of each square as a grid, in percent, rounded down.
 
-        The squares are pixels, or the smallest ones that give at most ``most`` squares. None if
-        even the largest are too many.
+        The squares are the smallest that give at most ``most`` squares. None if even the largest
+        are too many.
         """
         rows, cols = zip(*(self.tiles or ((0, 0),)), strict=True)
         low, high = (min(rows), min(cols)), (max(rows) + 1, max(cols) + 1)
@@ -237,13 +237,13 @@ def assembled(
 
     Args:
         tiles: the tiles.
-        window: of the raster.
+        window: window of the raster.
         side: edge of a tile, in squares.
         kind: dtype of the result.
         unpacked: returns the squares, (side, side), of a tile.
     """
     found = np.zeros((window.rows, window.cols), kind)
-    # For a window far larger than what there is, go through the tiles instead.
+    # If the window has more places than there are tiles, go through the tiles instead.
     many = window.rows * window.cols > side * side * len(tiles)
     for place in tiles if many else places_of(window, side):
         tile, part = tiles.get(place), window_of(place, side)
@@ -276,7 +276,7 @@ def swept_on(swept_in: Callable[[Window], Mask], place: Similarity, window: Wind
         return np.zeros((window.rows, window.cols), np.bool_)
     rows = (np.arange(window.row0, window.row1) + 0.5)[:, np.newaxis]
     cols = np.arange(window.col0, window.col1) + 0.5
-    # Relative to the corner of ``under`` all is positive, so truncation rounds down.
+    # Positions relative to the corner of ``under`` are positive, so truncation rounds down.
     row0, col0, right, up = place
     i = ((right * rows + (row0 - under.row0 + TIE)) + up * cols).astype(np.int32)
     j = (((col0 - under.col0 + TIE) - up * rows) + right * cols).astype(np.int32)

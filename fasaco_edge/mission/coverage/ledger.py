@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     # For types only: a daemon reads its ledger before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# Two poses farther apart than this many cells are a jump, unless the robot can have driven it: the
-# floor under the tool in between is unknown.
+# Distance of two poses above which they are a jump, unless the robot can have driven it [cells]:
+# the floor under the tool in between is unknown.
 JUMP_CELLS = 2.0
 
 TILE = 64
 # Lookups go by districts of DISTRICT x DISTRICT tiles.
 DISTRICT = 16
 
-# Limit on the tiles of a ledger, 8 million cells, more than any path: each takes 8 kB, and as much
-# again in the copy last written. ``protocol/limits.yaml`` has the same number.
+# Limit on the tiles of a ledger: 8 million cells, more than any path. A tile takes 8 kB, and as
+# much in the copy last written. ``protocol/limits.yaml`` has the same number.
 MOST_TILES = 2048
-# At the limit this many are dropped at once, the farthest first.
+# Number of tiles dropped at once at the limit, the farthest first.
 DROPPED_TILES = MOST_TILES // 16
 
 Tiles = Mapping["Cell", NDArray[np.uint16]]
@@ -46,15 +46,15 @@ Cells = NDArray[np.int64]
 class LedgerSnapshot:
     """An immutable copy of a ledger.
 
-    It holds everything of a mission that is kept over a restart: also swept floor, order and trail.
+    It holds all that a mission keeps over a restart, so also swept floor, order and trail.
 
     Attributes:
         cell_m: edge of a cell [m].
         frame: name of the cells' frame; "" while unknown.
         total: number of all visits.
-        tiles: the visits, uint16 (TILE, TILE), read-only; tile (i, j) has the cells from
-            (TILE * i, TILE * j) on.
-        under_tool: cells under the tool at that moment; staying there adds no visit.
+        tiles: the visits, uint16 (TILE, TILE), read-only; tile (i, j) begins at cell
+            (TILE * i, TILE * j).
+        under_tool: cells under the tool; staying on them adds no visit.
         floor: the swept floor.
         note: order and progress as JSON, see ``orders.order_state``; "" for none.
         trail: the living trail.
@@ -92,10 +92,10 @@ class LedgerSnapshot:
 class CoverageLedger:
     """Visits of the tool to each cell.
 
-    A cell is visited when the tool, a disc as wide as a cell, passes over its centre. Coming back
-    after having left counts as another visit; ``total`` counts all visits. ``frame`` names the
-    frame of the poses, "" while unknown. ``dropped`` counts the tiles dropped at the limit
-    ``MOST_TILES``: those farthest from the robot at that moment.
+    A cell is visited when the tool, a disc as wide as a cell, passes over its centre. Leaving and
+    returning counts as another visit; ``total`` counts all visits. ``frame`` names the frame of the
+    poses, "" while unknown. ``dropped`` counts the tiles dropped at the limit ``MOST_TILES``, which
+    are those farthest from the robot.
     """
 
     def __init__(self, cell_m: float, frame: str = "") -> None:
@@ -109,7 +109,7 @@ class CoverageLedger:
 
     @classmethod
     def restored(cls, snapshot: LedgerSnapshot) -> Self:
-        """Return a restored ledger, without the last pose: the track since then is unknown."""
+        """Return a restored ledger, without the last pose, as the track from it is unknown."""
         ledger = cls(snapshot.cell_m, snapshot.frame)
         ledger.total = snapshot.total
         ledger._tiles.update(snapshot.tiles)
@@ -135,9 +135,9 @@ class CoverageLedger:
 
         Args:
             pose: the robot's pose.
-            place_of: returns the point of a cell, x, y [m], that the tool has to pass over; None
-                for none. By default the cell's centre.
-            farthest_m: how far it can have driven since the pose before; 0 if not known [m].
+            place_of: returns the point of a cell that the tool has to pass over, x, y [m]; None for
+                none. By default the cell's centre.
+            farthest_m: longest possible drive since the previous pose; 0 if unknown [m].
         """
         last = self._last or pose
         if math.hypot(pose.x - last.x, pose.y - last.y) > max(
@@ -157,15 +157,15 @@ class CoverageLedger:
         self._last = None
 
     def lift_tool(self) -> None:
-        """Note that the map moved under the robot: the cells under the tool are unknown, too."""
+        """Note that the map moved: track and cells under the tool are unknown."""
         self.break_track()
         self._under_tool = frozenset()
 
     def forget(self, inside: Callable[[Cells, Cells], NDArray[np.bool_]]) -> None:
-        """Forget all visits to some cells, except the one to the cells under the tool now.
+        """Forget all visits to some cells; cells under the tool keep one.
 
         Args:
-            inside: mask function: rows and columns of nearby cells, int64 (n,) both, to bool (n,).
+            inside: mask function: rows and columns of nearby cells, int64 (n,), to bool (n,).
         """
         for places in self._districts():
             visited = [np.argwhere(self._tiles[place]) for place in places]
@@ -199,7 +199,7 @@ class CoverageLedger:
         return tile is not None and bool(tile[row % TILE, col % TILE])
 
     def open_again(self, cell: Cell) -> None:
-        """Forget the visits to a cell: the tool missed floor in it."""
+        """Forget the visits to a cell in which the tool missed floor."""
         row, col = cell
         if self.has_visited(cell):
             self._tiles.writable((row // TILE, col // TILE))[row % TILE, col % TILE] = 0
@@ -219,7 +219,7 @@ class CoverageLedger:
     def _near(
         self, start: Pose2D, end: Pose2D, place_of: Callable[[Cell], Point | None]
     ) -> dict[Cell, Point]:
-        """Return the cells that reach within half a cell of the segment, with their points."""
+        """Return the cells within half a cell of the segment, with their points."""
         cell_m, half = self._cell_m, 0.5 * self._cell_m
         rows = _span(min(start.y, end.y) - half, max(start.y, end.y) + half, cell_m)
         cols = _span(min(start.x, end.x) - half, max(start.x, end.x) + half, cell_m)

@@ -8,6 +8,7 @@ import numpy as np
 
 from fasaco_edge.errors import WouldForget
 from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.floor_tiles import window_of
 from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
@@ -17,12 +18,12 @@ from fasaco_edge.mission.orders.zones import in_zones
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """Covered cells that have to be covered again.
+    """Covered cells that a command would forget.
 
     Attributes:
-        cells: their number; those under the tool do not count, as they stay covered.
+        cells: their number, without cells under the tool, which stay covered.
         m2: their area [m2].
-        share: of the cells that the robot can reach; None where these are not known.
+        share: their share of the reachable cells; None if those are unknown.
     """
 
     cells: int
@@ -72,14 +73,13 @@ def loss_in(zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> Los
 
 
 def _beyond(window: Window, zones: tuple[Zone, ...], own: LedgerSnapshot) -> int:
-    """Return how many cells in zones are covered outside of a window.
+    """Return the number of covered cells in zones outside the map's window.
 
-    A map may have shrunk, as when a mapper begins anew.
+    The map may have been larger, as before a restart of the mapper.
     """
     cells = 0
-    for i, j in own.tiles:
-        tile = Window(TILE * i, TILE * j, TILE * (i + 1), TILE * (j + 1))
-        for part in tile.without(window):
+    for place in own.tiles:
+        for part in window_of(place, TILE).without(window):
             covered = (own.visits(part) > 0) & in_zones(zones, part, own.cell_m)
             for row, col in own.under_tool:
                 if part.contains(Window(row, col, row + 1, col + 1)):

@@ -1,12 +1,12 @@
-"""Mission ledger: the covered cells and swept floor, while no map contradicts them.
+"""Mission ledger: covered cells and swept floor, valid while no map contradicts them.
 
-A ledger from before a restart may belong to another building than the map now shows (``fit``).
-Until a map knows enough to decide, the ledger holds, and the next map is compared. From then on
-each map is compared with the building before (``map.building_watch``).
+A ledger from before a restart may belong to another building than the map now shows (``fit``). It
+stays valid, and is compared with each map, until a map knows enough to decide. From then on each
+map is compared with the previous building (``map.building_watch``).
 
 In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
-the rest. The robot that has passed the cell keeps that floor, in whichever robot's part it lies,
-and sweeps it when its line passes near again.
+the rest of its floor. The robot that has passed the cell keeps that floor, in any robot's part, and
+sweeps it when its line passes near again.
 """
 
 from __future__ import annotations
@@ -44,13 +44,12 @@ from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertai
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
-# Share of blocked cells among the known covered ones that furniture never reaches from one map to
-# the next.
+# Share of blocked cells among the known covered cells that new furniture never reaches within one
+# map.
 MANY_AT_ONCE = 0.2
-# Limit on the passed cells kept: the oldest are dropped.
+# Limit on the passed cells kept; the oldest are dropped.
 MOST_PASSED = 2_000
-# Limit on the returns to a cell: floor that the robot left unswept in two returns, a third would
-# leave, too.
+# Limit on the returns to a cell: a third return would leave the same floor unswept.
 MOST_AGAIN = 2
 
 PlaceOf = Callable[[Cell], Point | None]
@@ -64,10 +63,10 @@ def _full(most: int, size: str, dropped: int) -> LedgerFullError:
 
 
 class PassedCells:
-    """Cells that the robot has passed, but in which floor is unswept."""
+    """Cells that the robot has passed and in which floor is unswept."""
 
     def __init__(self) -> None:
-        # In the order of their last check.
+        # Sorted by their last check, oldest first.
         self._cells: dict[Cell, None] = {}
 
     def clear(self) -> None:
@@ -81,7 +80,7 @@ class PassedCells:
             self.drop(next(iter(self._cells)))
 
     def next(self, most: int) -> list[Cell]:
-        """Return the cells to check now: the ones whose last check is longest ago."""
+        """Return the cells to check now, oldest check first."""
         cells = list(self._cells)[:most]
         for cell in cells:
             del self._cells[cell]
@@ -98,7 +97,7 @@ class PassedCells:
 
 
 class MissionLedger:
-    """Owns the ledger; one from before a restart holds until a map contradicts it.
+    """Owns the ledger.
 
     Attributes:
         current: the covered cells.
@@ -123,10 +122,9 @@ class MissionLedger:
         Args:
             cell_m: edge of a cell [m].
             tool_m: width of the tool [m].
-            ahead_m: how far the tool's centre lies ahead of the point that the robot turns about
-                [m].
+            ahead_m: distance of the tool's centre ahead of the robot's turning point [m].
             shared: cells swept by other robots; None for a robot alone.
-            sight: for a tool that sticks out of the robot; None for one that does not.
+            sight: for a tool wider than the robot; else None.
         """
         self._sight = sight
         self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m
@@ -137,18 +135,18 @@ class MissionLedger:
         self.passed = PassedCells()
         self.before: LedgerSnapshot | None = None
         self._opened_again: Counter[Cell] = Counter()
-        # The ledger from before a restart while no map has confirmed it.
+        # The ledger from before a restart; None once a map has confirmed it.
         self._resumed: LedgerSnapshot | None = None
         # The robot's last pose before the map moved.
         self._pose_before_motion: Pose2D | None = None
 
     @property
     def version(self) -> tuple[int, int, int]:
-        """Changes whenever cells become covered, or are no longer covered."""
+        """Changes whenever covered cells change."""
         return self.current.total, self.shared.version, self.reopened
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
-        """Return the visits to cells, uint16 (rows, cols); 1 where only another robot swept."""
+        """Return the visits to cells, uint16 (rows, cols); 1 if only another robot swept one."""
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
@@ -190,7 +188,7 @@ class MissionLedger:
         Args:
             pose: the robot's pose.
             place_of: see ``CoverageLedger.record``.
-            farthest_m: how far it can have driven since the pose before; 0 if not known [m].
+            farthest_m: longest possible drive since the previous pose; 0 if unknown [m].
         """
         tool = pose
         if ahead_m := self._ahead_m:
@@ -207,15 +205,15 @@ class MissionLedger:
         return None
 
     def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell whose floor is swept, though the robot missed its point."""
+        """Count a visit to a cell whose floor is swept although the robot missed its point."""
         self.current.visit(cell)
 
     def may_open_again(self, cell: Cell) -> bool:
-        """Return whether a cell may be counted as not covered once more."""
+        """Return whether a cell may be opened once more."""
         return self._opened_again[cell] < MOST_AGAIN
 
     def open_again(self, cells: Collection[Cell]) -> None:
-        """Count cells as not covered: floor in them is left."""
+        """Count cells as uncovered, as floor in them is unswept."""
         for cell in cells:
             self.current.open_again(cell)
         self._opened_again.update(cells)
@@ -234,7 +232,7 @@ class MissionLedger:
         self.floor.break_track()
 
     def map_motion(self, pose: Pose2D) -> Motion | None:
-        """Return the map's motion, from the first pose after it; None if it did not move."""
+        """Return the map's motion by the first pose after it; None if no motion was noted."""
         start = self._pose_before_motion
         return None if start is None else Motion(start, pose)
 
@@ -248,8 +246,7 @@ class MissionLedger:
         cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
         self.current.forget(cells)
         self.floor.leave(floor)
-        # Cells of other robots are as uncertain on this map: each robot records them on a map of
-        # its own.
+        # Cells of other robots are as uncertain, as each robot records them on a map of its own.
         self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
         self.shared.note_forgotten()
         return before.cells - self.current.snapshot().cells
@@ -258,8 +255,8 @@ class MissionLedger:
         """Forget some cells and their floor, except under the tool now.
 
         Args:
-            inside: mask function: a window and the edge of its squares [m], to which squares have
-                their centre inside, bool (rows, cols).
+            inside: mask function: a window and the edge of its squares [m] to the squares whose
+                centre is inside, bool (rows, cols).
         """
 
         def cells_inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
@@ -291,7 +288,7 @@ class MissionLedger:
         )
 
     def reset(self, frame: str) -> None:
-        """Forget everything; ``frame`` is that of the poses, "" where none is active."""
+        """Forget everything; ``frame``: frame of the poses, "" if none is active."""
         self._replace(frame)
         self.shared.begin_anew()
         self.shared.disregard(lambda rows, _: np.ones(len(rows), np.bool_))
@@ -310,10 +307,7 @@ class MissionLedger:
         return None if verdict is Verdict.SAME else self._leave_building(frame)
 
     def contradicts(self, lattice: CoverageLattice) -> bool:
-        """Return whether a map blocks too many covered cells to be of the same building.
-
-        It is used for a map with other walls: new furniture alone would block fewer cells.
-        """
+        """Return whether a map with other walls blocks more covered cells than furniture would."""
         fit = Fit.of(self.current.snapshot(), lattice)
         return fit.verdict is Verdict.OTHER and fit.blocked >= MANY_AT_ONCE * fit.known
 
@@ -331,7 +325,7 @@ class MissionLedger:
         )
 
     def _forget_passed(self) -> None:
-        """Forget passed cells: the floor there has to be swept again."""
+        """Forget passed cells, as their floor has to be swept again."""
         self.passed.clear()
         self._opened_again.clear()
 

@@ -1,4 +1,4 @@
-"""Progress: of the robot on its path, of the coverage, and of each zone of an order."""
+"""Progress of the robot on its path, of coverage, and of zones and rooms."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ from fasaco_edge.mission.map.room_book import RoomBook
 from fasaco_edge.mission.orders.order_state import OrderState, Stage
 from fasaco_edge.mission.orders.zones import counts_in
 
-# The robot is searched for this many cells ahead; farther ahead the path may visit the same cell
-# again.
+# Number of cells ahead in which the robot is searched for; farther ahead the path may visit the
+# same cell again.
 LOOK_AHEAD = 16
+# Distance above which a robot is off its path [cells].
 FAR_CELLS = 4
 
 
@@ -33,10 +34,10 @@ class Coverage:
     Attributes:
         coverable: cells that are reachable, or have been since the order began.
         covered: number of them that the tool has passed over.
-        recovered: those it has passed over at least twice.
-        unreachable: coverable cells that the robot never could reach.
+        recovered: number of them that it has passed over at least twice.
+        unreachable: coverable cells that were never reachable.
         cell_m2: area of a cell [m2].
-        free_out_of_reach_m2: area known to be free, but in no reachable cell [m2].
+        free_out_of_reach_m2: free area outside the reachable cells [m2].
     """
 
     coverable: int
@@ -67,7 +68,7 @@ class Coverage:
 
     @property
     def remaining(self) -> int:
-        """Number of cells still to be covered that are reachable or have been."""
+        """Number of cells left to cover, reachable now or before."""
         return self.coverable - self.covered
 
     @property
@@ -77,7 +78,7 @@ class Coverage:
 
     @property
     def to_cover_m2(self) -> float:
-        """Area of the reachable cells still to be covered [m2]."""
+        """Area of the cells left to cover [m2]."""
         return self.remaining * self.cell_m2
 
     @property
@@ -87,11 +88,11 @@ class Coverage:
 
 
 class FreeArea:
-    """Free area out of reach, recomputed only when map or reachable cells change."""
+    """Free area out of reach; cached until map or reachable cells change."""
 
     def __init__(self, free_at_most: int) -> None:
         self._free_at_most = free_at_most
-        # The revision instead of the map, which would stay in memory.
+        # The revision, as the map would stay in memory.
         self._counted: tuple[int, NDArray[np.bool_] | None] = (-1, None)
         self._area_m2 = 0.0
 
@@ -152,8 +153,7 @@ class PathProgress:
     def driven_to(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> PathProgress:
         """Return the path with the robot in ``cell``, if it drove there along the path.
 
-        Neighbouring lanes are close: a pose that flickers into the next lane must not skip what
-        lies between.
+        A pose that flickers into the neighbouring lane must not skip the cells between.
         """
         near: list[Cell] = [
             (row, col) for row, col in self.cells[self.index : self.index + LOOK_AHEAD].tolist()
@@ -181,8 +181,8 @@ class ZoneProgress:
         name: name of the zone.
         passes: number of passes ordered.
         begun: number of its newest pass; 0 before the first.
-        cells: its reachable cells.
-        covered: number of them covered in that pass.
+        cells: number of its reachable cells.
+        covered: number of these covered in that pass.
     """
 
     name: str
@@ -195,7 +195,7 @@ class ZoneProgress:
 def zone_progress(
     order_state: OrderState, ground: ReachableArea | None, ledger: MissionLedger
 ) -> list[ZoneProgress]:
-    """Return the progress of each zone, in order; empty for an order for everything."""
+    """Return the progress of each zone, in sequence; empty for an order for everything."""
     order = order_state.order
     if order is None:
         return []
@@ -208,7 +208,7 @@ def zone_progress(
         cells = _counts(polygons, holes, lattice, reachable)
         covered = _counts(polygons, holes, lattice, visited)
     found = []
-    # Either all zones have polygons, or there is only one, without polygon: everything.
+    # Either all zones have polygons, or the only zone is everything.
     for index, counted in enumerate(zip(cells, covered, strict=True)):
         zone = order.zones[index]
         if order_state.stage is not Stage.COVERING or index < order_state.zone:
@@ -245,9 +245,9 @@ class RoomProgress:
     """Progress in a room.
 
     Attributes:
-        cells: how many of its cells are reachable.
-        covered: how many of these are covered.
-        to_go_s: time of the path ahead within it [s]; None without a path.
+        cells: number of its reachable cells.
+        covered: number of these that are covered.
+        to_go_s: time of the path ahead within the room [s]; None without a path.
     """
 
     cells: int
@@ -271,11 +271,10 @@ def room_progress(
 
     Args:
         book: the rooms, in the map frame.
-        lattice_deg: angle of the cells' rows to its x axis [deg].
+        lattice_deg: angle of the cells' rows to the map's x axis [deg].
         ground: the reachable area.
         ledger: the covered cells.
-        to_go_s: time of the path ahead within each room that it leads through [s]; without a path
-            empty.
+        to_go_s: time of the path ahead within each room that it crosses [s]; empty without a path.
     """
     placed = [room for room in book.rooms if room.outline]
     if ground is None or not placed:
@@ -300,13 +299,13 @@ def room_progress(
 def seconds_in(
     rooms: NDArray[np.uint16], window: Window, ahead: NDArray[np.int32], ahead_s: float
 ) -> dict[int, float]:
-    """Return how long a way stays in each room that it leads through [s].
+    """Return the time that a path takes in each room that it crosses [s].
 
     Args:
         rooms: uint16 (rows, cols), the room of each cell of ``window``, 0 for none.
         window: these cells.
-        ahead: int32 (n, 2), the cells of the way.
-        ahead_s: how long it takes [s]; its cells share that evenly.
+        ahead: int32 (n, 2), the cells of the path.
+        ahead_s: time of the whole path [s]; its cells share it evenly.
     """
     if len(ahead) < 2:
         return {}

@@ -1,7 +1,7 @@
 """Relaid ledger: conversion of a ledger to cells at another angle, or of another size.
 
-Coverage is rebuilt from swept floor alone: a cell counts as covered if the floor at its centre is
-swept. The trail, stored per step between cells, starts again; other robots resend theirs.
+Coverage is rebuilt from swept floor: a cell counts as covered if the floor at its centre is swept.
+The trail, stored per step between cells, starts again; other robots resend their cells.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     Place,
     Similarity,
     swept_on,
+    window_of,
 )
 from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
 from fasaco_edge.planners.living_trail import NO_TRAIL
 
 
 def relaid_ledger(before: LedgerSnapshot, lattice_deg: float, cell_m: float) -> LedgerSnapshot:
-    """Return a ledger converted to cells of ``cell_m`` [m] at ``lattice_deg`` [deg] to the map
-    frame."""
+    """Return a ledger converted to cells of ``cell_m`` [m], rotated by ``lattice_deg`` [deg]."""
     by_deg, floor = before.lattice_deg - lattice_deg, before.floor
     if not by_deg and before.cell_m == cell_m:
         return before
@@ -60,7 +60,7 @@ def _rotated(
 
     Args:
         floor: the present floor.
-        by_deg: rotation of the result against it [deg].
+        by_deg: rotation of the result against the floor [deg].
         side: edge of a tile, in squares.
         edge_m: edge of a square [m].
     """
@@ -75,9 +75,8 @@ def _rotated(
         )
         places |= {(i, j) for i in rows for j in cols}
     for place in sorted(places):
-        row, col = side * place[0], side * place[1]
-        window = Window(row, col, row + side, col + side)
-        squares = rotated_geometry(GridGeometry.of_cells(window, edge_m), -by_deg)
+        cells = GridGeometry.of_cells(window_of(place, side), edge_m)
+        squares = rotated_geometry(cells, -by_deg)
         swept = swept_on(floor.swept_in, Similarity.of(squares), Window(0, 0, side, side))
         if swept.any():
             yield place, swept

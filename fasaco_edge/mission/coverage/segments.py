@@ -1,7 +1,7 @@
-"""Segments of the track: what of the floor the tool passes for certain from place to place.
+"""Segments of the track: the floor that the tool certainly sweeps between consecutive places.
 
-Between two places the robot turns once at most, and bases drive where they head: its track stays
-within the triangle of its headings there. It also drives no farther than its speed allows.
+Between two places a robot turns at most once, and drives in the direction of its heading. So its
+track stays within the triangle of the headings, and is no longer than its speed allows.
 """
 
 from __future__ import annotations
@@ -18,19 +18,16 @@ from fasaco_edge.mission.coverage.steady_track import Place
 
 # Error of a heading [rad].
 YAW_RAD = math.radians(1.0)
-# Tolerance, so that rounding does not decide whether a pixel at the rim is swept [m].
+# Tolerance against rounding for pixels at the rim [m].
 TOUCH_M = 1e-9
-# Up to this length [m] a right angle between two places lies less than a pixel beside the segment.
+# Length up to which a right-angled track lies less than a pixel beside the segment [m].
 SHORT_M = 2.0 * math.sqrt(2.0) * PIXEL_M
-# Sides this near to parallel meet farther away than any room is long.
+# Angle below which two headings count as parallel, as they meet beyond any room [rad].
 LEAST_RAD = 1e-3
 
 
 class Segment(NamedTuple):
-    """A segment from one place to the next, and the radius swept along it with certainty [m].
-
-    A radius of 0: nothing is swept with certainty.
-    """
+    """A segment between places, and the radius certainly swept along it [m], 0 for none."""
 
     start: Place
     end: Place
@@ -59,9 +56,9 @@ def segments_between(start: Place, end: Place, tool_m: float) -> list[Segment]:
 
 
 def beside_m(start: Place, end: Place) -> float:
-    """Return how far from the segment between two places the robot may have been [m].
+    """Return how far beside the segment between two places the robot may have been [m].
 
-    Where it is not known how far it can have driven, it is taken to have driven straight.
+    If its longest possible drive is unknown, it is taken to have driven straight.
     """
     length, farthest_m = math.dist(start.point, end.point), end.farthest_m
     if length <= SHORT_M or not farthest_m:
@@ -78,10 +75,10 @@ def beside_m(start: Place, end: Place) -> float:
 
 
 def corner_between(start: Place, end: Place) -> Point | None:
-    """Return where the robot turned between two places, x, y [m]; None if that is not known."""
+    """Return where the robot turned between two places, x, y [m]; None if unknown."""
     one, other = _turns(start, end)
     if not one * other < 0.0 or abs(one) + abs(other) >= math.pi - LEAST_RAD:
-        return None  # it did not turn once, or did not drive where it heads
+        return None  # it did not turn exactly once, or did not follow its heading
     one, other = abs(one), abs(other)
     length = math.dist(start.point, end.point)
     first_m = length * math.sin(other) / math.sin(one + other)
@@ -107,11 +104,11 @@ def window_around(segment: Segment) -> Window:
 def within(segments: Sequence[Segment], window: Window, most_m: float = math.inf) -> Mask:
     """Return which pixel centres of a window are swept along segments, bool (rows, cols).
 
-    ``most_m``: the most that counts of their radius [m].
+    ``most_m``: upper limit on their radius [m].
     """
     values = []
     for start, end, reach_m in segments:
-        # Relative to each start: far from the origin rounding would swamp differences.
+        # Relative to each start, as far from the origin rounding would exceed the differences.
         far_y, far_x = end.y - start.y, end.x - start.x
         length2 = far_x * far_x + far_y * far_y or 1.0
         reach2 = (min(reach_m, most_m) + TOUCH_M) ** 2

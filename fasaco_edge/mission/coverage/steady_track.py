@@ -1,16 +1,16 @@
 """Steady track: filtered robot positions from noisy poses.
 
 A place is the mean over a symmetric window of poses. The window is wide enough for an error of a
-quarter of a pixel, and no wider than the tool reaches. Exact poses are taken as they are, without
-delay; noisy ones give places some poses later.
+quarter of a pixel, but not wider than the tool's reach. Exact poses become places at once, noisy
+poses some poses later.
 
 The noise is estimated from three consecutive poses. A robot drives smoothly: within a tenth of a
-second it leaves the straight line between the pose before and the pose after by only some
-millimetres. The lateral deviation from that line is localisation noise; a longitudinal one would be
-timestamp error. Three lateral errors of standard deviation s give a deviation of sqrt(1 + 1/4 +
-1/4) s, whose median size is 0.674 times that. Corners are rare, so the median over the last
-deviations ignores them. Between poses that are far apart corners are not rare, so these are left
-out. A drift, constant from pose to pose, is not seen.
+second it deviates by only some millimetres from the straight line between its neighbouring poses.
+A larger lateral deviation is localisation noise; a longitudinal one would be timestamp error. Three
+lateral errors of standard deviation s give a deviation with standard deviation sqrt(1 + 1/4 + 1/4)
+s, and with 0.674 times that as its median size. Corners are rare, so the median over the last
+deviations ignores them; between poses far apart they are frequent, and excluded. Drift, which is
+equal in consecutive poses, is not detected.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from typing import NamedTuple
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
 
-# The median is over the last POSES; at least FEWEST are needed.
+# The median is over the last POSES deviations; at least FEWEST are needed.
 POSES, FEWEST = 31, 5
-# Median size of the deviation from the line between the neighbours, for errors of 1.
+# Median size of the deviation from the line between the neighbours, for standard deviation 1.
 _MEDIAN_OFF = 0.6745 * math.sqrt(1.5)
 
 
@@ -33,11 +33,11 @@ class PoseScatter:
     """Estimates the noise of the newest poses.
 
     Attributes:
-        sigma_m: standard deviation of an error along one axis [m]; 0 before enough poses have come.
+        sigma_m: standard deviation of an error along one axis [m]; 0 before there are enough poses.
     """
 
     def __init__(self, corner_m: float) -> None:
-        """Start without a pose; ``corner_m``: a sharp bend between longer steps is a corner [m]."""
+        """Start without a pose; ``corner_m``: least step beside a corner [m]."""
         self.sigma_m = 0.0
         self._corner_m = corner_m
         self._before: tuple[Pose2D, ...] = ()
@@ -56,7 +56,7 @@ class PoseScatter:
         self._before = (*self._before[-1:], pose)
 
     def _is_corner(self, first: Pose2D, middle: Pose2D, last: Pose2D) -> bool:
-        """Return whether the robot turned, as noise would not."""
+        """Return whether the robot turned more sharply than noise appears to."""
         ax, ay, bx, by = (
             middle.x - first.x,
             middle.y - first.y,
@@ -71,10 +71,10 @@ class PoseScatter:
         self._before = ()
 
 
-# Half-width of the confidence interval in standard deviations: 95 %.
-SURE = 2.0
-# A place with this error needs no wider window [m].
-RIGHT_M = PIXEL_M / 4
+# Half-width of the 95 % confidence interval, in standard deviations.
+SURE_SIGMAS = 2.0
+# Error of a place that needs no wider window [m].
+GOOD_ERROR_M = PIXEL_M / 4
 # Limit on the poses before and after a place.
 MOST_BESIDE = 15
 
@@ -84,8 +84,8 @@ class Place(NamedTuple):
 
     Attributes:
         x, y: the position [m].
-        error_m: error bound to each side [m].
-        farthest_m: longest possible drive to it from the previous pose; 0 if not known [m].
+        error_m: bound of the error [m].
+        farthest_m: longest possible drive to it from the previous pose; 0 if unknown [m].
         yaw: heading of the robot there [rad].
     """
 
@@ -108,8 +108,8 @@ class SteadyTrack:
         """Start without a pose; ``tool_m``: width of the tool [m]."""
         self._reach_m = 0.5 * tool_m
         self._scatter = PoseScatter(self._reach_m)
-        # The poses in the window, how far the robot can have driven to each from the one before
-        # [m], and how many of them have become places.
+        # The newest poses, the longest possible drive to each from the previous pose [m], and the
+        # number of poses that have become places.
         self._poses: list[Pose2D] = []
         self._farthest_m: list[float] = []
         self._done = 0
@@ -117,7 +117,7 @@ class SteadyTrack:
     def add(self, pose: Pose2D, farthest_m: float = 0.0) -> list[Place]:
         """Take in the next pose; return the places that are final now.
 
-        ``farthest_m``: how far the robot can have driven since the pose before; 0 if not known [m].
+        ``farthest_m``: longest possible drive since the previous pose; 0 if unknown [m].
         """
         self._scatter.note(pose)
         self._poses.append(pose)
@@ -138,7 +138,7 @@ class SteadyTrack:
         return [self._place(index) for index in range(self._done, len(self._poses))]
 
     def box_ahead(self) -> tuple[float, float, float, float] | None:
-        """Return the bounding box of these places: least x, y, greatest x, y [m]; None for none."""
+        """Return the bounds of these places: least x, y, greatest x, y [m]; None for none."""
         if not self.is_behind:
             return None
         # Places are means of poses, so the poses bound them.
@@ -147,7 +147,7 @@ class SteadyTrack:
         return min(xs), min(ys), max(xs), max(ys)
 
     def end(self) -> list[Place]:
-        """Return the last places: the robot's track to its next pose is unknown."""
+        """Return the last places, as the robot's track to its next pose is unknown."""
         places = self._places(len(self._poses))
         self._poses, self._farthest_m, self._done = [], [], 0
         self._scatter.break_track()
@@ -156,7 +156,7 @@ class SteadyTrack:
     @property
     def _beside(self) -> int:
         """Number of poses before and after a place in its window."""
-        needed = (self._scatter.sigma_m / RIGHT_M) ** 2
+        needed = (self._scatter.sigma_m / GOOD_ERROR_M) ** 2
         return min(max(math.ceil((needed - 1) / 2), 0), MOST_BESIDE)
 
     def _places(self, stop: int) -> list[Place]:
@@ -166,7 +166,7 @@ class SteadyTrack:
 
     def _place(self, index: int) -> Place:
         poses, sigma_m = self._poses, self._scatter.sigma_m
-        here, reach_m = poses[index], self._reach_m + SURE * sigma_m
+        here, reach_m = poses[index], self._reach_m + SURE_SIGMAS * sigma_m
         beside = min(self._beside, index, len(poses) - 1 - index)
         for away in range(1, beside + 1):
             before, after = poses[index - away], poses[index + away]
@@ -179,5 +179,5 @@ class SteadyTrack:
         around = poses[index - beside : index + beside + 1]
         count = len(around)
         x, y = sum([pose.x for pose in around]) / count, sum([pose.y for pose in around]) / count
-        error_m = SURE * sigma_m / math.sqrt(count)
+        error_m = SURE_SIGMAS * sigma_m / math.sqrt(count)
         return Place(x, y, error_m, self._farthest_m[index], here.yaw)

@@ -1,14 +1,13 @@
 """Swept floor: the pixels of the map frame that the tool has passed over.
 
 A pixel is swept if its centre was under the tool, a disc, on the straight segment between two
-consecutive poses, and not behind a wall from there (``tool_sight``).
+consecutive poses, and no wall lay between them (``tool_sight``).
 
-With noisy poses, the union of tool discs is wider than the strip really swept. So the disc moves
+With noisy poses, the union of tool discs is wider than the strip that is swept. So the disc moves
 along the steady track and shrinks by the track's error bound: not at all with exact poses, and
-never to less than half of the tool. Between poses that are far apart it also shrinks by the
-distance that the robot may have driven beside the segment, down to nothing, see ``segments``.
-Sweeps along the newest poses are visible at once; they are stored, and counted, as soon as the
-track there is final.
+never below half of the tool. Between poses far apart it also shrinks by the distance that the robot
+may have driven beside the segment, down to nothing (``segments``). Sweeps along the newest poses
+are visible at once; they are stored and counted as soon as the track there is final.
 """
 
 from __future__ import annotations
@@ -52,13 +51,13 @@ from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
-# Two poses farther apart than this many tool widths are a jump, unless a drive takes no longer.
+# Distance of two poses above which they are a jump, unless the robot can have driven it [tool
+# widths].
 JUMP_TOOLS = 2.0
-# Limit on the tiles of a floor, 100 million pixels, the same as for planning: each takes 2 kB, and
-# as much again if it has changed since the copy that is being written. ``protocol/limits.yaml`` has
-# the same number.
+# Limit on the tiles of a floor: 100 million pixels, as for planning. A tile takes 2 kB, and as much
+# again if it has changed since the copy last written. ``protocol/limits.yaml`` has the same number.
 MOST_FLOOR_TILES = 6144
-# At the limit this many are dropped at once, the farthest first.
+# Number of tiles dropped at once at the limit, the farthest first.
 DROPPED_FLOOR_TILES = MOST_FLOOR_TILES // 16
 NOWHERE = Window(0, 0, 0, 0)
 # Limit on the pixels around the preliminary part of the track.
@@ -68,8 +67,7 @@ MOST_TOGETHER = 1 << 16
 # Number of changes whose windows are remembered.
 REMEMBERED = 64
 ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
-# Grids are processed in blocks of BLOCK x BLOCK pixels of the floor; coarser grids in smaller
-# blocks.
+# Grids are processed in blocks of about BLOCK x BLOCK pixels of floor.
 BLOCK = 256
 
 
@@ -80,8 +78,7 @@ class SweptFloor:
         changes: counter of changes; each object has its own.
         pixels: number of swept pixels.
         forgotten: how often pixels were forgotten.
-        dropped: number of tiles dropped at the limit ``MOST_FLOOR_TILES``: those farthest from the
-            robot at that moment.
+        dropped: number of tiles dropped at the limit ``MOST_FLOOR_TILES``, farthest first.
     """
 
     def __init__(self, tool_m: float, sight: ToolSight | None = None) -> None:
@@ -89,7 +86,7 @@ class SweptFloor:
 
         Args:
             tool_m: width of the tool [m].
-            sight: for a tool that sticks out of the robot; None for one that does not.
+            sight: for a tool wider than the robot; else None.
         """
         self._sight = sight
         self.changes = 0
@@ -97,10 +94,10 @@ class SweptFloor:
         self.dropped = 0
         self._tool_m = tool_m
         self._track = SteadyTrack(tool_m)
-        # The newest pose, and the last place up to which sweeps are stored.
+        # The newest pose, and the place up to which sweeps are stored.
         self._last: Pose2D | None = None
         self._kept_to: Place | None = None
-        # Preliminary sweeps beyond that, None until computed; and a window that contains them.
+        # Preliminary sweeps after that place, None until computed; and a window around them.
         self._ahead: tuple[Window, Mask] | None = None
         self._around_ahead: Window | None = None
         blank = np.zeros((FLOOR_TILE, ROW_BYTES), np.uint8)
@@ -112,7 +109,7 @@ class SweptFloor:
     def restored(
         cls, snapshot: FloorSnapshot, tool_m: float, sight: ToolSight | None = None
     ) -> Self:
-        """Return a restored floor, without the last pose: the track since then is unknown."""
+        """Return a restored floor, without the last pose, as the track from it is unknown."""
         floor = cls(tool_m, sight)
         floor.changes, floor.pixels = snapshot.changes, snapshot.pixels
         floor._tiles.update(snapshot.tiles)
@@ -155,26 +152,25 @@ class SweptFloor:
     def record(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
         """Record driving to ``pose``.
 
-        ``farthest_m``: how far the robot can have driven since the pose before; 0 if that is not
-        known [m].
+        ``farthest_m``: longest possible drive since the previous pose; 0 if unknown [m].
         """
         last, self._last = self._last, pose
         most_m = max(JUMP_TOOLS * self._tool_m, farthest_m)
         if last is not None and (apart := _apart(last, pose)) <= most_m:
             if not apart:
-                return  # a pose repeated with each map gives no measure of noise
+                return  # a repeated pose would bias the noise estimate
         else:
             self._end_track()
         before = self._around_ahead
         self._keep(self._track.add(pose, farthest_m))
         self._begin_ahead()
-        # The preliminary part has changed, too.
+        # The preliminary sweeps have changed, too.
         self._note(Window.around(before, self._around_ahead))
 
     def changed_since(self, changes: int) -> Window | None:
         """Return the window that may have changed since change number ``changes``; None for none.
 
-        ``ANYWHERE`` if that is no longer known.
+        ``ANYWHERE`` if that change is no longer remembered.
         """
         if changes == self.changes:
             return None
@@ -268,7 +264,7 @@ class SweptFloor:
             windows = [window_around(segment) for segment in segments]
             whole = Window.around(*windows) or NOWHERE
             if whole.rows * whole.cols > MOST_AHEAD:
-                # Poses with so much noise are no drive, and a mask would take much memory.
+                # Poses this noisy show no driving, and their mask would take much memory.
                 whole, segments = NOWHERE, []
             if len(segments) * whole.rows * whole.cols <= MOST_TOGETHER:
                 ahead = self._under(segments, whole)
@@ -280,7 +276,7 @@ class SweptFloor:
         return self._ahead
 
     def _segments_ahead(self, places: list[Place]) -> list[Segment]:
-        """Return the sweeps after the stored ones, to places in their order."""
+        """Return the sweeps from the stored ones along places."""
         chain = [self._kept_to or places[0], *places] if places else []
         return [
             segment

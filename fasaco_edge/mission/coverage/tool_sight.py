@@ -1,7 +1,7 @@
 """Tool sight: the floor that a tool wider than the robot touches, without floor behind walls.
 
-Side brushes, a wide deck or a lamp reach over the rim of the robot's disc. As in
-``grid.floor``, a pixel counts if free pixels connect it with the disc, about within the tool.
+Side brushes, a wide deck or a lamp reach beyond the robot's disc. As in ``grid.floor``, a pixel
+counts if free pixels under the tool connect it with the disc.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class ToolSight:
     """Finds the part of the tool's disc that the tool touches, on the newest map.
 
     Attributes:
-        radius_m: of the robot's disc [m].
+        radius_m: radius of the robot's disc [m].
     """
 
     def __init__(
@@ -34,8 +34,8 @@ class ToolSight:
 
         Args:
             tool_m: width of the tool [m].
-            radius_m: of the robot's disc [m].
-            free_at_most: occupancy values up to this are free [percent].
+            radius_m: radius of the robot's disc [m].
+            free_at_most: largest occupancy of free pixels [percent].
             grid: returns the newest map.
         """
         self._steps = tool_steps(radius_m / PIXEL_M, 0.5 * tool_m / PIXEL_M)

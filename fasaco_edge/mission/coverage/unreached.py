@@ -21,7 +21,7 @@ from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
 
-# Limit on the areas listed, the largest first; the others are counted.
+# Limit on the areas listed, the largest first; the rest are only counted.
 MOST_AREAS = 20
 # Limit on the areas visited in a retry.
 MOST_VIEWPOINTS = 256
@@ -42,7 +42,7 @@ REASONS = {
     Cause.KEPT_OUT: "in a keep-out zone",
     Cause.BEHIND_KEEP_OUT: "closed off by a keep-out zone",
     Cause.BEHIND_OBSTACLES: "closed off by obstacles",
-    # An obstacle, a wall that the map shows thicker by a pixel, or one that has moved: not known.
+    # The reason may be an obstacle, a wall that has moved, or one drawn thicker by a pixel.
     Cause.CLOSED: "no longer free on the map",
     Cause.UNKNOWN: "unknown to the map",
 }
@@ -82,8 +82,8 @@ class Unreached:
 def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[Cell]:
     """Return a reachable cell beside each closed area, to look at it; array indices.
 
-    An area without a square of two by two cells is left out: rows of cells along walls come and go
-    with the map's noise. At most MOST_VIEWPOINTS, for the largest areas.
+    Areas without a square of two by two cells are left out, as single rows of cells along walls are
+    noise of the map. At most MOST_VIEWPOINTS, for the largest areas.
     """
     areas = find_areas(closed.view(np.uint8))
     beside = cells_beside(areas, reachable)
@@ -93,7 +93,7 @@ def viewpoints(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -> list[
 
 
 def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return cells and those beside them, bool (rows, cols)."""
+    """Return cells and their eight neighbours, bool (rows, cols)."""
     padded = np.pad(cells, 1)
     rows = padded[:-2] | padded[1:-1] | padded[2:]
     widened: NDArray[np.bool_] = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
@@ -112,18 +112,18 @@ class OrderReach:
     def __init__(self, map_state: MapState, ledger: MissionLedger) -> None:
         self.order_state = OrderState.idle(NO_ORDER)
         self._map, self._ledger = map_state, ledger
-        # Number of paths that left cells over, and why the last did; "" if not known.
+        # Number of paths that left cells over, and why the last path did; "" if unknown.
         self._failures, self._why_left = 0, ""
         self._newest: ReachableArea | None = None
-        # Which cells of a window around all maps received have ever been reachable.
+        # A window around all maps received, and which of its cells have ever been reachable.
         self._once: tuple[Window, NDArray[np.bool_]] | None = None
-        # These cells before the map moved, and whether cells have moved since the newest area.
+        # The same before the map moved; and whether cells have moved since the newest area.
         self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
         self._have_moved = False
         self._found: tuple[object, Unreached] = (None, Unreached())
 
     def _begin_reach(self, reached: ReachedCells | None) -> None:
-        """Start another order, or continue one that had reached some cells before a restart."""
+        """Start another order, or continue one with the cells reached before a restart."""
         self._failures, self._why_left, self._newest = 0, "", None
         self._once = None if reached is None else (reached.window, reached.mask)
         self._before_motion = None
@@ -131,13 +131,13 @@ class OrderReach:
         self.note_area()
 
     def succeed(self, before: OrderReach) -> None:
-        """Go on with the same order on the same cells, as another mission left it."""
+        """Take over the reach of another mission with the same order on the same cells."""
         self._failures, self._why_left = before._failures, before._why_left
         self._newest, self._once = before._newest, before._once
 
     @property
     def reached(self) -> ReachedCells | None:
-        """The cells that have been reachable since the order began; None without one to go on."""
+        """The cells that have been reachable since the order began; None without open order."""
         return self._reached_cells() if self.order_state.is_open else None
 
     def _reached_cells(self) -> ReachedCells | None:
@@ -153,18 +153,18 @@ class OrderReach:
             once = self._once_on(window)
             here = once[area.lattice.window.slices_in(window)]
             if self._have_moved:
-                # After a motion by part of a cell, a cell beside reachable cells that is not
-                # coverable lies in a wall.
+                # After a motion by part of a cell, some moved cells lie in walls: those beside
+                # reachable cells that are not coverable.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
             self._once, self._newest, self._have_moved = (window, once), area, False
 
     def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``move_reached`` gets the motion."""
+        """Note that the newest map has moved; ``move_reached`` follows with the motion."""
         self._before_motion = self._before_motion or self._once
 
     def move_reached(self, motion: Motion) -> None:
-        """Move the cells with the map: areas since were found from a pose before the motion."""
+        """Move the cells with the map; areas found since it moved were from an old pose."""
         before, self._before_motion = self._before_motion, None
         if before is not None and not motion.is_still:
             lattice = self._map.lattice
@@ -180,19 +180,15 @@ class OrderReach:
             self._have_moved = True
 
     def _around(self, window: Window) -> Window:
-        """Return the window around the newest map and the maps before, if not too large.
-
-        A map that was cut is still known to have been larger.
-        """
+        """Return the window around all maps received; around the newest alone if too large."""
         whole = Window.around(window, None if self._once is None else self._once[0])
         assert whole is not None
         return whole if whole.rows * whole.cols <= MAX_LATTICE_CELLS else window
 
     def known(self, lattice: CoverageLattice) -> NDArray[np.bool_]:
-        """Return which cells of a lattice are reachable or have been, bool (rows, cols).
+        """Return which cells of a lattice are reachable or were before, bool (rows, cols).
 
-        Without cells that keep-out zones close now, and cells that were only assumed to be
-        reachable.
+        Cells that keep-out zones close now are left out.
         """
         known, area = self._once_on(lattice.window), self._map.area
         if area is not None and area.lattice is lattice:
@@ -208,7 +204,7 @@ class OrderReach:
     def unreached(self) -> Unreached:
         """Return the cells that stay uncovered on the present map.
 
-        The last result while the robot is on no coverable cell.
+        While the robot is on no coverable cell, the last result is returned.
         """
         area, state = self._map.area, self.order_state
         if state.order is None:
@@ -221,8 +217,8 @@ class OrderReach:
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
         """Return the size of an area, and of all cells that were ever reachable [m2].
 
-        Covered cells count as reachable: after a restart only they are known. Cells that are now
-        unknown on the map, for instance of a restarted mapper, do not count.
+        Covered cells count as ever reachable, as after a restart no others are known. Cells unknown
+        on the present map, as after a restart of the mapper, do not count.
         """
         once = self.known(area.lattice) | (self._ledger.visits(area.lattice.window) > 0)
         once &= area.lattice.states != UNKNOWN
@@ -230,7 +226,7 @@ class OrderReach:
         return np.count_nonzero(area.reachable) * cell_m2, np.count_nonzero(once) * cell_m2
 
     def _outcome(self) -> str:
-        """Return how much of the order is covered, and why the rest is not."""
+        """Return as text how much of the order is covered, and why the rest is not."""
         order, area, lattice = self.order_state.order, self._map.area, self._map.lattice
         if order is None or lattice is None:
             return "the order was carried out"
@@ -260,7 +256,7 @@ class OrderReach:
         return f"{ending}: {', '.join(why)}" if why else ending
 
     def _is_any_left(self) -> bool:
-        """Return whether anything of the order is left that was ever reachable."""
+        """Return whether any ordered cell is left that was ever reachable."""
         lattice, state = self._map.lattice, self.order_state
         if state.order is None or state.next_pass() is not state:
             return True
@@ -274,7 +270,7 @@ class OrderReach:
     ) -> NDArray[np.bool_]:
         """Return the ordered cells that were ever reachable, bool (rows, cols) of a window.
 
-        If the map was cut, the cells cut off count, too.
+        Cells outside the present map count, too.
         """
         asked = self._once_on(whole)
         asked[lattice.window.slices_in(whole)] = self.known(lattice)
@@ -289,7 +285,7 @@ class OrderReach:
         return REASONS.get(cause, f"{LEFT_OVER} {tries}{why}")
 
     def _viewpoints(self) -> set[Cell]:
-        """Return the cells (row, col) from which to look at areas that were closed."""
+        """Return the cells (row, col) from which the robot can look at closed areas."""
         order, area = self.order_state.order, self._map.area
         if order is None or area is None:
             return set()
@@ -314,12 +310,12 @@ class OrderReach:
         return Unreached(tuple(listed), cells, len(areas.cells) - len(listed))
 
     def _causes(self, order: MissionOrder, area: ReachableArea) -> NDArray[np.uint8]:
-        """Return the cause of each cell, uint8 (rows, cols); a later one overrides."""
+        """Return the cause of each uncovered cell, uint8 (rows, cols); later causes override."""
         lattice, reachable, free = area.lattice, area.reachable, self._map.free
         assert free is not None
         causes, once = np.zeros(lattice.states.shape, np.uint8), self._once_on(lattice.window)
         causes[once & ~lattice.coverable] = Cause.CLOSED
-        # An order for everything does not ask for cells that were unknown all the time.
+        # An order for everything does not include cells that were never known.
         is_asked = once if order.zones[0].polygon is None else True
         causes[is_asked & (lattice.states == UNKNOWN)] = Cause.UNKNOWN
         causes[lattice.coverable & ~reachable] = Cause.BEHIND_OBSTACLES
@@ -331,7 +327,7 @@ class OrderReach:
             without_zones = ReachableArea.around(free, cell).reachable
             causes[without_zones & lattice.coverable & ~reachable] = Cause.BEHIND_KEEP_OUT
         if self.order_state.stage is not Stage.COVERING:
-            # In earlier stages they are still to come.
+            # While covering, reachable cells are still to come.
             causes[reachable] = Cause.LEFT_OVER
         causes[~self._uncovered(order, area)] = 0
         return causes

@@ -1,20 +1,19 @@
 """Building watch: whether the newest map still shows the building of the ledger.
 
-Another floor, a saved map of another building or a map turned round may arrive in the frame of the
-previous map. Then walls and floor of the cells that both maps know agree no better than by chance:
-Cohen's kappa of blocked and free, 1 for equal maps, is about 0. After a loop closure the maps agree
-once the previous map is moved as the robot's pose has moved. If they agree in neither way, the
-robot stands, and a map that stays like that for a while is another building's. While a mapper shows
-two buildings in turn, nothing is decided: the robot stands until one of them stays.
+The frame of the previous map may show another floor, another building or a rotated map. Then walls
+and floor of the cells known to both maps agree no better than by chance: Cohen's kappa of blocked
+and free, 1 for equal maps, is about 0. After a loop closure the maps agree once the previous map is
+moved as the robot's pose has moved. If they agree in neither way, the robot stands still; a map
+that keeps disagreeing for some seconds shows another building. If a mapper alternates between two
+buildings, the robot stands until one of them stays.
 
-A map is compared with a map of some seconds before (the reference), not with the last one: a map
-sent in parts, or that of a restarted mapper, which is almost empty at first, differs from it, too.
+Each map is compared with a reference some seconds old, not with the previous map, as maps sent in
+parts, and the first maps of a restarted mapper, differ from the previous map in any building.
 
 Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, and 0.35 for
 the first 2 m that a scanner sees in another building. The lowest kappa in one building is 0.59 for
-maps 0.3 m apart, 0.32 for 0.6 m, and 0.67 and 0.34 if furniture moves from and to 10 and 30 % of
-the coverable cells. Floors with the same walls are one building to this watch: they need frames of
-their own.
+maps 0.3 m apart, 0.32 for 0.6 m, and 0.67 and 0.34 if furniture moves on 10 and 30 % of the
+coverable cells. Floors with equal walls count as one building, so each needs a frame of its own.
 """
 
 from __future__ import annotations
@@ -40,12 +39,13 @@ BETTER = 0.1
 MOST_CELLS = 20_000
 # Longest time from a map to the pose that shows its motion, before the robot stops [s].
 GRACE_S = 0.5
-# Time for which a map has to show another building, or again the previous one, to be accepted [s];
-# the first time doubles with each change of building within SOON_S, at most LONGEST-fold.
+# Time for which maps must show another building before it is accepted, and the previous building
+# before the robot drives again [s]. PATIENCE_S doubles with each change of building within SOON_S,
+# up to LONGEST-fold.
 PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
-# Age at which the reference is replaced [s], by a map that knows at least this share of its cells.
+# Age at which the reference is replaced [s], and least share of its cells that the new one knows.
 AGE_S, KNOWN_SHARE = 5.0, 0.5
-# A pose that jumped at most this long before a map counts as moved with it [s].
+# Longest time from a jump of the pose to the map that has moved with it [s].
 JUMP_S = 6.0
 
 # The motion of a map that has not moved.
@@ -58,8 +58,8 @@ class Agreement:
 
     Attributes:
         known: number of cells known to both.
-        blocked: number of them blocked on the first map, and on the second.
-        both: number of them blocked on both.
+        blocked: number of these blocked on the first map, and on the second.
+        both: number of these blocked on both.
     """
 
     known: int
@@ -68,7 +68,7 @@ class Agreement:
 
     @classmethod
     def of(cls, before: CoverageLattice, after: CoverageLattice, motion: Motion = STILL) -> Self:
-        """Compare two lattices, the first one moved with the map; large ones by a sample."""
+        """Compare two lattices, the first one moved by ``motion``; of large ones, a sample."""
         places = np.flatnonzero(after.states != UNKNOWN)
         stride = 1 + len(places) // MOST_CELLS
         places = places[::stride]
@@ -96,12 +96,12 @@ class Agreement:
 
     @property
     def is_close(self) -> bool:
-        """Whether too few cells differ to say anything."""
+        """Whether too few cells differ for a decision."""
         return self.changed < max(LEAST_CELLS, LEAST_SHARE * self.known)
 
     @property
     def kappa(self) -> float:
-        """Cohen's kappa: 1 for equal maps, 0 for maps as alike as by chance."""
+        """Cohen's kappa: 1 for equal maps, 0 for agreement by chance."""
         if not self.known:
             return 1.0
         first, second = (count / self.known for count in self.blocked)
@@ -111,10 +111,10 @@ class Agreement:
 
 
 class BuildingWatch:
-    """Compares each map with the building before. All times are [s]; lattices of cell centres.
+    """Compares each map with the previous building. Times are [s], lattices of cell centres.
 
     Attributes:
-        why: why the robot has to stand; "" if it need not.
+        why: why the robot has to stand; "" if it may drive.
     """
 
     def __init__(self) -> None:
@@ -122,25 +122,25 @@ class BuildingWatch:
         self._reference: CoverageLattice | None = None
         self._reference_at = 0.0
         self._newest: CoverageLattice | None = None
-        # Since when all maps disagree with the reference, the agreement of the first of them, and
-        # the pose at that time; None while the newest map agrees.
+        # Time of the first map that disagrees with the reference, its agreement, and the pose at
+        # that time; None while the newest map agrees.
         self._foreign: tuple[float, Agreement, Pose2D | None] | None = None
         self._agreed_at = 0.0
         # Whether the newest map shows no floor, so that nothing is decided.
         self._is_blind = False
         # Number of changes of building, and the time of the last one.
         self._changes, self._changed_at = 0, float("-inf")
-        # Until the next pose: the agreement of a map that still shows the previous building with
-        # the reference, and the pose at that time; None for a map that is nearly equal.
+        # Until the next pose: the agreement of a changed map of the same building, and the pose at
+        # that time; None for a map that is nearly equal.
         self._shifted: tuple[Agreement, Pose2D] | None = None
-        # Whether a loop closure was found since ``take_closure``.
+        # Whether a loop closure was found since the last ``take_closure``.
         self._has_closed = False
         # The last jump of the pose, and its time.
         self._jump: tuple[Motion, float] | None = None
 
     @property
     def is_foreign(self) -> bool:
-        """Whether the newest map shows another building, as far as the poses received show."""
+        """Whether the newest map shows another building, judged by the poses received."""
         return self._foreign is not None
 
     def begin_anew(self) -> None:
@@ -150,18 +150,18 @@ class BuildingWatch:
         self._has_closed = self._is_blind = False
 
     def accept(self, now: float) -> None:
-        """Accept the newest map's building as the robot's from now on."""
+        """Accept the newest map's building as the robot's."""
         self._changes = 1 + (self._changes if now - self._changed_at < SOON_S else 0)
         self._changed_at = now
         self._end(now)
         self.why = ""
 
     def note_jump(self, start: Pose2D, end: Pose2D, now: float) -> None:
-        """Note that the pose has jumped: a map that has moved with it may still come."""
+        """Note a jump of the pose: a map that has moved with it may follow."""
         self._jump = Motion(start, end), now
 
     def note_no_floor(self) -> None:
-        """Note a map without floor: it shows no building, and the time with it does not count."""
+        """Note a map without floor: it shows no building, and its time does not count."""
         self._is_blind = True
 
     def note_map(
@@ -171,17 +171,17 @@ class BuildingWatch:
         now: float,
         contradicts: Callable[[], bool],
     ) -> Pose2D | None:
-        """Compare a map with the building before.
+        """Compare a map with the previous building.
 
         Args:
             lattice: cell centres of the map.
-            pose: the robot's, on the map before.
+            pose: the robot's pose on the previous map.
             now: time.
-            contradicts: returns whether the covered cells contradict the map; called if its walls
+            contradicts: returns whether the covered cells contradict the map; called if the walls
                 do not decide.
 
         Returns:
-            The robot's pose on the map before, which differs from ``pose`` if the pose moved first.
+            The robot's pose on the previous map; not ``pose`` if the pose moved before the map.
         """
         self._newest, before = lattice, self._reference
         if self._is_blind and self._foreign is not None:
@@ -241,8 +241,8 @@ class BuildingWatch:
         if for_s >= GRACE_S:
             self.why = (
                 "the map shows another building, or another floor, and the pose has not moved "
-                f"with it: waits until the map has stayed so for {patience_s:g} s, or has shown "
-                f"the one before for {SETTLED_S:g} s"
+                f"with it: waits until maps have shown that for {patience_s:g} s, or the previous "
+                f"building for {SETTLED_S:g} s"
             )
         return for_s >= patience_s
 

@@ -1,7 +1,7 @@
 """Ground: the lattice over the newest map, with and without keep-out zones.
 
-If floor is swept, the lattice is one of stands, see ``grid.floor_map``; if cells are counted, as in
-the published planners, one of cell centres.
+If the mission sweeps floor, the lattice is that of stands (``grid.floor_map``); if it counts cells,
+as the published planners do, the lattice is that of cell centres.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Ground:
         free: the lattice without keep-out zones.
         lattice: the lattice with the cells of keep-out zones removed.
         change: change from the previous ``lattice``; None before there is one.
-        floor: the floor under ``lattice``; None where cells are counted.
+        floor: the floor under ``lattice``; None if cells are counted.
         free_floor: the floor under ``free``.
     """
 
@@ -88,12 +88,12 @@ class Ground:
             self._set_free(None, grid)
 
     def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
-        """Return for which cells of a window the map shows whether the robot fits at the centre.
+        """Return the cells of which the map shows whether the robot fits at the centre.
 
-        In the other cells the stand lies at the border of the known map, and will soon move.
+        Stands of other cells lie at the border of the known map, and will soon move.
 
         Returns:
-            bool (rows, cols); None where cells are counted, or for another window.
+            bool (rows, cols) of the window; None if cells are counted, or the window is another.
         """
         plain = self.plain
         if self.floor is None or plain is None or plain.window != window:
@@ -110,9 +110,9 @@ class Ground:
         return floor.stand_xy(cell)
 
     def places_of(self, cells: NDArray[np.int32]) -> NDArray[np.float64]:
-        """Return the robot's positions for cells (row, col), int32 (n, 2).
+        """Return the robot's positions x, y [m], float64 (n, 2), for cells, int32 (n, 2).
 
-        x, y [m], float64 (n, 2); NaN where it cannot stand.
+        NaN where it cannot stand.
         """
         if self.floor is None:
             assert self.lattice is not None
@@ -120,10 +120,7 @@ class Ground:
         return raster_to_map(self.floor.geometry, self.floor.stands.stands_of(cells))
 
     def _set_free(self, change: LatticeChange | None, grid: OccupancyGrid) -> None:
-        """Take over the changed lattice of cell centres, or the lattice of a new floor.
-
-        If the lattice object is new but its cells are equal, no cell counts as changed.
-        """
+        """Take over the changed lattice of cell centres, or the lattice of a new floor."""
         before, free = self.lattice, self.free_floor
         if free is None:
             assert self.plain is not None

@@ -1,8 +1,7 @@
-"""Places without effect: keep-outs that touch no free ground of the map, home or dock beside it.
+"""Places without effect: keep-outs that touch no free ground, home or dock off the map.
 
-Places in a wrong unit or with a wrong sign have no effect, nor has a mask with a wrong origin. A
-zone of an order would be refused there; these places are kept, as they hold for later maps, too,
-and a map may still grow.
+Wrong units, signs or origins cause them. A zone of an order there is refused; these places are only
+reported, as the map may grow, and as they apply to later maps, too.
 """
 
 from __future__ import annotations
@@ -16,10 +15,10 @@ from fasaco_edge.mission.orders.mask import mask_frame, mask_polygons
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.zones import near_polygons
 
-# Least time between two looks at the same places [s]: a map that grows changes often.
+# Least time between two checks of the same places [s], as a growing map changes often.
 PERIOD_S = 1.0
-# Limit on the pixels of a check, and number of pixels that each polygon counts in addition to its
-# own: some tens of milliseconds in all.
+# Limit on the pixels of a check, which takes some tens of milliseconds; fixed cost of a polygon, in
+# pixels.
 MOST_PIXELS, POLYGON_PIXELS = 1_000_000, 500
 # Limit on the places that are named.
 MOST_NAMED = 5
@@ -31,7 +30,7 @@ class IdlePlaces:
     """Finds places that have no effect on a map; used from one thread.
 
     Args:
-        config: of the mission, with the places in the map frame.
+        config: configuration of the mission, with the places in the map frame.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -50,10 +49,10 @@ class IdlePlaces:
         if mask := policy.keep_out_mask:
             polygons = mask_polygons(mask)
             self._standing += [("keep_out_mask", polygons)] if polygons else []
-            # A mask that comes as a message may be blank for a while.
+            # A mask received as a message may be blank at first.
             if not polygons and not mask_frame(mask):
                 self._blank = "no pixel of mission.keep_out_mask is occupied"
-        # Keep-outs that have been found to have an effect, on maps of a frame.
+        # A frame, and the keep-outs that have had an effect on its maps.
         self._frame, self._used = "", set[_Named]()
         self._key: tuple[object, ...] = ()
         self._looked_at, self._said = float("-inf"), ""
@@ -61,11 +60,11 @@ class IdlePlaces:
     def look(
         self, grid: OccupancyGrid, revision: int, order: OrderState, now: float, *, is_theirs: bool
     ) -> str:
-        """Return which places have no effect, and why; "" if all have.
+        """Return which places have no effect, and why; "" for none.
 
         Args:
             grid: the newest map.
-            revision: counter of its states.
+            revision: revision of the map.
             order: the order, with the operator's keep-outs.
             now: time [s].
             is_theirs: whether the places of the configuration belong to this map.
@@ -86,7 +85,7 @@ class IdlePlaces:
 
     def _texts(self, grid: OccupancyGrid, areas: list[_Named], *, is_theirs: bool) -> Iterator[str]:
         idle, spent = [], 0
-        # Places this near to free pixels have an effect [pixels].
+        # Places up to this distance from free pixels have an effect [pixels].
         reach = 0.5 + self._footprint.robot_radius_m / grid.geometry.resolution
         for area in areas:
             if area in self._used:
@@ -95,7 +94,7 @@ class IdlePlaces:
                 corners = tuple(grid.geometry.to_pixels(x, y) for x, y in polygon)
                 window = _around(corners, reach, grid.geometry)
                 spent += POLYGON_PIXELS + window.rows * window.cols
-                # The remaining places are not checked, and count as used on this map.
+                # Beyond the limit, places are not checked and count as used.
                 if spent > MOST_PIXELS or self._touches_free(corners, reach, window, grid):
                     self._used.add(area)
                     break
@@ -113,14 +112,14 @@ class IdlePlaces:
     def _touches_free(
         self, corners: Polygon, reach: float, window: Window, grid: OccupancyGrid
     ) -> bool:
-        """Return whether a free pixel lies in a polygon, by pixels, or near it."""
+        """Return whether a free pixel lies in or near a polygon, in pixels."""
         values = grid.cells[window.row0 : window.row1, window.col0 : window.col1]
         free = (values >= 0) & (values <= self._footprint.free_at_most)
         return bool(free.any() and (free & near_polygons((corners,), window, 1.0, reach)).any())
 
 
 def _around(corners: Polygon, reach: float, geometry: GridGeometry) -> Window:
-    """Return the window of a map around a polygon and what is near it."""
+    """Return the window of a map within ``reach`` of a polygon [pixels]."""
     x0, y0, x1, y1 = polygon_bounds(corners)
     row0, row1 = _span(y0 - reach, y1 + reach, geometry.rows)
     col0, col1 = _span(x0 - reach, x1 + reach, geometry.cols)

@@ -1,10 +1,10 @@
 """Incoming maps and poses: selection of the active frame, timeouts, and jumps of the pose.
 
-A frame becomes active once a map and a pose have arrived in it; neither decides alone. From then on
-maps and poses in other frames are refused, but the newest map in another frame is kept. If map and
-poses arrive in that frame for ``PATIENCE_S``, and no pose arrives in the active one, that frame
-becomes active. The frame of a ledger from before a restart is active from the start. So a single
-message in a wrong frame changes nothing, whenever it arrives.
+A frame becomes active once both a map and a pose have arrived in it. From then on maps and poses in
+other frames are refused, but the newest map in another frame is kept. That frame becomes active if
+map and poses arrive in it for ``PATIENCE_S``, and no pose arrives in the active one. The frame of a
+ledger from before a restart is active from the start. So a single message in a wrong frame never
+changes the frame.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.drive_meter import SPEED_MARGIN, DrivenPoses
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 
-# Time for which map and poses must arrive in another frame alone before it becomes active [s].
+# Time for which map and poses must arrive only in another frame before it becomes active [s].
 PATIENCE_S = 10.0
 # Longer gaps between poses restart that time [s].
 GAP_S = 3.0
-# A lost robot is searched for as far ahead on its line as it drives in this time [s].
+# Distance ahead on its line in which a lost robot is searched for, as driving time [s].
 LOST_ON_LINE_S = 10.0
-# Poses are too far apart if the track to half of this many last poses is unknown.
+# Poses are too far apart if the track to half of the last LOOKED_BACK poses is unknown.
 LOOKED_BACK = 10
 
 
 class FrameSelector:
-    """Selects the active frame; holds the newest map and pose of two frames at most.
+    """Selects the active frame; holds the newest map and pose of up to two frames.
 
     Attributes:
         active: name of the active frame; "" for none.
@@ -39,12 +39,12 @@ class FrameSelector:
 
     def __init__(self) -> None:
         self.active = ""
-        # Maps and poses by frame, the newest last.
+        # Maps, and poses with their times [s], by frame, the newest last.
         self._maps: dict[str, OccupancyGrid] = {}
         self._poses: dict[str, tuple[StampedPose, float]] = {}
-        # The other frame in which map and poses arrive, and since when.
+        # Another frame in which map and poses arrive, and when that began [s].
         self._rival, self._rival_since = "", 0.0
-        # Whether a reset has left the decision to the next map and pose.
+        # Whether a reset lets the next map and pose select the frame.
         self._is_open = False
 
     def activate(self, frame: str) -> None:
@@ -52,7 +52,7 @@ class FrameSelector:
         self.active = frame
 
     def note_map(self, grid: OccupancyGrid) -> bool:
-        """Note a map; return whether that makes its frame active."""
+        """Note a map; return whether its frame becomes active."""
         self._maps.pop(grid.frame, None)
         self._maps[grid.frame] = grid
         self._limit(self._maps)
@@ -62,10 +62,10 @@ class FrameSelector:
         return True
 
     def note_patches(self, patches: Sequence[MapPatch]) -> tuple[list[MapPatch], list[FasacoError]]:
-        """Apply updates to the map of a frame that is not active.
+        """Apply updates to maps of frames that are not active.
 
         Returns:
-            The updates of the active frame; and the faults of the others.
+            The other updates; and the faults of those applied.
         """
         others = [frame for frame in self._maps if self.active not in ("", frame)]
         faults: list[FasacoError] = []
@@ -78,7 +78,7 @@ class FrameSelector:
         return [patch for patch in patches if patch.frame not in others], faults
 
     def note_pose(self, stamped: StampedPose, now: float) -> bool:
-        """Note a pose at ``now`` [s]; return whether that makes its frame active."""
+        """Note a pose at ``now`` [s]; return whether its frame becomes active."""
         frame = stamped.frame
         _, before = self._poses.pop(frame, (None, float("-inf")))
         self._poses[frame] = stamped, now
@@ -98,7 +98,7 @@ class FrameSelector:
 
     @property
     def is_settled(self) -> bool:
-        """Whether a frame is active, and no reset has left it to the next map and pose."""
+        """Whether a frame is active, and no reset lets the next map and pose select another."""
         return bool(self.active) and not self._is_open
 
     @property
@@ -107,9 +107,10 @@ class FrameSelector:
         return self._is_open or not self.active
 
     def reset(self) -> None:
-        """Let the next map and pose select the frame; the present ones count until then.
+        """Let the next map and pose select the frame.
 
-        A latched map is not repeated, nor is the pose of a standing robot.
+        The present map and pose stay in use until then, as neither a latched map nor the pose of a
+        standing robot is repeated.
         """
         self._rival, self._is_open = "", True
         agreed = [frame for frame in self._poses if frame in self._maps]
@@ -119,7 +120,7 @@ class FrameSelector:
 
     @property
     def newest_map(self) -> OccupancyGrid | None:
-        """The map in the active frame; the newest of all while none is active."""
+        """The map in the active frame; the newest map while no frame is active."""
         if self.active:
             return self._maps.get(self.active)
         return next(reversed(self._maps.values()), None)
@@ -140,12 +141,12 @@ class FrameSelector:
         if not self.active or not others:
             return "no map yet"
         return (
-            f"no map in frame {self.active!r} yet, that of the progress kept: the newest is in "
+            f"no map in frame {self.active!r} yet, in which progress is kept: the newest is in "
             f"{others[-1]!r}{self._outlook(others[-1])}"
         )
 
     def why_no_pose(self, map_frame: str) -> str:
-        """Return why there is no pose, or no current one, in the frame of the map."""
+        """Return why there is no current pose in the frame of the map."""
         frame = self.last_pose_frame
         if frame in ("", map_frame):
             return "no pose yet"
@@ -155,8 +156,8 @@ class FrameSelector:
         if frame != self._rival:
             return ""
         return (
-            f"; that frame counts once map and poses have come in it for {PATIENCE_S:g} s and no "
-            f"pose in {self.active!r}, or at a reset"
+            "; that frame is used once map and poses have arrived only in it for "
+            f"{PATIENCE_S:g} s, or after a reset"
         )
 
     def _limit(self, held: dict[str, OccupancyGrid] | dict[str, tuple[StampedPose, float]]) -> None:
@@ -171,16 +172,16 @@ class InputMonitor:
     """Timeouts of maps and poses, and jumps between poses. All times are [s].
 
     Attributes:
-        doubt: why the robot may be off its path; "" for none. It is cleared when a plan from the
-            new position arrives, or the robot is on its path after all.
+        doubt: why the robot may be off its path; "" for none. Cleared when a plan from the new
+            position arrives, or the robot is found on its path.
         doubt_since: start of the doubt.
         farthest_m: longest possible drive between the last two poses, by their stamps and the
-            robot's speed; 0 if not known [m].
-        on_line_m: the same also where the track between them is unknown: how far ahead on its line
-            the robot may be.
-        pose_at, map_at: when the last pose, and the last map or update, came; before that, when
-            they began to be due; None before that.
-        driven: selects the poses used for swept floor.
+            robot's speed; 0 if unknown [m].
+        on_line_m: longest possible drive along the line, also if the track between the two poses is
+            unknown [m].
+        pose_at, map_at: time of the last pose, and of the last map or update; before the first one,
+            the time from which it is due; None before that time.
+        driven: selects the poses that count for swept floor.
     """
 
     def __init__(self, config: MissionConfig) -> None:
@@ -188,7 +189,7 @@ class InputMonitor:
         self.doubt_since = self.farthest_m = self.on_line_m = 0.0
         self.driven = DrivenPoses(config.speed_m_s, config.footprint.cell_m)
         self._config = config
-        # Whether the track to each of the newest poses is unknown.
+        # For each of the newest poses: whether the track to it is unknown.
         self._gaps: deque[bool] = deque(maxlen=LOOKED_BACK)
         self._pose: StampedPose | None = None
         # Whether a pose has arrived, in any frame.
@@ -199,12 +200,12 @@ class InputMonitor:
         self._answered_by = -1
 
     def begin(self, now: float) -> None:
-        """Note that map and pose are due from ``now`` on, unless they have come."""
+        """Note that map and pose are due from ``now`` on, unless they have arrived."""
         self.pose_at = now if self.pose_at is None else self.pose_at
         self.map_at = now if self.map_at is None else self.map_at
 
     def succeed(self, before: InputMonitor) -> None:
-        """Go on with the times of another monitor."""
+        """Take over the times of another monitor."""
         self._has_pose, self.pose_at = before._has_pose, before.pose_at
         self.map_at = before.map_at
 
@@ -226,8 +227,8 @@ class InputMonitor:
         gap_s = min((stamped.stamp_ns - last.stamp_ns) * 1e-9, LOST_ON_LINE_S)
         self.on_line_m = SPEED_MARGIN * self._config.speed_m_s * max(gap_s, 0.0)
         distance = math.hypot(pose.x - last.pose.x, pose.y - last.pose.y)
-        # Consecutive poses may be some cells apart, or as far as the robot can have driven; after a
-        # timeout half a cell is a gap.
+        # Consecutive poses may be some cells apart, or as far as the robot can have driven; after
+        # a timeout, half a cell.
         most_m = (0.5 if lost else JUMP_CELLS) * self._config.footprint.cell_m
         jumped = distance > max(most_m, self.farthest_m)
         if jumped:
@@ -240,11 +241,11 @@ class InputMonitor:
 
     @property
     def are_poses_far_apart(self) -> bool:
-        """Whether most of the drive lies between poses, and does not count."""
+        """Whether most of the track is unknown, so that driving does not count."""
         return 2 * sum(self._gaps) >= LOOKED_BACK
 
     def forget_pose(self, now: float) -> None:
-        """Forget the last pose: the next one is in another frame, and due from now on."""
+        """Forget the last pose: the next pose, due from now on, is in another frame."""
         self._pose, self.pose_at, self.doubt = None, now, ""
         self.driven.break_track()
 

@@ -1,13 +1,12 @@
 """Loop closures: SLAM corrects the whole map, and moves map and pose at once.
 
-The ledger's cells are places in the map frame. After such a jump it is unknown which of them the
-tool passed over, only that the map was somewhere between its old position and the new one. Only
-cells that were covered under every possible intermediate map position still count.
+The ledger's cells are places in the map frame. When the map has moved, its true position while the
+tool swept them is unknown: somewhere between the old and the new one. So only cells that are
+covered for every intermediate position still count.
 
 Small shifts are found by walls alone. A loop closure that moves the map by less than a cell changes
-too few cells to count as a motion (``loop_closure.has_moved``), and is smaller than the steps
-between poses of a driving robot. The walls show it: pixels at the border of occupied and free lie
-in the previous walls once they are moved back.
+too few cells for ``has_moved``, and is smaller than the steps between poses of a driving robot. The
+walls show it: once moved back, wall pixels beside free ones lie in the previous walls.
 """
 
 from __future__ import annotations
@@ -45,20 +44,20 @@ from fasaco_edge.mission.coverage.floor_tiles import (
 )
 from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 
-# Threshold on the cells that change between free and blocked with one map: number, and share of
-# those known before. Doors and passers-by change fewer.
+# Least number of cells, and least share of the known cells, that change between free and blocked if
+# the map has moved. Doors and passers-by change fewer.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
-# A map with fewer drivable cells shows no floor: it gives no evidence of walls, or of the building.
+# Least number of coverable cells on a map that shows floor, and so gives evidence of walls.
 LEAST_FLOOR = LEAST_CELLS
 # Smaller motions are ignored: [m], [rad].
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
-# A point this close to a row, or column, of cell centres [cells] needs only that one covered, not
-# its neighbours on both sides.
+# A point within this distance of a row (or column) of cell centres [cells] needs only that row
+# covered, else the rows on both sides.
 NEAR = 0.1
 # Intermediate map positions that are tested, as shares of the motion.
 BETWEEN = (0.25, 0.5, 0.75, 1.0)
-# For swept floor one position per pixel of the motion is tested, up to this many: motions of more
-# than 0.4 m, which are rare, are tested more coarsely.
+# Most positions tested for swept floor, one per pixel of the motion: motions of more than 0.4 m,
+# which are rare, are tested more coarsely.
 MOST_BETWEEN = 16
 
 
@@ -68,29 +67,31 @@ def shows_floor(lattice: CoverageLattice) -> bool:
 
 
 def has_moved(change: LatticeChange) -> bool:
-    """Return whether a map shows most walls at other places."""
+    """Return whether a map shows many walls at other places."""
     if change.before is None or len(change.cells) < LEAST_CELLS:
         return False
-    then, now = (
-        lattice.window.values_at(lattice.states, change.cells, UNKNOWN)
-        for lattice in (change.before, change.after)
-    )
+    then, now = _states(change.before, change), _states(change.after, change)
     changed = int(np.count_nonzero((then != UNKNOWN) & (now != UNKNOWN) & (then != now)))
-    # The whole lattice is counted only if necessary: this runs with every map.
+    # Counts the whole lattice only if necessary, as this runs with every map.
     return changed >= LEAST_CELLS and changed >= LEAST_SHARE * int(
         np.count_nonzero(change.before.states != UNKNOWN)
     )
 
 
+def _states(lattice: CoverageLattice, change: LatticeChange) -> NDArray[np.uint8]:
+    """Return the states of the changed cells on a lattice, uint8 (n,)."""
+    return lattice.window.values_at(lattice.states, change.cells, UNKNOWN)
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A rigid motion of the map, by the robot's pose before (``start``) and after (``end``)."""
+    """A rigid motion of the map, given by the robot's poses before and after it."""
 
     start: Pose2D
     end: Pose2D
 
     def undone(self, share: float) -> Similarity:
-        """Return the placement of swept pixels before a share of the motion."""
+        """Return the transform of swept pixels that undoes a share of the motion."""
         x, y = self.back(share, np.zeros(1), np.zeros(1))
         turn = -share * math.remainder(self.end.yaw - self.start.yaw, math.tau)
         return Similarity(
@@ -114,7 +115,7 @@ class Motion:
     def back(
         self, share: float, x: NDArray[np.float64], y: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return points [m] before a share of the motion."""
+        """Return points [m] with a share of the motion undone."""
         start, end = self.start, self.end
         turn = -share * math.remainder(end.yaw - start.yaw, math.tau)
         dx = x - start.x - share * (end.x - start.x)
@@ -124,10 +125,10 @@ class Motion:
 
 
 def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDArray[np.int32]:
-    """Return the centres of a path's cells, int32 (n, 2), after the motion, int32 (m, 2).
+    """Return a path's cells, int32 (n, 2), after the motion, int32 (m, 2).
 
-    Successive centres in the same cell count once; after a rotation, successive cells may touch
-    only at a corner.
+    Cells are moved by their centres; successive centres in one cell give one cell. After a rotation
+    successive cells may touch only at a corner.
     """
     y, x = ((cells.astype(np.float64) + 0.5) * cell_m).T
     x, y = motion.forward(x, y)
@@ -140,10 +141,10 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
 def moved_mask(
     window: Window, mask: NDArray[np.bool_], motion: Motion, cell_m: float, scale: float = 1.0
 ) -> tuple[Window, NDArray[np.bool_]] | None:
-    """Return which cells have their centre on a marked cell after a motion, with their window.
+    """Return the cells whose centre lies on a marked cell after a motion, with their window.
 
-    None if the window is too large. ``mask``: bool (rows, cols) of a window before, of cells of
-    ``cell_m``; those after it are ``scale`` times as wide.
+    ``mask``: bool (rows, cols) of ``window``, of cells of ``cell_m``. The cells returned are
+    ``scale`` times as wide. None if their window is too large.
     """
     rows, cols, new_m = (window.row0, window.row1), (window.col0, window.col1), cell_m * scale
     y, x = np.array(list(product(rows, cols))).T * cell_m
@@ -164,14 +165,14 @@ def moved_mask(
 def uncertain_cells(
     before: LedgerSnapshot, motion: Motion
 ) -> Callable[[Cells, Cells], NDArray[np.bool_]]:
-    """Return a mask function of rows and columns: cells perhaps not covered, bool (n,)."""
+    """Return a mask function: rows and columns to cells perhaps not covered, bool (n,)."""
 
     def inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
         x, y = ((each.astype(np.float64) + 0.5) * before.cell_m for each in (cols, rows))
         doubt = np.zeros(rows.shape, bool)
         for share in BETWEEN:
             doubt |= ~_covered(before, *motion.back(share, x, y))
-        # A round tool in the centre of each cell may have missed points far from a centre.
+        # The tool is a disc: at a cell's centre it misses the cell's corners.
         x, y = motion.back(1.0, x, y)
         row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
         between: NDArray[np.bool_] = np.hypot(row - np.rint(row), col - np.rint(col)) >= 0.5
@@ -183,7 +184,7 @@ def uncertain_cells(
 def certain_floor(
     before: FloorSnapshot, motion: Motion
 ) -> Callable[[Tiles], list[tuple[Place, Bits]]]:
-    """Return a function that returns the pixels certainly swept, for tiles with uncertain ones."""
+    """Return a function that returns the tiles with uncertain pixels, without these pixels."""
     known = _stacked(before.tiles)
 
     def left_of(tiles: Tiles) -> list[tuple[Place, Bits]]:
@@ -197,7 +198,7 @@ def certain_floor(
             between[count - 1, :count] = places
         left = kernels.certain_floor(known, asked, Whereabouts(between, counts))
         is_less = (left != asked.bits).any(axis=(1, 2))
-        # Copies: a view would keep all of them in memory.
+        # Copies, as a view would keep the whole array in memory.
         return [
             ((row, col), bits.copy())
             for (row, col), bits in zip(asked.places[is_less].tolist(), left[is_less], strict=True)
@@ -227,7 +228,7 @@ def _places_between(tiles: NDArray[np.int64], motion: Motion) -> NDArray[np.int6
 def _covered(
     before: LedgerSnapshot, x: NDArray[np.float64], y: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Return for points [m] whether all cells around them were covered."""
+    """Return whether all cells around points [m] were covered, bool (n,)."""
     row, col = y / before.cell_m - 0.5, x / before.cell_m - 0.5
     low_row, high_row = np.floor(row + NEAR).astype(int), np.ceil(row - NEAR).astype(int)
     low_col, high_col = np.floor(col + NEAR).astype(int), np.ceil(col - NEAR).astype(int)
@@ -241,13 +242,15 @@ def _covered(
     return covered
 
 
-# Maps that close fewer cells are not compared: nothing is lost by them.
+# Fewest cells that a shift of the map closes; maps that close fewer are not compared.
 LEAST_CLOSED = 3
 # Largest shift along each axis [pixels], and number of pixels compared.
 FARTHEST_PX, MOST_PIXELS = 4, 2000
-# Least share of these pixels that a shift moves into the previous walls; least gain over no shift.
+# Least share of these pixels that a shift moves into the previous walls, and least gain in this
+# share over no shift.
 LEAST_ALIKE, BETTER = 0.5, 0.2
-# Of shifts that differ by less, the smallest is taken: along a corridor all are alike.
+# Of shifts whose shares differ by less, the smallest is taken, as shifts along a corridor are
+# alike.
 ALIKE = 0.03
 
 
@@ -255,11 +258,8 @@ def closes_cells(change: LatticeChange | None) -> bool:
     """Return whether a change of the lattice closes cells, as a shift of the map does."""
     if change is None or change.before is None:
         return False
-    then, now = (
-        lattice.window.values_at(lattice.states, change.cells, UNKNOWN)
-        for lattice in (change.before, change.after)
-    )
-    closed = (then == COVERABLE) & (now == BLOCKED)
+    was_open = _states(change.before, change) == COVERABLE
+    closed = was_open & (_states(change.after, change) == BLOCKED)
     return bool(np.count_nonzero(closed) >= LEAST_CLOSED)
 
 
@@ -290,6 +290,6 @@ def small_shift(before: OccupancyGrid, after: OccupancyGrid, footprint: Footprin
 
 
 def _wall_faces(cells: NDArray[np.int8], footprint: Footprint) -> NDArray[np.bool_]:
-    """Return which pixels are occupied and beside a free one, bool (rows, cols)."""
+    """Return which occupied pixels lie beside a free pixel, bool (rows, cols)."""
     free = (cells >= 0) & (cells <= footprint.free_at_most)
     return beside(free) & (cells >= footprint.occupied_at_least)

@@ -40,12 +40,12 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder
 
-# A robot this close to its dock's pose is in the dock [m].
+# Distance from the dock's pose up to which a robot is in the dock [m].
 IN_DOCK_M = 0.5
 
 
 class MapState(Ground):
-    """Takes in maps and poses; the lattice and the floor are those of the newest map.
+    """Takes in maps and poses; lattice and floor show the newest map.
 
     Attributes:
         grid: the newest map, with all updates and obstacles; None before there is one.
@@ -54,12 +54,12 @@ class MapState(Ground):
         map_revision: counter of map states: full maps, batches of updates, changes of frame; 0
             before the first.
         pose: the newest pose in the map's frame; before the first map, in any frame.
-        has_moved: whether the newest map shows the walls at other places: a loop closure.
+        has_moved: whether the newest map shows walls at other places, after a loop closure.
         shift: a small shift of the newest map against the previous one; None for none.
         shows_floor: whether the newest map shows floor; else it gives no evidence of walls.
         area: the reachable area as of the last ``update_area``; None while the robot's pose is on
             no coverable cell.
-        frames: selects the active frame; keeps the inputs of another.
+        frames: selects the active frame; keeps inputs in another frame.
         building: whether the newest map still shows the same building.
         places: the places of the configuration.
         path_cell: the robot's cell by its place on the line; None off the line.
@@ -75,19 +75,19 @@ class MapState(Ground):
         self.area: ReachableArea | None = None
         self.has_moved = self.shows_floor = False
         self.shift: Motion | None = None
-        # The newest lattice of cell centres of a map that shows floor.
+        # The cell centres of the newest map that shows floor.
         self._shown: CoverageLattice | None = None
         self.frames = FrameSelector()
         self.building = BuildingWatch()
         self.places = StandingPlaces(config.policy, config.given or config.policy)
         self.path_cell: Cell | None = None
         self._patches_lost = False
-        # Why the newest map was refused; "" if it was not.
+        # Why the newest map was refused; "" if it was taken in.
         self._refused = ""
         self._free_area = FreeArea(config.footprint.free_at_most)
 
     def take_map(self, grid: OccupancyGrid) -> bool:
-        """Take in a full map; return whether that makes its frame active.
+        """Take in a full map; return whether its frame becomes active.
 
         Raises:
             WrongFrame: another frame is active.
@@ -96,7 +96,7 @@ class MapState(Ground):
         """
         is_active_now = False
         if self.frames.active not in ("", grid.frame):
-            # The map may be needed later, if its size is acceptable.
+            # Its frame may become active later, so it is kept unless too large.
             lattice_window(
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
@@ -146,15 +146,15 @@ class MapState(Ground):
         raise PatchWithoutBase(f"{count} map updates were lost")
 
     def draw_obstacles(self) -> None:
-        """Draw the newest map again: the closed floor on it has changed."""
+        """Draw the newest map again, as its obstacles have changed."""
         if self.given is not None:
             self._take_map(self.given)
-            self.has_moved = False  # closed floor does not move walls
+            self.has_moved = False  # obstacles move no walls
 
     def without_obstacles(self, lattice: CoverageLattice) -> CoverageLattice:
-        """Return a lattice over the newest map on which cells near obstacles are unknown.
+        """Return a lattice over the newest map, with the cells near obstacles unknown.
 
-        It shows only the building, without robots that stand in it.
+        So it shows the building without robots that stand in it.
         """
         if self.grid is None or self.given is None or self.grid is self.given:
             return lattice
@@ -192,7 +192,7 @@ class MapState(Ground):
             self.pose = self.frames.pose_in(grid.frame)
 
     def _compare(self, change: LatticeChange) -> None:
-        """Find whether the newest map shows floor, and has moved since the last one that did."""
+        """Find whether the newest map shows floor, and moved since the last map with floor."""
         assert self.free is not None
         self.has_moved, self.shows_floor = False, shows_floor(self.free)
         if not self.shows_floor:
@@ -202,7 +202,7 @@ class MapState(Ground):
         self.has_moved, self._shown = has_moved(change), change.after
 
     def watch_on(self, building: BuildingWatch) -> None:
-        """Compare maps with the building of another mission on the same cells."""
+        """Take over the building watch of another mission on the same cells."""
         self.building = building
 
     def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
@@ -232,7 +232,7 @@ class MapState(Ground):
             return
         change = self.change
         if before is not None and before.lattice is self.lattice and before.contains(cell):
-            self.area = before  # as with every pose: steps lead there and back
+            self.area = before  # as with most poses: steps can be driven both ways
         elif before is None or change is None or change.after is not self.lattice:
             self.area = ReachableArea.around(self.lattice, cell)
         else:
@@ -247,21 +247,21 @@ class MapState(Ground):
         lattice, cell = self.lattice, self.path_cell
         if lattice is None or self.pose is None:
             return None
-        # A polished line runs beside its cells.
+        # A polished line does not pass through its cells.
         if cell is not None and lattice.is_coverable(cell):
             return cell
         pose, dock = self.pose.pose, self.places.dock
         own = anchor_cell(lattice, pose)
         if own is not None or dock is None:
             return own
-        # No path may lead to the dock itself: paths start in front of it.
+        # Paths start in front of the dock, as no path leads into it.
         is_docked = math.hypot(pose.x - dock.x_m, pose.y - dock.y_m) <= IN_DOCK_M
         return anchor_cell(lattice, dock.stand) if is_docked else None
 
     def cell_at_pose(self) -> Cell | None:
         """Return the coverable cell at the robot's pose; ``robot_cell`` if there is none.
 
-        A polished line takes short cuts: the cell of its path may be metres from the robot.
+        On a polished line, which takes short cuts, ``robot_cell`` may be metres from the robot.
         """
         if self.lattice is None or self.pose is None:
             return None
@@ -279,17 +279,17 @@ class MapState(Ground):
         return f"{why}: the last one was refused: {self._refused}" if self._refused else why
 
     def why_no_pose(self) -> str:
-        """Return why there is no pose, or no current one."""
+        """Return why there is no current pose."""
         return self.frames.why_no_pose(self.grid.frame) if self.grid is not None else "no pose yet"
 
     def why_other_frame(self) -> str:
-        """Return a suffix saying that poses arrive in another frame than the map; "" if not."""
+        """Return the end of a text on poses in another frame than the map's; "" for none."""
         other = self.grid is not None and self.frames.last_pose_frame not in ("", self.grid.frame)
         return f"; {self.why_no_pose()}" if other else ""
 
     @property
     def is_kept_out(self) -> bool:
-        """Whether the robot fits at its place, apart from a keep-out zone."""
+        """Whether a keep-out zone alone makes the robot's cell unusable."""
         if self.lattice is None or self.free is None or self.pose is None:
             return False
         cell = self.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
@@ -315,12 +315,10 @@ class MapState(Ground):
         return f"robot is in an occupied cell, or too close to one: {waits}"
 
     def check_zones(self, order: MissionOrder) -> None:
-        """Check that part of each zone lies on the map; without a map nothing is checked.
-
-        Zones, and the error, are in the map frame.
+        """Check that part of each zone lies on the map, if there is one; in the map frame.
 
         Raises:
-            OrderError: a zone lies outside.
+            OrderError: a zone lies off the map.
         """
         if self.grid is None:
             return
@@ -337,7 +335,7 @@ class MapState(Ground):
     def coverage(self, ledger: MissionLedger, known: NDArray[np.bool_]) -> Coverage | None:
         """Return the counts of coverage; None before there is a map.
 
-        ``known``: bool (rows, cols), the cells that are reachable or have been.
+        ``known``: bool (rows, cols), the cells that are reachable or were before.
         """
         if self.lattice is None or self.grid is None:
             return None

@@ -1,8 +1,8 @@
-"""Obstacles that the map does not show: a follower reports them, their floor closes for a while.
+"""Obstacles missing on the map: a follower reports them, and their floor is closed for some time.
 
-People walk away and doors open, so such floor is tried again: after 20 s, and after twice as long
-each time an obstacle is reported there again. Until then it is occupied on the mission's map, so
-plans keep the same clearance from it as from walls. The robot's own place stays free.
+Closed floor is occupied on the mission's map, so plans keep the same clearance from it as from
+walls; the robot's own place stays free. As people walk away and doors open, the floor is opened
+after 20 s, and after twice as long each time an obstacle is reported there again.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 
 # Time for which floor is closed [s], doubled each time it is closed again, up to a limit.
 CLOSED_S, MOST_CLOSED_S = 20.0, 320.0
-# Distance within which obstacles count as the same [m]; time after which one is forgotten [s].
+# Distance up to which two reports mean the same obstacle [m]; time from the opening of its floor
+# until it is forgotten [s].
 SAME_M, FORGET_S = 0.5, 600.0
-# A follower that still stands there after this time [s] cannot drive the new path either: the floor
-# is closed wider by this much each time [m], up to this number of times.
-AGAIN_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
-# Assumed depth of an obstacle away from the robot, spacing of its points, the follower's clearance
-# from it, and width around the robot's disc that stays free [m].
+# A follower that still reports the obstacle after WIDEN_AFTER_S [s] cannot drive the new path
+# either: the floor is closed wider by WIDER_M [m], up to MOST_WIDER times.
+WIDEN_AFTER_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
+# Assumed depth of an obstacle, away from the robot; spacing of its points; the follower's clearance
+# from it; width of the ring around the robot's disc that stays free [m].
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
-# Largest map on which they are drawn [pixels]: it is kept twice then, see ``daemon.memory``.
+# Largest map on which obstacles are drawn [pixels], as it is then kept twice (``daemon.memory``).
 MOST_PIXELS = 6_000_000
-# Limit on the obstacles that are kept, the newest; and on the points of each.
+# Limit on the obstacles kept, which are the newest; and on the points of each.
 MOST, MOST_POINTS = 32, 192
 
 
@@ -39,10 +40,10 @@ class _Obstacle:
 
     Attributes:
         points: points seen of it, the nearest first [m].
-        here: where the robot was [m].
-        at, until: begin and end of the time for which its floor is closed [s].
-        times: how often it was closed, opened in between.
-        wider: how often it was closed wider.
+        here: the robot's position at that time [m].
+        at, until: times at which its floor is closed and opened [s].
+        times: number of separate times that its floor was closed.
+        wider: number of times that the closed floor was widened.
     """
 
     points: tuple[Point, ...]
@@ -57,7 +58,7 @@ class Obstacles:
     """Keeps obstacles, and draws them on maps.
 
     Args:
-        radius_m: of the robot's disc [m].
+        radius_m: radius of the robot's disc [m].
     """
 
     def __init__(self, radius_m: float) -> None:
@@ -71,17 +72,17 @@ class Obstacles:
         return len(self._closed)
 
     def close(self, points: Sequence[Point], here: Point, now: float) -> bool:
-        """Close the floor at some points; return whether that changes anything.
+        """Close the floor at some points; return whether closed floor has changed.
 
         Args:
             points: points seen, the nearest first [m].
-            here: where the robot is [m].
+            here: the robot's position [m].
             now: the time [s].
         """
         if not points:
             return False
         same = [one for one in self._closed if _is_same(one, points[0])]
-        if any(now - one.at < AGAIN_S for one in same):
+        if any(now - one.at < WIDEN_AFTER_S for one in same):
             return False
         past = [one for one in self._past if _is_same(one, points[0])]
         times = max([1, *(one.times for one in same), *(one.times + 1 for one in past)])
@@ -95,7 +96,7 @@ class Obstacles:
         return True
 
     def open_due(self, now: float) -> bool:
-        """Open the floor that was closed for long enough; return whether there was any."""
+        """Open the floor whose time is up; return whether there was any."""
         self._past = [one for one in self._past if now - one.until < FORGET_S][-MOST:]
         due = [one for one in self._closed if now >= one.until]
         if due:
@@ -104,7 +105,7 @@ class Obstacles:
         return bool(due)
 
     def on(self, grid: OccupancyGrid) -> OccupancyGrid:
-        """Return a map with the obstacles on it; the same without any, or if it is too large."""
+        """Return a map with the obstacles drawn; unchanged without any, or if it is too large."""
         if not self._closed or grid.cells.size > MOST_PIXELS:
             return grid
         cells = grid.cells.copy()

@@ -15,8 +15,8 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, update_reach
 
-# If the robot's own cell is not coverable (a small offset, a noisy scan), the nearest coverable
-# cell within this distance is taken.
+# Distance within which the nearest coverable cell is taken if the robot's own cell is not
+# coverable, as by a small offset or a noisy scan [cells].
 ANCHOR_CELLS = 1.5
 
 # Bit of a step in a step mask, by index 3 * rows + columns + 4.
@@ -24,15 +24,15 @@ _BIT_OF_MOVE = np.zeros(9, np.uint8)
 for _direction, (_row, _col) in enumerate(zip(ROW_STEP, COL_STEP, strict=True)):
     _BIT_OF_MOVE[3 * _row + _col + 4] = 1 << _direction
 
-# Above this changed share of the lattice, a full search is as fast.
+# Share of changed cells above which a full search is as fast.
 LOCAL_SHARE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class AreaChange:
-    """Counts of reachable cells that were gained, lost, or have other steps than before.
+    """Counts of reachable cells gained, lost, or with other steps than before.
 
-    ``window`` is the smallest window around all of them; None for none.
+    ``window``: the smallest window around all of them; None for none.
     """
 
     gained: int
@@ -70,7 +70,7 @@ class ReachableArea:
     def updated(self, change: LatticeChange, cell: Cell) -> ReachableArea:
         """Return the area that is reachable from ``cell`` after a change of the lattice.
 
-        Equals ``around``, incrementally where possible.
+        Equals ``around``, but is computed incrementally where possible.
         """
         lattice = change.after
         if lattice is self.lattice and self.contains(cell):
@@ -95,7 +95,7 @@ class ReachableArea:
     def change_since(self, before: ReachableArea) -> AreaChange:
         """Compare with the previous area; cells outside an array are not reachable."""
         if before is self:
-            return AreaChange(0, 0, 0)  # as after each jump of a pose
+            return AreaChange(0, 0, 0)
         mine, theirs = self.lattice.window, before.lattice.window
         common = mine.intersection(theirs)
         total, total_before = np.count_nonzero(self.reachable), np.count_nonzero(before.reachable)
@@ -114,7 +114,7 @@ class ReachableArea:
         )
         if not change:
             return change
-        # Reachable in exactly one of the two, even if only one of them has cells there.
+        # Cells reachable in one of the two only, even outside the other's window.
         came, went = self.reachable.copy(), before.reachable.copy()
         came[here] &= ~then
         went[there] &= ~now
@@ -122,17 +122,13 @@ class ReachableArea:
         return replace(change, window=window)
 
     def drivable_prefix(self, cells: NDArray[np.int32]) -> int:
-        """Return how many leading cells of a path, int32 (n, 2), can be driven.
-
-        0 if the first is not coverable.
-        """
+        """Return how many leading cells of a path, int32 (n, 2), can be driven; 0 for none."""
         if not len(cells):
             return 0
         lattice = self.lattice
         if not lattice.is_coverable((int(cells[0, 0]), int(cells[0, 1]))):
             return 0
         allowed = lattice.window.values_at(lattice.steps, cells[:-1], 0)
-        # Column by column: this runs over tens of thousands of cells.
         row_moves, col_moves = np.diff(cells[:, 0]), np.diff(cells[:, 1])
         is_step = np.abs(row_moves) + np.abs(col_moves) == 1
         allowed &= _BIT_OF_MOVE.take(3 * row_moves + col_moves + 4, mode="clip")
@@ -156,7 +152,7 @@ def _around(marked: NDArray[np.bool_], window: Window) -> Window | None:
 
 
 def anchor_cell(lattice: CoverageLattice, pose: Pose2D) -> Cell | None:
-    """Return the coverable cell at ``pose``, or the nearest one beside it; else None."""
+    """Return the coverable cell at ``pose``, or the nearest beside it; None for none."""
     row, col = lattice.cell_at(pose.x, pose.y)
     best, best_distance = None, ANCHOR_CELLS * lattice.cell_m
     for cell in ((row + i, col + j) for i in (0, -1, 1) for j in (0, -1, 1)):

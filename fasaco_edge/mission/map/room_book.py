@@ -1,9 +1,9 @@
-"""Room book: the only owner of rooms: their numbers, names, settings, and where they are.
+"""Room book: the only owner of rooms, with their numbers, names, settings and squares.
 
-The rooms of one building in one map frame are a sheet; the sheet in use is the one that the newest
-map shows. A number is never given to a second room, on any sheet. The map changes rooms by
-``room_matching``, people by ``room_edits`` and the methods here. Needs no kernels, so that commands
-are accepted before there is a map.
+A sheet holds the rooms of one building in one map frame; the newest map shows the building of the
+sheet in use. Over all sheets no two rooms get the same number. Maps change rooms through
+``room_matching``, people through ``room_edits`` and the methods here. The module needs no kernels,
+so that commands are accepted before there is a map.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ if TYPE_CHECKING:
 
 # Limits of one sheet; a number needs 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
-# Least area of a room, and of a part that is more than the border moving to and fro [m2].
+# Least area of a room, and of a change that is more than noise of its border [m2].
 LEAST_M2 = 1.0
-# Titles of rooms in a text are cut after so many characters.
+# Most characters of a list of rooms in a text.
 MOST_LISTED = 400
 # Sheets that are kept: floors and buildings.
 MOST_SHEETS = 8
 
 BY_NUMBER = re.compile(r"room (\d{1,5})")
-# Names that read as a number, which would be taken for that of a room.
+# Names that would be taken for a room's number.
 LIKE_NUMBER = re.compile(r"(room )?\d+")
 
 
 @dataclass(frozen=True, slots=True)
 class RoomSettings:
-    """What an order by a room's name does where it says nothing itself.
+    """Settings of a room: defaults for orders that name it.
 
     Attributes:
-        passes: number of passes; None for as many as other zones have.
-        kinds: what is special about each; () if nothing is.
+        passes: number of passes; None for the order's.
+        kinds: settings of each pass; () if all are usual.
         skip: whether orders for everything leave the room out.
-        priority: where time or battery do not allow all, higher ones come first; 0 to 100.
+        priority: 0 to 100; higher ones come first if time or battery do not allow all.
     """
 
     passes: int | None = None
@@ -64,12 +64,12 @@ class Room:
     Attributes:
         id: its number, from 1.
         name: given by people; "" for none.
-        is_by_hand: whether people have split or merged it: then no map splits or merges it.
-        settings: what orders do in it.
+        is_by_hand: whether people have split or merged it, so that no map does.
+        settings: defaults for orders.
         outline: corners (x, y) [m] in the map frame, without holes.
         area_m2: area of its squares [m2].
         neighbours: numbers of the rooms it is joined to, ascending.
-        encloses: numbers of the rooms that lie within its outline, as those in a ring of corridors.
+        encloses: numbers of the rooms within its outline, as inside a ring of corridors.
     """
 
     id: int
@@ -83,7 +83,7 @@ class Room:
 
     @property
     def is_kept(self) -> bool:
-        """Whether no map may take it away, or join it with another that is kept."""
+        """Whether no map may remove it, or join it with another kept room."""
         return bool(self.name) or self.is_by_hand or self.settings != USUAL
 
     @property
@@ -98,16 +98,16 @@ class RoomSheet:
 
     Attributes:
         frame: frame of its map.
-        raster: which squares belong to which room.
+        raster: squares of the rooms.
         rooms: by their numbers.
         cuts: segments that people have split rooms along [m].
-        gone: squares of rooms that have joined others by themselves, to get their numbers back.
+        gone: squares of rooms that maps have joined to others; if one reappears, it gets its number
+            back.
         regions: scores of the regions that are no rooms yet, by their numbers in ``pending``.
         pending: squares of these regions.
-        settled: the squares of rooms some updates ago: what one map adds decides nothing.
-        changes: scores of rooms that may join another, and of parts that may change their room, as
-            (what, room, other room). A score counts the updates that have shown a change; one that
-            does not show it counts twice against it.
+        settled: the squares of rooms some updates ago, without what the newest maps have added.
+        changes: scores of possible changes (what, room, other room): a room that may join another,
+            or a part of it that may. Each update that shows a change adds 1, others subtract 2.
     """
 
     frame: str
@@ -119,9 +119,9 @@ class RoomSheet:
     cuts: list[Cut] = field(default_factory=list)
     regions: dict[int, int] = field(default_factory=dict)
     changes: dict[tuple[str, int, int], int] = field(default_factory=dict)
-    # How many squares of each room have changed since its outline was drawn.
+    # Number of squares of each room that have changed since its outline was drawn.
     stale: dict[int, int] = field(default_factory=dict, init=False)
-    # The squares since ``settled``, and how many updates there were in all.
+    # The next ``settled``, and the number of updates so far.
     _between: RoomRaster | None = field(default=None, init=False)
     _updates: int = field(default=0, init=False)
 
@@ -134,7 +134,7 @@ class RoomSheet:
     def lay(
         self, raster: RoomRaster, gone: RoomRaster | None = None, pending: RoomRaster | None = None
     ) -> None:
-        """Replace the squares of the rooms, of those that are gone, and of pending regions."""
+        """Replace the squares of rooms, of rooms gone, and of pending regions."""
         self.raster, self.gone = raster, gone or self.gone
         self.pending = pending or self.pending
 
@@ -143,13 +143,13 @@ class RoomSheet:
         self.regions, self.pending = regions, pending
 
     def settle(self, period: int) -> None:
-        """Note the squares before an update: they are settled after ``period`` to twice as many."""
+        """Note the squares before an update: they settle after 1 to 2 times ``period`` updates."""
         if self._updates % period == 0:
             self.settled, self._between = self._between or self.raster, self.raster
         self._updates += 1
 
     def fix(self) -> None:
-        """Take the squares for settled: people have seen them so."""
+        """Take the present squares as settled, as people rely on them."""
         self.settled, self._between = self.raster, self.raster
 
     def move(self, motion: Motion) -> None:
@@ -167,12 +167,12 @@ class RoomSheet:
 
     @property
     def is_settling(self) -> bool:
-        """Whether a change is under way: the same map shown again would bring it about."""
+        """Whether a change is pending, which repeating the same map would complete."""
         return bool(self.regions or self.changes)
 
     @property
     def is_named(self) -> bool:
-        """Whether it has a room that no map may take away."""
+        """Whether it has a room that no map may remove."""
         return any(room.is_kept for room in self.rooms.values())
 
 
@@ -181,11 +181,11 @@ class RoomBook:
     """All rooms.
 
     Attributes:
-        sheets: the one in use first.
+        sheets: all sheets, the last used first.
         next_id: the next number.
-        version: counter of changes that a listener sees.
-        is_elsewhere: whether the map may show another building than the first sheet, so that none
-            is in use until a map has been looked at.
+        version: counter of changes of the published rooms.
+        is_elsewhere: whether the map may show another building than the first sheet; until the next
+            update no sheet is in use then.
     """
 
     sheets: list[RoomSheet] = field(default_factory=list)
@@ -195,12 +195,12 @@ class RoomBook:
 
     @property
     def sheet(self) -> RoomSheet | None:
-        """The sheet in use; None before the first map, and while it may be another."""
+        """The sheet in use; None before the first map, and while the building is unclear."""
         return self.sheets[0] if self.sheets and not self.is_elsewhere else None
 
     @property
     def rooms(self) -> tuple[Room, ...]:
-        """The rooms of the sheet in use, by their numbers."""
+        """The rooms of the sheet in use, sorted by number."""
         sheet = self.sheet
         return () if sheet is None else tuple(sheet.rooms[each] for each in sorted(sheet.rooms))
 
@@ -215,7 +215,7 @@ class RoomBook:
         self.is_elsewhere = True
 
     def find(self, called: str | int) -> Room | None:
-        """Return the room of a name, as ``room 3``, or of a number; None for none."""
+        """Return the room with a name, as "bath" or "room 3", or with a number; None for none."""
         rooms = {} if self.sheet is None else self.sheet.rooms
         if isinstance(called, int):
             return rooms.get(called)
@@ -224,10 +224,10 @@ class RoomBook:
         return rooms.get(int(by_number[1])) if named is None and by_number else named
 
     def room(self, called: str | int) -> Room:
-        """Return the room of a name or number.
+        """Return the room with a name or number.
 
         Raises:
-            OrderError: there is none; the text lists those there are.
+            OrderError: there is none; the text lists all rooms.
         """
         room = self.find(called)
         if room is None:
@@ -238,15 +238,15 @@ class RoomBook:
         return room
 
     def listed(self) -> str:
-        """Return which rooms there are, as text."""
+        """Return a list of the rooms as text."""
         titles = ", ".join(repr(room.name) if room.name else room.title for room in self.rooms)
         return f"there are {titles:.{MOST_LISTED}}" if titles else "no room is known yet"
 
     def name(self, called: str | int, name: str) -> None:
-        """Give a room a name; "" takes it away.
+        """Give a room a name; "" removes its name.
 
         Raises:
-            OrderError: there is no such room, or another one has that name, or it is no name.
+            OrderError: there is no such room, another one has that name, or it is no valid name.
         """
         room = self.room(called)
         if name:
@@ -254,20 +254,20 @@ class RoomBook:
         self.put_by_hand(replace(room, name=name))
 
     def holes(self, room: Room) -> tuple[Polygon, ...]:
-        """Return the outlines of the rooms that lie within that of a room."""
+        """Return the outlines of the rooms that a room encloses."""
         rooms = {} if self.sheet is None else self.sheet.rooms
         return tuple(rooms[each].outline for each in room.encloses if each in rooms)
 
     def check_name(self, where: str, name: str, *of: int) -> None:
-        """Check a name for a room, which may be that of the rooms ``of`` now.
+        """Check a new name of a room; the rooms ``of`` may have it now.
 
         Raises:
-            OrderError: it is no name, or that of another room.
+            OrderError: it is no valid name, or another room has it.
         """
         check_name(where, name)
         if LIKE_NUMBER.fullmatch(name):
             raise OrderError(
-                f"{where}: {name!r} is how a room without a name is called",
+                f"{where}: {name!r} would be read as the number of a room",
                 hint="choose a name that is more than a number",
             )
         taken = self.find(name)
@@ -286,14 +286,14 @@ class RoomBook:
         self.put_by_hand(replace(self.room(called), settings=settings))
 
     def put(self, room: Room) -> None:
-        """Replace a room of the sheet in use, or add it; nothing if it has not changed."""
+        """Add a room to the sheet in use, or replace it if it has changed."""
         assert self.sheet is not None
         if self.sheet.rooms.get(room.id) != room:
             self.sheet.rooms[room.id] = room
             self.version += 1
 
     def put_by_hand(self, room: Room) -> None:
-        """Replace a room as people want it."""
+        """Replace a room by order of people."""
         assert self.sheet is not None
         self.put(room)
         self.sheet.fix()
@@ -307,30 +307,33 @@ class RoomBook:
 
     @property
     def numbers_left(self) -> int:
-        """How many rooms may come to the sheet in use."""
+        """Number of rooms that may be added to the sheet in use."""
         there = MOST_ROOMS if self.sheet is None else len(self.sheet.rooms)
         return min(MOST_ROOMS - there, MOST_NUMBER + 1 - self.next_id)
 
     def new_id(self) -> int:
-        """Return a number that no room ever had; 0 if there are too many rooms."""
+        """Return a number that no room has had; 0 if there are too many rooms."""
         if self.numbers_left < 1:
             return 0
         self.next_id += 1
         return self.next_id - 1
 
     def pass_over(self, number: int) -> None:
-        """Give no room a number up to this one: a room that is not known any more had it."""
+        """Skip the numbers up to this one, which a lost room had."""
         self.next_id = max(self.next_id, number + 1)
         self.version += 1
 
     def forget(self, sheet: RoomSheet) -> None:
-        """Drop a sheet: another one turns out to be that of its building."""
+        """Drop a sheet, as another sheet is that of its building."""
         self.sheets.remove(sheet)
         self.version += 1
 
     def turn_to(self, sheet: RoomSheet) -> None:
-        """Use a sheet, new or not; of too many the one used longest ago is dropped, first of those
-        where no room has a name."""
+        """Use a sheet, new or not.
+
+        Beyond ``MOST_SHEETS``, the least recently used sheet is dropped, those without kept rooms
+        first.
+        """
         if self.sheet is not sheet:
             self.version += 1
         self.sheets = [sheet, *(each for each in self.sheets if each is not sheet)]

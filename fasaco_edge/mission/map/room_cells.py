@@ -17,19 +17,19 @@ class RoomCells:
 
     Args:
         watch: the rooms, in the map frame.
-        lattice_deg: angle of the cells' rows to its x axis [deg].
+        lattice_deg: angle of the cells' rows to the map's x axis [deg].
     """
 
     def __init__(self, watch: RoomWatch, lattice_deg: float) -> None:
         self._watch, self._lattice_deg = watch, lattice_deg
-        # The rooms of a window's cells, and the raster that they were read from.
+        # Cached: a raster and a window, and the rooms of the window's cells.
         self._raster, self._window = RoomRaster.empty(1.0), NOWHERE
         self._rooms = np.zeros((0, 0), np.uint16)
 
     def on(self, lattice: CoverageLattice) -> NDArray[np.uint16] | None:
         """Return the room of each cell of a lattice, uint16 (rows, cols), 0 for none.
 
-        None as long as no room is known.
+        None while no room is known.
         """
         sheet = self._watch.book.sheet
         if sheet is None or not sheet.rooms:

@@ -27,7 +27,7 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
     """Split a room along a segment; the largest part keeps number, name and settings.
 
     Raises:
-        OrderError: there is no such room, or the segment does not divide it, or there are too many
+        OrderError: there is no such room, the segment does not divide it, or there are too many
             rooms or cuts.
     """
     room, sheet = book.room(called), _sheet(book)
@@ -64,14 +64,15 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
 
 
 def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
-    """Merge rooms that are joined; the smallest number stays, and the name given, or its name, or
-    the next one's.
+    """Merge rooms that are joined, into the one with the smallest number.
+
+    It gets the name given; without one, the first name among the rooms by number.
 
     Raises:
-        OrderError: there is no such room, or the rooms are not joined, or the name is taken.
+        OrderError: there is no such room, the rooms are not joined, or the name is taken.
     """
     sheet = _sheet(book) if book.sheet else None
-    rooms = sorted({room.id: room for room in map(book.room, called)}.values(), key=_number)
+    rooms = [room for _, room in sorted({each.id: each for each in map(book.room, called)}.items())]
     if len(rooms) < 2 or sheet is None:
         raise OrderError("room.others: a merge takes two rooms or more", hint="name another room")
     numbers = [room.id for room in rooms]
@@ -95,7 +96,7 @@ def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
 
 
 def move(book: RoomBook, motion: Motion) -> None:
-    """Move the rooms of the sheet in use with the map, as a loop closure has moved it."""
+    """Move the rooms of the sheet in use with the map after a loop closure."""
     sheet = book.sheet
     if sheet is None or motion.is_still:
         return
@@ -109,17 +110,13 @@ def _moved(point: Point, motion: Motion) -> Point:
     return float(x[0]), float(y[0])
 
 
-def _number(room: Room) -> int:
-    return room.id
-
-
 def _sheet(book: RoomBook) -> RoomSheet:
     assert book.sheet is not None  # a room was found
     return book.sheet
 
 
 def _part_at(mask: Mask, marked: Mask) -> Mask:
-    """Return the connected part of a room with the most marked squares; all if none is marked."""
+    """Return the connected part with the most marked squares; all if none is marked."""
     areas = find_areas(mask.astype(np.uint8))
     counts = np.bincount(areas.labels[marked], minlength=1)
     part: Mask = mask if not counts.sum() else areas.labels == int(counts.argmax())
@@ -127,7 +124,7 @@ def _part_at(mask: Mask, marked: Mask) -> Mask:
 
 
 def _apart(rooms: Sequence[Room]) -> Room | None:
-    """Return a room that no chain of the others joins to the first; None for none."""
+    """Return a room that is not joined to the first, even through others; None for none."""
     left = {room.id: room for room in rooms[1:]}
     reached = [rooms[0]]
     while reached:
@@ -138,7 +135,7 @@ def _apart(rooms: Sequence[Room]) -> Room | None:
 
 
 def _is_inside(raster: RoomRaster, cut: Cut, room: int) -> bool:
-    """Return whether a cut goes through one room alone."""
+    """Return whether a cut goes through this room alone."""
     around = cut_window(cut, raster.square_m).intersection(raster.window)
     if around is None:
         return False

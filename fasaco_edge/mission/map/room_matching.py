@@ -1,18 +1,18 @@
-"""Room matching: regions of a new map to the rooms of a sheet, by the squares they have in common.
+"""Room matching: assigns the regions of a new map to rooms, by the squares they have in common.
 
-What is known holds: a room keeps its squares wherever the map shows floor that others do not claim,
-and grows over new floor of its region. Changes of what is known must last:
+A room keeps its squares as long as the map shows floor there that no other room claims, and it
+grows over new floor of its region. Other changes must last:
 
 - a region on new ground becomes a room after ``HOLD_NEW`` updates,
-- a region that parts from a room becomes one after ``HOLD_CHANGE`` updates,
-- rooms in one region are divided as before; after ``HOLD_CHANGE`` updates they are one room,
-- a large part of a room in the region of another goes over to it after as many.
+- a region that separates from a room becomes a room after ``HOLD_CHANGE`` updates,
+- rooms in one region stay divided as before, and join after ``HOLD_CHANGE`` updates,
+- a large part of a room in another room's region joins that room after ``HOLD_CHANGE`` updates.
 
-An update without the change counts twice against it, so that one that flickers never lasts. A room
-that vanished so, and comes back, gets its number back. Rooms that people have named, set, split or
-merged are kept: they are neither parted nor joined by a map; two of them in one region are divided
-by memory, and those split or merged keep their parts. What a few maps have added to a room says
-nothing on where it is. Rooms that the map does not show stay as they are.
+An update without the change counts twice against it, so that a flickering change never lasts. A
+room that joined another and separates again gets its number back. Maps neither split nor join kept
+rooms, which people have named, set, split or merged: two of them in one region stay divided as
+before, and those split or merged keep their parts. Squares that only the newest maps have added do
+not decide which region shows a room. Rooms that the map does not show stay unchanged.
 """
 
 from __future__ import annotations
@@ -37,21 +37,22 @@ from fasaco_edge.mission.map.room_raster import BLOCK, Ids, RoomRaster, cut_wind
 
 Labels = NDArray[np.int32]
 
-# Updates that a change must last.
+# Number of updates that a change must last.
 HOLD_NEW, HOLD_CHANGE = 4, 8
-# Squares are settled in a room after so many updates, to twice as many.
+# Squares have settled in a room after 1 to 2 times this number of updates.
 SETTLED = 2 * HOLD_CHANGE
-# An update without a change takes this from its score.
+# Decrease of a change's score with an update that does not show it.
 PENALTY = 2
-# A region shows a room if it has this area of it [m2], or half of a smaller room; and this share of
-# the smaller of the two.
+# A region shows a room if their common area is at least LEAST_SHOWN_M2 [m2], or half of a smaller
+# room, and at least LEAST_SHARE of the smaller of the two.
 LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
-# From this share of a room's area on a region shows all of it: its other squares are no floor.
+# Least size of a region, as a share of a room, to show all of the room: its other squares are then
+# no floor.
 WHOLE = 0.8
 
 
 def slots_of(ids: Ids, numbers: Iterable[int]) -> Ids:
-    """Return squares with the place of their number among ``numbers``, from 1; 0 for none."""
+    """Return for each square the index of its number in sorted ``numbers``, from 1; 0 for none."""
     places = np.zeros(MOST_NUMBER + 1, np.uint16)
     ordered = np.array(sorted(numbers), np.int64)
     places[ordered] = np.arange(1, len(ordered) + 1)
@@ -59,7 +60,7 @@ def slots_of(ids: Ids, numbers: Iterable[int]) -> Ids:
 
 
 def common_counts(labels: Labels, slots: Ids, most: int) -> NDArray[np.int64]:
-    """Return how many squares each region and each slot have in common, int64 (n, most + 1)."""
+    """Return how many squares each region and each slot share, int64 (n, most + 1)."""
     wide, regions = most + 1, int(labels.max(initial=0)) + 1
     counts = np.zeros(regions * wide, np.int64)
     whole = Window(0, 0, *labels.shape)
@@ -72,7 +73,7 @@ def common_counts(labels: Labels, slots: Ids, most: int) -> NDArray[np.int64]:
 
 @dataclass(slots=True)
 class _Region:
-    """A region that is no room yet: its label, and after how many updates it becomes one."""
+    """A region that is no room yet: its label, and the updates until it becomes one."""
 
     label: int
     hold: int
@@ -82,9 +83,9 @@ class Matching:
     """One update of a sheet.
 
     Args:
-        book, sheet: to change; the sheet's raster covers the map's window.
-        window: of the map's squares.
-        labels: their regions, int32 (rows, cols).
+        book, sheet: changed in place; the sheet's raster covers the map's window.
+        window: the map's squares.
+        labels: regions of these squares, int32 (rows, cols).
     """
 
     def __init__(self, book: RoomBook, sheet: RoomSheet, window: Window, labels: Labels) -> None:
@@ -92,7 +93,7 @@ class Matching:
         self._square_m2 = sheet.raster.square_m**2
         self._ids = sheet.raster.ids
         self._part = self._ids[window.slices_in(sheet.raster.window)]
-        # Rooms by their slots, from 1; in all tables slot 0 is floor of no room.
+        # The rooms' numbers by slot, from 1; slot 0 is floor of no room.
         self._rooms = [0, *sorted(sheet.rooms)]
         self._slots = slots_of(self._part, sheet.rooms)
         self._squares = np.bincount(self._ids.ravel(), minlength=MOST_NUMBER + 1)[self._rooms]
@@ -100,7 +101,7 @@ class Matching:
         self._firm = common_counts(labels, self._slots * self._is_settled(), len(sheet.rooms))
         self._areas = self._counts.sum(axis=1)
         self._shown_by = self._find_shown()
-        # The new number of squares, by region and slot.
+        # The room that squares go to, by region and slot.
         self._becomes = np.tile(np.array(self._rooms, np.uint16), (len(self._areas), 1))
         self._to_divide: list[int] = []
         self._regions: list[_Region] = []
@@ -154,14 +155,14 @@ class Matching:
         return is_settled
 
     def _find_shown(self) -> dict[int, int]:
-        """Return for each room's slot that the map shows the region that shows it."""
+        """Return the region that shows each room, by slot; rooms not shown are missing."""
         found = dict[int, int]()
         if len(self._areas) < 2:
             return found
         for slot in range(1, len(self._rooms)):
             squares = int(self._squares[slot])
             least = min(LEAST_SHOWN_M2 / self._square_m2, 0.5 * squares)
-            # What was added lately says little on where a room is, unless it is all there is.
+            # Only settled squares decide, unless a room has too few of them.
             counts = self._counts if self._firm[1:, slot].sum() < least else self._firm
             label = int(counts[1:, slot].argmax()) + 1
             common = int(self._counts[label, slot])
@@ -176,12 +177,12 @@ class Matching:
         return [slot for slot in there if slot and slot not in slots]
 
     def _is_border(self, label: int, slot: int) -> bool:
-        """Return whether the squares of a room in a region are no more than its border moving."""
+        """Return whether a room's squares in a region are few enough to be noise of its border."""
         squares = int(self._counts[label, slot])
         return self._m2(squares) < LEAST_M2 and squares < 0.5 * self._squares[slot]
 
     def _take_one(self, label: int, slot: int) -> None:
-        """A region shows one room: its new floor belongs to it."""
+        """Assign a region that shows one room: its new floor belongs to the room."""
         room = self._rooms[slot]
         self._becomes[label, 0] = room
         for other in self._others(label, slot):
@@ -193,7 +194,7 @@ class Matching:
             self._becomes[0, slot] = 0
 
     def _take_shared(self, label: int, slots: list[int]) -> None:
-        """A region shows several rooms: they are divided as before, until they join."""
+        """Assign a region that shows several rooms: they stay divided until they join."""
         self._to_divide.append(label)
         for other in self._others(label, *slots):
             if self._is_border(label, other):
@@ -205,19 +206,19 @@ class Matching:
                 self._changes.add(("join", self._rooms[slot], self._rooms[stays]))
 
     def _take_none(self, label: int) -> None:
-        """A region shows no room: it is a part of one, or new."""
+        """Assign a region that shows no room: it is a part of a room, or new."""
         parent, half = 0, 0.5 * self._areas[label]
         if self._counts[label, 1:].max(initial=0) >= half:
             parent = int(self._counts[label, 1:].argmax()) + 1
             self._becomes[label, 0] = self._rooms[parent]
-        # What has come to a kept room lately may turn out to be another one.
+        # Squares added lately to a kept room may turn out to be another room.
         if parent and self._room(parent).is_kept and self._firm[label, parent] >= half:
             return
         if self._m2(self._areas[label]) >= LEAST_M2 and len(self._regions) < MOST_ROOMS:
             self._regions.append(_Region(label, HOLD_CHANGE if parent else HOLD_NEW))
 
     def _count_changes(self) -> list[tuple[str, int, int]]:
-        """Score the changes that this map shows, and others; return those that have lasted."""
+        """Score all pending changes; return those that have lasted."""
         scores = dict[tuple[str, int, int], int]()
         for change, score in self._sheet.changes.items():
             if change not in self._changes and score > PENALTY:
@@ -242,7 +243,7 @@ class Matching:
         numbers[inside] = ids[inside]
 
     def _number_regions(self) -> None:
-        """Score regions that are no rooms yet; make those rooms that have lasted."""
+        """Score the regions that are no rooms yet; those that have lasted become rooms."""
         sheet, before = self._sheet, self._sheet.pending.on(self._window)
         counts = common_counts(self._labels, before, max(sheet.regions, default=0))
         squares = np.bincount(sheet.pending.ids.ravel(), minlength=counts.shape[1])
@@ -260,7 +261,7 @@ class Matching:
             if score >= region.hold and self._make_room(label):
                 continue
             places.append((label, score))
-        # Regions that this map does not show lose; their squares stay.
+        # Regions that this map does not show lose score, but keep their squares.
         numbers = np.zeros(max(sheet.regions, default=0) + 1, np.uint16)
         for was, score in sheet.regions.items():
             if was not in matched and score > PENALTY:
@@ -291,7 +292,7 @@ class Matching:
         return True
 
     def _join(self, room: int, other: int) -> None:
-        """Let a room join another; its number waits for it."""
+        """Join a room to another; its squares are kept so that it can get its number back."""
         if room not in self._sheet.rooms or other not in self._sheet.rooms:
             return
         squares = self._ids == room
@@ -312,7 +313,7 @@ class Matching:
                 self._ids[at][is_lost] = before[at][is_lost]
 
     def _keep(self, before: Ids) -> None:
-        """Give rooms that are kept their squares back if all are lost; drop others without any."""
+        """Restore the squares of kept rooms that lost all; drop other rooms without squares."""
         squares = np.bincount(self._ids.ravel(), minlength=self._book.next_id)
         empty = []
         for room in self._book.rooms:
@@ -328,13 +329,13 @@ class Matching:
 
 
 def spread(ids: Ids, allowed: NDArray[np.bool_]) -> None:
-    """Give squares without a number that of the nearest square with one, in place.
+    """Give squares without a number the number of the nearest square with one, in place.
 
-    Near is counted in steps over the edges of squares.
+    Distance is counted in steps over edges of squares.
 
     Args:
         ids: uint16 (rows, cols), the numbers.
-        allowed: bool (rows, cols), the squares to fill, and to step over.
+        allowed: bool (rows, cols), the squares to fill and to step on.
     """
     grown = ids.astype(np.int32)
     grow(grown, np.ascontiguousarray(allowed))

@@ -1,4 +1,4 @@
-"""Room outlines: the polygon around a room's squares, with few corners; which rooms are joined."""
+"""Room outlines: polygons with few corners around rooms' squares; and joins between rooms."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from fasaco_edge.mission.map.room_raster import Ids
 
 Mask = NDArray[np.bool_]
 
-# Outlines follow once so much has changed [m2]: pixels along walls flicker.
+# Change of a room after which its outline is updated [m2]: pixels along walls flicker.
 STALE_M2 = 0.1
 MOST_CORNERS = 100
-# How far a corner that is left out lies beside the outline at most [m], the first that serves.
+# Largest distance of a dropped corner from the outline [m]: the first value that gives a valid
+# outline is used.
 TOLERANCES_M = (0.12, 0.06, 0.0, 0.25, 0.5, 1.0)
-# Rooms are joined where they share a border of at least this length [m]: a robot's doorway.
+# Least length of the border that joined rooms share [m]: a doorway for a robot.
 LEAST_DOOR_M = 0.3
-# Steps along the border (row, col): east, north, west, south; what is inside lies on the left.
+# Steps along the border (row, col): east, north, west, south; the inside lies on the left.
 STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 
 
 def largest_part(mask: Mask) -> Mask:
-    """Return the largest of the parts that are connected by edges; the first of equal ones."""
+    """Return the largest part connected by edges; the first of equal parts."""
     areas = find_areas(mask.astype(np.uint8))
     if len(areas.cells) < 2:
         return mask
@@ -43,7 +44,7 @@ def outline(window: Window, mask: Mask, square_m: float) -> Polygon:
     It has at most ``MOST_CORNERS`` corners, and does not touch itself.
 
     Args:
-        window: of the squares.
+        window: the squares.
         mask: bool (rows, cols), the room's squares; at least one.
         square_m: edge of a square [m].
     """
@@ -64,7 +65,7 @@ def _place(corner: list[int], window: Window, square_m: float) -> Point:
 
 
 def _without_pinches(mask: Mask) -> Mask:
-    """Return squares of which no two touch at a corner alone; more squares if necessary."""
+    """Return squares, some added, of which no two touch only at a corner."""
     mask = np.pad(mask, 1)
     while True:
         sw, se, nw, ne = mask[:-1, :-1], mask[:-1, 1:], mask[1:, :-1], mask[1:, 1:]
@@ -76,7 +77,7 @@ def _without_pinches(mask: Mask) -> Mask:
 
 
 def _traced(mask: Mask) -> NDArray[np.int64]:
-    """Return the corners (row, col) of the outer border where it turns, int64 (n, 2)."""
+    """Return the corners (row, col) of the outer border, int64 (n, 2)."""
     inside = np.pad(mask, 1)
     row, col = (int(first) for first in divmod(int(np.argmax(inside)), inside.shape[1]))
     begin, heading = (row, col), 0
@@ -84,7 +85,7 @@ def _traced(mask: Mask) -> NDArray[np.int64]:
     while True:
         step = STEPS[heading]
         at = at[0] + step[0], at[1] + step[1]
-        # The squares ahead, on the right and on the left of the border.
+        # The squares ahead, right and left of the border.
         right, left = _ahead(at, heading)
         turn = -1 if inside[right] else 0 if inside[left] else 1
         if at == begin and (heading + turn) % 4 == 0:
@@ -107,9 +108,9 @@ def _ahead(at: tuple[int, int], heading: int) -> tuple[tuple[int, int], tuple[in
 
 
 def _simplified(corners: NDArray[np.int64], tolerance: float) -> NDArray[np.int64]:
-    """Return those corners between which all others lie within ``tolerance`` (Douglas, Peucker).
+    """Return the corners kept by the Douglas-Peucker algorithm, int64 (m, 2).
 
-    Of a closed border: it is cut at its first corner and at the one farthest from that.
+    The closed border is divided at its first corner and at the corner farthest from it.
     """
     if tolerance <= 0.0 or len(corners) <= 4:
         return corners
@@ -135,7 +136,7 @@ def _simplified(corners: NDArray[np.int64], tolerance: float) -> NDArray[np.int6
 
 
 def joined(ids: Ids, square_m: float) -> dict[int, tuple[int, ...]]:
-    """Return for each room the rooms that it is joined to, by their numbers."""
+    """Return the numbers of the rooms that each room is joined to."""
     shared = Counter[tuple[int, int]]()
     for here, there in ((ids[1:], ids[:-1]), (ids[:, 1:], ids[:, :-1])):
         is_border = (here != there) & (here > 0) & (there > 0)
@@ -152,7 +153,7 @@ def joined(ids: Ids, square_m: float) -> dict[int, tuple[int, ...]]:
 
 
 def stale(sheet: RoomSheet, before: Ids) -> list[int]:
-    """Return the rooms whose outlines are outdated, as enough of their squares have changed."""
+    """Return the rooms whose outlines are outdated."""
     after = sheet.raster.ids
     squares = np.bincount(after.ravel(), minlength=MOST_NUMBER + 1)
     other = before != after
@@ -168,7 +169,7 @@ def stale(sheet: RoomSheet, before: Ids) -> list[int]:
 
 
 def refresh(book: RoomBook, changed: Iterable[int]) -> None:
-    """Derive outline, area and neighbours anew of rooms whose squares have changed."""
+    """Update outline and area of changed rooms, and neighbours of all."""
     sheet = book.sheet
     rooms = set(changed)
     if sheet is None or not rooms:
@@ -187,7 +188,7 @@ def refresh(book: RoomBook, changed: Iterable[int]) -> None:
                 area_m2=round(int(np.count_nonzero(mask)) * square_m**2, 2),
             )
         shapes.append(shape)
-    # Outlines with a hole that a room fits in.
+    # Rooms whose outline has a hole large enough for a room.
     rings = {
         each.id
         for each in shapes

@@ -1,8 +1,8 @@
 """Room raster: squares of the map frame, each with the number of its room.
 
-It has its own squares, aligned with the axes of the map frame: maps may have other pixels, another
-corner or another yaw each time, and cover another part of the building. Needs no kernels: an idle
-daemon reads rooms from its file.
+Its squares are aligned with the axes of the map frame, as maps may differ in pixel size, corner,
+yaw and the part of the building that they cover. The module needs no kernels, as an idle daemon
+reads rooms from its file.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 # Limit on the squares of a raster; a larger building gets wider squares.
 MOST_SQUARES = 1_000_000
 NOWHERE = Window(0, 0, 0, 0)
-# Squares worked on at once, which bounds memory.
+# Number of squares processed at once, which bounds memory.
 BLOCK = 1 << 18
 
-# Squares are cut if their centre is nearer to a cut than this [squares]: no step passes between.
-CUT = 0.75
+# Distance from a cut up to which squares are cut, by their centre [squares]: no step passes between
+# them.
+CUT_SQUARES = 0.75
 
 Ids = NDArray[np.uint16]
 Cut = tuple[Point, Point]
-"""A segment (x, y) to (x, y) [m] in the map frame that parts two rooms."""
+"""A segment from (x, y) to (x, y) [m] in the map frame that separates two rooms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +55,7 @@ class RoomRaster:
         return cls(square_m, NOWHERE, np.zeros((0, 0), np.uint16))
 
     def on(self, window: Window) -> Ids:
-        """Return a copy of the numbers on another window."""
+        """Return a copy of the numbers in another window, uint16 (rows, cols)."""
         ids = np.zeros((window.rows, window.cols), np.uint16)
         if (common := window.intersection(self.window)) is not None:
             ids[common.slices_in(window)] = self.ids[common.slices_in(self.window)]
@@ -66,7 +67,7 @@ class RoomRaster:
         return self.window.values_at(self.ids, squares, 0)
 
     def cropped(self) -> RoomRaster:
-        """Return the same without empty rows and columns at its border."""
+        """Return the raster without empty rows and columns at its border."""
         inner = Window.of(self.ids > 0)
         if inner is None:
             return RoomRaster.empty(self.square_m)
@@ -83,7 +84,7 @@ class RoomRaster:
         return window, mask[window.slices_in(self.window)].copy()
 
     def coarser(self, factor: int) -> RoomRaster:
-        """Return it with squares ``factor`` times as wide: each has the number at its middle."""
+        """Return the raster with squares ``factor`` times as wide, with their centres' numbers."""
         window = self.window.rounded_out(factor)
         ids = self.on(window)[factor // 2 :: factor, factor // 2 :: factor]
         edges = (window.row0, window.col0, window.row1, window.col1)
@@ -92,7 +93,7 @@ class RoomRaster:
         )
 
     def moved(self, motion: Motion) -> RoomRaster:
-        """Return it after a motion of the map; unchanged if it would be too large."""
+        """Return the raster after a motion of the map; unchanged if it would be too large."""
         if not self.ids.size:
             return self
         window, side = self.window, self.square_m
@@ -147,5 +148,7 @@ def is_cut(window: Window, square_m: float, cut: Cut) -> NDArray[np.bool_]:
     along = np.clip(along, 0.0, 1.0)
     right, up = x0 + along * dx - x, y0 + along * dy - y
     far = right * right + up * up
-    near: NDArray[np.bool_] = (far < (CUT * square_m) ** 2).reshape(window.rows, window.cols)
+    near: NDArray[np.bool_] = (far < (CUT_SQUARES * square_m) ** 2).reshape(
+        window.rows, window.cols
+    )
     return near

@@ -1,4 +1,4 @@
-"""Room watch: looks for rooms on the newest map, so seldom that it costs little, and takes them in.
+"""Room watch: finds rooms on the newest map from time to time, and enters them in the room book.
 
 The regions of a map go to the sheet of the building that it shows.
 """
@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.errors import NotPublished
-from fasaco_edge.grid.geometry import Pose2D, Window
+from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.grid.rotation import rotated_pose
@@ -29,26 +29,26 @@ from fasaco_edge.mission.map.room_raster import (
     window_over,
 )
 
-# Share of the floor in rooms that match from which a map shows the building of a sheet; region and
-# room match if they have this share of all their floor in common.
+# Least share of floor in matching rooms for a map to show the building of a sheet; least share of
+# their common floor for a region and a room to match.
 ALIKE = MATCH = 0.5
 # Squares are as wide as the map's pixels, and not narrower than this [m].
 LEAST_SQUARE_M = 0.05
 
 
-# Least time from one look to the next [s]; large maps, at some 0.2 s per million pixels, are looked
-# at less often.
+# Least time between two searches [s], longer for large maps: a search takes some 0.2 s per million
+# pixels.
 PERIOD_S, PIXELS_PER_S = 2.0, 50_000
-# Maps of more pixels are looked at with wider ones: a look takes some 20 bytes a pixel.
+# Larger maps are made coarser before a search, which takes some 20 bytes per pixel.
 MOST_PIXELS = 1_000_000
-# A look waits at most this long for a step without a new map [s]: a plan comes first.
+# Longest delay of a search, until a step without a new map [s], as planning comes first.
 LATE_S = 1.0
 
 ROOMS_STAY = "the robot goes on with the rooms it knows; report it with the log"
 
 
 class RoomWatch:
-    """Finds the rooms of maps for a book.
+    """Finds the rooms of maps, and enters them in a book.
 
     Attributes:
         book: the rooms.
@@ -56,20 +56,20 @@ class RoomWatch:
 
     def __init__(self) -> None:
         self.book = RoomBook()
-        # The map of the last step, and whether it was looked at.
+        # The map of the last step, and whether it was searched.
         self._newest: OccupancyGrid | None = None
         self._is_seen = False
-        # What was looked at last, the cuts on it, and what was found, as long as it is needed.
+        # The last map searched, its cuts, and the rooms found on it while they are needed.
         self._key: tuple[object, ...] = ()
         self._cuts: tuple[Cut, ...] = ()
         self._found: FoundRooms | None = None
         self._due = -math.inf
 
     def look(self, grid: OccupancyGrid, now: float) -> None:
-        """Look for rooms on a map at ``now`` [s] if that is due.
+        """Search a map for rooms at ``now`` [s] if that is due.
 
         Raises:
-            NotPublished: that failed; the rooms known before are as good as they were.
+            NotPublished: the search failed; the rooms known before stay.
         """
         try:
             self._look(grid, now)
@@ -78,9 +78,9 @@ class RoomWatch:
             raise NotPublished(why, hint=ROOMS_STAY) from error
 
     def _look(self, grid: OccupancyGrid, now: float) -> None:
-        """Look for rooms on a map at ``now`` [s] if that is due.
+        """Search a map at ``now`` [s] if that is due.
 
-        A map that stays is shown to the book again until nothing more follows from it.
+        An unchanged map is entered again until it causes no further change.
         """
         came, self._newest = grid is not self._newest, grid
         self._is_seen &= not came
@@ -98,7 +98,7 @@ class RoomWatch:
         self._is_seen, self._cuts = True, cuts
         pixels = min(grid.cells.size, MOST_PIXELS)
         self._due = now + max(PERIOD_S, pixels / PIXELS_PER_S)
-        # A mapper of a robot that stands sends the same map again and again.
+        # The mapper of a standing robot repeats the same map.
         key = zlib.crc32(np.ascontiguousarray(grid.cells).data), grid.geometry, grid.frame, cuts
         if key == self._key and is_settled:
             return
@@ -115,25 +115,18 @@ class RoomWatch:
         self._key, self._is_seen = (), False
 
     def on(self, grid: OccupancyGrid | None) -> RoomBook:
-        """Return the rooms as far as they are those of a map; all without one."""
+        """Return the book if its rooms are in the frame of a map, else an empty one."""
         is_here = grid is None or self.book.frame in ("", grid.frame)
         return self.book if is_here else RoomBook()
 
     def move(self, motion: Motion, lattice_deg: float) -> None:
-        """Move the rooms with the map; the motion is given in a frame at an angle [deg]."""
-        start, end = (_turned(pose, lattice_deg) for pose in (motion.start, motion.end))
+        """Move the rooms with the map; ``motion`` is in the frame of the lattice."""
+        start, end = (rotated_pose(pose, lattice_deg) for pose in (motion.start, motion.end))
         move(self.book, Motion(start, end))
 
 
-def _turned(pose: Pose2D, by_deg: float) -> Pose2D:
-    return rotated_pose(pose, by_deg) if by_deg else pose
-
-
 def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
-    """Take in the regions of the newest map, which is in ``frame``.
-
-    A map without regions changes nothing.
-    """
+    """Enter the regions of the newest map, in ``frame``, in a book; without regions do nothing."""
     if not found.count:
         return
     sheet = _sheet_for(book, found, frame)
@@ -154,7 +147,7 @@ def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
 
 
 def _widen(sheet: RoomSheet, factor: int) -> None:
-    """Make the squares of a sheet wider by a factor, if that is more than 1."""
+    """Make the squares of a sheet ``factor`` times as wide."""
     if factor > 1:
         sheet.lay(sheet.raster.coarser(factor), sheet.gone.coarser(factor))
         sheet.note({}, RoomRaster.empty(sheet.raster.square_m))
@@ -165,8 +158,8 @@ def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
     in_use = book.sheet if book.frame == frame else None
     if in_use is not None and in_use.is_named:
         return in_use
-    # A first look may have seen a corner: as long as no room in use has a name or settings,
-    # other rooms may turn out to be those of the building.
+    # The first map may show only a corner. So while no room in use is kept, a sheet from before may
+    # turn out to be that of the building.
     others = [each for each in book.sheets if each.frame == frame and each is not in_use]
     alike = [(_alike(each, found), each) for each in others if each.is_named or in_use is None]
     share, best = max(alike, key=lambda each: each[0], default=(0.0, None))
@@ -180,7 +173,7 @@ def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
 
 
 def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
-    """Return how much of the floor of map or sheet lies in regions and rooms that match."""
+    """Return the share of the smaller floor, of map or sheet, in matching regions and rooms."""
     window = window_over(found.geometry, sheet.raster.square_m)
     if window.rows * window.cols > MOST_SQUARES:
         return 0.0

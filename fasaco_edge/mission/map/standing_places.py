@@ -1,10 +1,9 @@
-"""Standing places: zones, keep-out zones, home and dock of the configuration, on their map alone.
+"""Standing places: zones, keep-out zones, home and dock of the configuration, valid on one map.
 
-Their coordinates are valid only on the map that they were given for. That is the map in the frame
-``map_frame`` of the configuration, or else in the first frame used with these places; that frame is
-kept with the ledger. The places are not used on a map in another frame, or of another building in
-this frame. With keep-out zones configured, the robot does not drive there, as the zones of that map
-are not known. After a command ``reset`` the places belong to the map in use at that time.
+That map is in the configured frame ``map_frame``, or else in the first frame used with these
+places, which is kept with the ledger. On a map in another frame, or of another building, the places
+are not used; if keep-out zones are configured, the robot does not drive there, as the keep-out
+zones of that map are unknown. After a command ``reset`` the places belong to the map in use.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from fasaco_edge.mission.orders.placing import located
 
 
 class StandingPlaces:
-    """Returns the places of the configuration while the map is the one that they belong to.
+    """Returns the places of the configuration while the map is theirs.
 
     Attributes:
         note: which map they belong to; kept with the order.
@@ -34,7 +33,7 @@ class StandingPlaces:
         """Begin before the first map.
 
         Args:
-            policy: with the places in the frame of the lattice.
+            policy: the policy with the places in the frame of the lattice.
             given: the policy with the places as configured.
         """
         self.note = NO_PLACES
@@ -42,7 +41,7 @@ class StandingPlaces:
         self._names = [
             name for name in ("zones", "keep_out", "home", "dock") if getattr(given, name)
         ]
-        # A mask that came as a message has its own frame, and another mask may come.
+        # A mask received as a message has its own frame, and may be replaced by another.
         mask = given.keep_out_mask
         self._mask_frame = mask_frame(mask)
         self._mask = f"{zlib.crc32(mask.encode()):08x}" if self._mask_frame else ""
@@ -50,11 +49,11 @@ class StandingPlaces:
         values = {name: getattr(given, name) for name in self._names}
         of = msgspec.json.encode((values, given.map_frame))
         self._of = f"{zlib.crc32(of):08x}"
-        # The frame in use, "" before there is one; and the last report on it.
+        # The frame in use, "" before there is one; and the last fault reported.
         self._here = self._said = ""
 
     def enter(self, frame: str) -> PlacesElsewhere | None:
-        """Note the frame in use; return a fault if the places belong to another one now."""
+        """Note the frame in use; return a new fault if the places are not valid there."""
         self._here = frame
         if self.note.of != self._of:
             self.note = replace(
@@ -66,7 +65,7 @@ class StandingPlaces:
     def leave_building(self, frame: str) -> None:
         """Note that the map in a frame shows another building; ``enter`` returns the fault.
 
-        Places that are new in the configuration belong to the new building.
+        Places that a changed configuration gives belong to the new building.
         """
         if self.note.of == self._of and self.note.frame == frame:
             self.note = replace(self.note, is_left=True)
@@ -83,7 +82,7 @@ class StandingPlaces:
 
     @property
     def why(self) -> str:
-        """Why no place of the configuration is used; "" if they are, or if there are none."""
+        """Why the configured places are not used; "" if they are, or if there are none."""
         note = self.note
         if not self._names or note.of != self._of or not self._here:
             return ""
@@ -97,10 +96,10 @@ class StandingPlaces:
 
     @property
     def why_no_keep_out(self) -> str:
-        """Why the keep-out zones of this map are not known; "" if they are, or none are given."""
+        """Why the keep-out zones of this map are unknown; "" if known, or if none are given."""
         is_given = "keep_out" in self._names or "keep_out_mask" in self._names
         why = self.why if is_given and self.why else self._why_no_mask
-        return f"{why}: waits for its own, or for that map" if why else ""
+        return f"{why}: waits for places of this map, or for that map" if why else ""
 
     @property
     def _why_no_mask(self) -> str:
@@ -123,14 +122,14 @@ class StandingPlaces:
 
     @property
     def frame(self) -> str:
-        """The frame of the map they belong to; "" while that is not known."""
+        """The frame of the map that the places belong to; "" while unknown."""
         return self.note.frame if self.note.of == self._of else self._given.map_frame
 
     def located(self, order: MissionOrder, book: RoomBook) -> MissionOrder:
-        """Return an order with its named zones replaced by those of the configuration, or rooms.
+        """Return an order with its named zones replaced by configured zones or rooms.
 
         Raises:
-            OrderError: there is no zone or room of that name, or it is on another map.
+            OrderError: no zone or room has the name, or it is on another map.
         """
         named = [zone.name for zone in order.zones if zone.polygon == () and not zone.room]
         names = [name for name in named if book.find(name) is None]

@@ -1,7 +1,7 @@
 """Rooms one by one: a price of steps from one room into another.
 
-Of many walks that take nearly the same time most leave rooms half done. With the price the search
-chooses one that finishes a room before the next.
+Many walks take nearly the same time, and most of them leave rooms half done. With the price, the
+search chooses a walk that finishes each room before the next.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from fasaco_edge.mission.config import ByRoom
 from fasaco_edge.mission.map.room_cells import RoomCells
 from fasaco_edge.planners.problem import CoverageProblem
 
-# Price of a step into another room, in steps with a quarter-turn each. With a tenth of it robots
-# came back to 19 rooms of 27, with it to 12; four times as much gained nothing on other floors.
+# Price of a step into another room, in units of a step with a quarter-turn. At this price robots
+# returned to 12 rooms of 27, at a tenth of it to 19; four times the price gained nothing.
 PRICE = 20.0
 
 
@@ -22,7 +22,7 @@ class RoomPrice:
 
     Args:
         by_room: whether rooms matter.
-        cells: the rooms of cells.
+        cells: the room of each cell.
     """
 
     def __init__(self, by_room: ByRoom, cells: RoomCells) -> None:

@@ -1,4 +1,4 @@
-"""The rest of an order: cells that need a visit, floor that opened, zones beyond reach."""
+"""Cells left of an order: cells that need a visit, floor that opened, zones out of reach."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class CellsLeft:
     ) -> None:
         self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
         self._state, self._exploration = state, exploration
-        # The edge of an area.
+        # The last area, and its edge cells.
         self._edge: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
@@ -69,7 +69,7 @@ class CellsLeft:
 
     @property
     def is_exploring(self) -> bool:
-        """Whether for some reachable cell the map does not yet show if the robot fits."""
+        """Whether a reachable cell is undecided: the map does not show if the robot fits there."""
         area = self._map.area
         decided = None if area is None else self._map.is_decided(area.lattice.window)
         if area is None or decided is None:
@@ -100,7 +100,7 @@ class CellsLeft:
         return [(row, col) for row, col in cells[nearest].tolist()]
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
-        """Return which cells of ``window`` this robot has to cover, covered or not."""
+        """Return the cells of ``window`` that this robot has to cover, or has covered."""
         state = self._state()
         zone, order = state.current_zone, state.order
         due = (zone,) if zone is not None else order.zones if order is not None else ()
@@ -125,7 +125,7 @@ class CellsLeft:
         return carried(self._edge[1], area.lattice.window, window)
 
     def edge_in(self, window: Window, square_m: float) -> NDArray[np.bool_]:
-        """Return which squares of a window, ``square_m`` wide [m], have their centre in an edge."""
+        """Return which squares of a window, ``square_m`` wide [m], are centred in an edge cell."""
         share = square_m / self._config.footprint.cell_m
         rows, cols = (
             np.floor((np.arange(first, end) + 0.5) * share).astype(np.int64)
@@ -137,7 +137,7 @@ class CellsLeft:
 
     @property
     def keeps_passed(self) -> bool:
-        """Whether floor of cells that this robot has passed stays with it, in any robot's part."""
+        """Whether this robot's floor includes all cells it has passed, also in parts of others."""
         return self._company.has_members
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
@@ -164,15 +164,14 @@ class CellsLeft:
 
 @dataclass(slots=True)
 class LeftBehind:
-    """Finds floor for which a robot on its way home turns back.
+    """Decides whether a robot on its way home turns back, as floor has opened.
 
     Attributes:
-        times: how often it turned back. A gap that opens whenever the robot has left must not hold
-            it for ever.
+        times: how often it turned back. Callers limit it, as a gap may open after each departure.
     """
 
     times: int = 0
-    # Cells that were reachable when the robot set out; None if not known, as after a restart.
+    # The reachable area when the robot set out; None if unknown, as after a restart.
     _area: ReachableArea | None = None
 
     def set_out(self, area: ReachableArea | None) -> None:
@@ -182,8 +181,8 @@ class LeftBehind:
     def is_open(self, unswept: NDArray[np.bool_], area: ReachableArea) -> bool:
         """Return whether floor has opened since it set out: at least a square of two by two cells.
 
-        Rows of cells along walls come and go with the map's noise. ``unswept``: bool (rows, cols)
-        of the area.
+        Single rows of cells along walls are noise of the map. ``unswept``: bool (rows, cols) of the
+        area.
         """
         before = self._area = self._area or area
         opened = unswept & area.reachable
@@ -197,8 +196,11 @@ class LeftBehind:
 
 
 def visits_due(zone: Zone, area: ReachableArea, skipped: NDArray[np.bool_]) -> int:
-    """Return how many cells the passes over a zone cover, the first one none of those skipped, bool
-    (rows, cols) of the area; where no cell of it is reachable, as many as fit into its polygon."""
+    """Return the number of cells that the passes over a zone cover.
+
+    The first pass leaves out ``skipped``, bool (rows, cols) of the area. If no cell of the zone is
+    reachable, the area of its polygon gives the number.
+    """
     lattice = area.lattice
     inside = in_zones((zone,), lattice.window, lattice.cell_m) & area.reachable
     if zone.polygon and not inside.any():
@@ -215,9 +217,9 @@ def visits_due(zone: Zone, area: ReachableArea, skipped: NDArray[np.bool_]) -> i
 def zones_beyond(
     order: MissionOrder, area: ReachableArea, free: CoverageLattice, visits: NDArray[np.uint16]
 ) -> str:
-    """Return zones with their areas as text that follows another; "" for none.
+    """Return the zones out of reach, with their areas, as the end of a longer text; "" for none.
 
-    A zone that was covered before its way was closed does not count.
+    Covered zones that have become unreachable do not count.
 
     Args:
         order: the order.

@@ -48,7 +48,7 @@ def read_command(document: object) -> Command:
     """Return the command in a parsed document.
 
     Raises:
-        OrderError: naming the member, what was expected and what came.
+        OrderError: a member is wrong; the text names it, the expected and the given value.
     """
     asked = converted(document, CommandDocument)
     name = asked.command
@@ -97,7 +97,7 @@ def _parts(order: object) -> Iterator[tuple[object, int]]:
 
 
 def read_recorded(document: dict[str, object]) -> Command:
-    """Return a command of a recording; releases before ``discard`` always forgot covered cells.
+    """Return a recorded command; without ``discard``, as in older releases, it forgets cells.
 
     Raises:
         OrderError: as ``read_command``.

@@ -1,4 +1,4 @@
-"""Exploration: cells visited only to look around, for a path to an unreachable zone."""
+"""Exploration: cells visited to look for a path to an unreachable zone."""
 
 from __future__ import annotations
 
@@ -14,29 +14,27 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
 
-# Cells this close to a cell that showed nothing new are not visited either [cells].
+# Distance from a visited viewpoint within which the robot tries no other viewpoint [cells].
 SEEN_AROUND = 1
-# Period of looking again for a way past robots that stand in it [s].
-AGAIN_S = 1.0
-# Time for which a robot looks at ground beyond its map, which may come late [s].
-LOOKS_S = 6.0
+# Period between searches for a way past robots that block it [s].
+SEARCH_PERIOD_S = 1.0
+# Time that a robot stands at the edge of its map, which may come late [s].
+LOOK_S = 6.0
 
 
 def frontier(area: ReachableArea) -> NDArray[np.bool_]:
     """Return the reachable cells that have an unknown neighbour, bool (rows, cols)."""
-    # Outside of the lattice all is unknown.
+    # Everything outside the lattice is unknown.
     return area.reachable & beside(area.lattice.states == UNKNOWN, beyond=True)
 
 
 def next_frontier(area: ReachableArea, polygon: Polygon, looked: Iterable[Cell]) -> Cell | None:
-    """Return the frontier cell (row, col) nearest to a corner of the polygon [m], straight line.
-
-    A frontier cell is reachable and has an unknown neighbour.
+    """Return the frontier cell (row, col) nearest to a corner of a polygon; None for none.
 
     Args:
         area: the reachable area.
-        polygon: destination.
-        looked: cells already visited for this; their neighbourhoods are left out.
+        polygon: destination, corners (x, y) [m].
+        looked: viewpoints already visited; cells around them are left out.
     """
     lattice, window = area.lattice, area.lattice.window
     rows, cols = np.nonzero(frontier(area))
@@ -59,9 +57,9 @@ class Exploration:
     Attributes:
         viewpoints: cells (row, col) to look from, not yet reached.
         reached: number of viewpoints that were reached.
-        looked: cells already visited in search of the zone, or of ground beyond the map.
+        looked: viewpoints already visited for this zone, or for ground beyond the map.
         seeks_zone: whether the viewpoints are for a zone.
-        is_shut: whether other robots stand in the way to all cells from which the zone may be seen.
+        is_shut: whether other robots block the way to all viewpoints for the zone.
     """
 
     viewpoints: set[Cell] = field(default_factory=set)
@@ -69,16 +67,16 @@ class Exploration:
     reached: int = 0
     seeks_zone: bool = False
     is_shut: bool = False
-    # The last viewpoint of ground beyond the map, why, and since when the robot has been there.
+    # The last viewpoint for ground beyond the map, why, and the time of arrival there [s].
     _beyond: Cell | None = None
     _why_beyond: str = ""
     _there_since: float | None = None
-    # Since when the robot has waited for those robots, and when it looked for a way last.
+    # Start of the wait for the robots in the way, and time of the last search for a way [s].
     _shut_since: float | None = None
     _shut_looked: float = float("-inf")
 
     def begin(self) -> None:
-        """Begin with another zone."""
+        """Begin another zone."""
         self.looked.clear()
         self.is_shut, self._shut_since = False, None
 
@@ -93,13 +91,13 @@ class Exploration:
     ) -> str:
         """Look for a path to an unreachable zone; return why a plan is wanted, or "".
 
-        Visits frontier cells, nearest to the zone's corners first, until the zone is reachable or
-        all were visited. Those behind other robots can wait.
+        The robot visits frontier cells, nearest to the zone's corners first, until the zone is
+        reachable or all were visited. Frontier cells behind other robots come last.
 
         Args:
             zone: the zone.
             area: the reachable area.
-            free: the part reachable around the robots that now stand in the way.
+            free: the part of it that is reachable past the robots now in the way.
             cell: the robot's cell.
         """
         self.is_shut = False
@@ -116,7 +114,7 @@ class Exploration:
         return f"looking for a way to zone {zone.name!r}"
 
     def waits_for_way(self, now: float, patience_s: float) -> bool:
-        """Return whether the robot waits, ``patience_s`` at most, for others to clear the way."""
+        """Return whether the robot waits, up to ``patience_s`` [s], for others to clear the way."""
         if not self.is_shut:
             self._shut_since = None
             return False
@@ -127,12 +125,12 @@ class Exploration:
 
     def is_shut_still(self, now: float) -> bool:
         """Return whether it is too soon to look again for a way past others."""
-        return self._shut_since is not None and now - self._shut_looked < AGAIN_S
+        return self._shut_since is not None and now - self._shut_looked < SEARCH_PERIOD_S
 
     def look_beyond(self, viewpoint: Cell, cell: Cell, why: str) -> str:
-        """Look beyond the map, from ``cell``; return ``why``, as a plan is wanted, or "".
+        """Aim at ground beyond the map; return ``why`` if a plan is wanted, else "".
 
-        Each viewpoint is used once: data of others may be wrong, or the way closed to this robot.
+        Each viewpoint is used once: maps of others may be wrong, or the way too narrow.
         """
         if any(_is_beside(viewpoint, at) for at in (cell, *self.looked)):
             return ""
@@ -147,11 +145,7 @@ class Exploration:
             return ""
         if self._there_since is None:
             self._there_since = now
-        return self._why_beyond if now - self._there_since <= LOOKS_S else ""
-
-    def aim_at(self, viewpoints: set[Cell]) -> None:
-        """Set the viewpoints."""
-        self.viewpoints = viewpoints
+        return self._why_beyond if now - self._there_since <= LOOK_S else ""
 
     def end_if_reached(self, zone: Zone | None, area: ReachableArea) -> None:
         """Stop searching for a zone once it is reachable."""
@@ -159,7 +153,7 @@ class Exploration:
             self.viewpoints.clear()
 
     def skip_viewpoint(self) -> bool:
-        """Skip an unreached viewpoint; return whether others may show the zone."""
+        """Give up an unreached viewpoint; return whether another one may show the zone."""
         another = bool(self.looked and self.viewpoints)
         if another:
             self.viewpoints.clear()
@@ -172,7 +166,7 @@ class Exploration:
 
 
 def _is_beside(cell: Cell, other: Cell) -> bool:
-    """Return whether a cell gives no better view than another."""
+    """Return whether two cells are so close that they have the same view."""
     return max(abs(cell[0] - other[0]), abs(cell[1] - other[1])) <= SEEN_AROUND
 
 

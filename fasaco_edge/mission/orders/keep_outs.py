@@ -1,4 +1,4 @@
-"""Keep-outs of the operator: named areas that hold under every order until they are removed.
+"""Keep-outs of the operator: named areas that apply to every order until they are removed.
 
 They are part of the order's state, so they are kept with the ledger. Keep-outs of an order end with
 the order.
@@ -18,7 +18,7 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
 
-# Limits on the places of an order: it is kept with the ledger, which is written once a second.
+# Limits on the places of an order, as it is part of the ledger, which is written once a second.
 MOST_KEEP_OUT = 100
 MOST_POINTS = 1_000
 MOST_POINTS_IN_ALL = 5_000
@@ -32,7 +32,7 @@ PlaceName = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 
 
 class KeepOutDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A keep-out of the operator; without a polygon, to be removed."""
+    """A keep-out of the operator; a request to remove it has no polygon."""
 
     name: PlaceName
     polygon: Corners | None = None
@@ -44,7 +44,7 @@ class KeepOut:
 
     Attributes:
         name: unique among the operator's keep-outs.
-        polygon: corners (x, y) [m] in the map frame, on any lattice; () for one to be removed.
+        polygon: corners (x, y) [m] in the map frame, on any lattice; () in a request to remove it.
     """
 
     name: str
@@ -58,7 +58,7 @@ def keep_out_of(document: KeepOutDocument) -> KeepOut:
     """Return the keep-out in a document.
 
     Raises:
-        OrderError: naming the member, and what is wrong with it.
+        OrderError: a member is wrong; the text names it.
     """
     check_name("keep_out.name", document.name)
     polygon = tuple(document.polygon or ())
@@ -73,10 +73,10 @@ def keep_out_document(keep_out: KeepOut) -> dict[str, object]:
 
 
 def added(keep_outs: KeepOuts, new: KeepOut) -> KeepOuts:
-    """Return keep-outs with another one added; unchanged if it is there already.
+    """Return keep-outs with ``new`` added; unchanged if they contain it.
 
     Raises:
-        OrderError: another one has that name, or there are too many, or too many corners.
+        OrderError: another keep-out has its name, or there are too many keep-outs or corners.
     """
     if new in keep_outs:
         return keep_outs
@@ -100,7 +100,7 @@ def added(keep_outs: KeepOuts, new: KeepOut) -> KeepOuts:
 
 
 def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
-    """Return keep-outs without the one of a name.
+    """Return keep-outs without the one that has the name of ``unwanted``.
 
     Raises:
         OrderError: there is no keep-out of this name.
@@ -121,7 +121,7 @@ def check_name(where: str, name: str) -> None:
     """Check the name of a place.
 
     Raises:
-        OrderError: it is not printable, or has spaces around it.
+        OrderError: it has unprintable characters, or spaces at an end.
     """
     if not (name.isprintable() and name.strip() == name):
         raise OrderError(
@@ -130,10 +130,10 @@ def check_name(where: str, name: str) -> None:
 
 
 def check_polygons(polygons: Mapping[str, Polygon]) -> None:
-    """Check polygons, by the members they are in, beyond their types; it needs no map.
+    """Check polygons, each under the name of its member, beyond their types.
 
     Raises:
-        OrderError: naming the member, and what is wrong with it.
+        OrderError: a polygon is wrong; the text names its member.
     """
     points = sum(map(len, polygons.values()))
     if points > MOST_POINTS_IN_ALL:

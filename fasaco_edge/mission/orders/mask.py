@@ -24,7 +24,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 
 # A hand-drawn outline needs one rectangle for each step of its staircase.
 MOST_RECTANGLES = 2_000
-# Unpacking expands a few rows of bits to bytes at a time.
+# Bounds memory: unpacking expands eight rows of bits to bytes at a time.
 MOST_COLS = 100_000
 # Prefix of a mask stored in the configuration itself: a replay has no file.
 INLINE = "mask:"
@@ -60,7 +60,7 @@ def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = Non
 
 
 def inline_grid(grid: OccupancyGrid, occupied_at_least: int) -> str:
-    """Return the inline form of a mask that came as a message, the input of ``mask_polygons``.
+    """Return the inline form of a mask received as a message, the input of ``mask_polygons``.
 
     Raises:
         BadConfiguration: its outlines are too fine, or it is too wide.
@@ -134,7 +134,7 @@ def _check_width(cols: int) -> None:
 
 
 def _rows(bits: NDArray[np.uint8], rows: int, cols: int) -> Iterator[NDArray[np.uint8]]:
-    """Yield the rows of packed pixels, uint8 (cols,) of 0 and 1; 8 rows are whole bytes."""
+    """Yield the rows of packed pixels, uint8 (cols,) of 0 and 1; eight rows fill whole bytes."""
     for row in range(0, rows, 8):
         count = min(rows - row, 8)
         some = np.unpackbits(bits[row // 8 * cols :][:cols], count=count * cols)
@@ -155,7 +155,7 @@ def _rectangles(bits: NDArray[np.uint8], rows: int, cols: int) -> list[tuple[int
     open_since: dict[tuple[int, int], int] = {}
     for row, marked in enumerate(chain(_rows(bits, rows, cols), (np.zeros(cols, np.uint8),))):
         borders = np.flatnonzero(np.diff(marked.view(np.int8), prepend=0, append=0))
-        # Runs of this row; each is a rectangle, or extends one.
+        # Runs of this row; each begins a rectangle or extends one.
         stretches = {
             (int(low), int(high)): None
             for low, high in borders.reshape(-1, 2)[: MOST_RECTANGLES + 1]

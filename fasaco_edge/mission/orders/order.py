@@ -37,7 +37,7 @@ Minutes = Annotated[float, Meta(ge=0, le=1440)]
 
 
 class RoomArea(NamedTuple):
-    """A room in an order for everything: its title, its outline, holes in that, its priority."""
+    """A room in an order for everything; the polygons are corners (x, y) [m]."""
 
     title: str
     outline: Polygon
@@ -52,17 +52,17 @@ class Zone:
     Attributes:
         name: unique in its order.
         polygon: corners (x, y) [m] in the map frame, the last joined to the first; None for
-            everything reachable; () for a standing zone or a room of that name that is not placed
-            yet, see ``orders.placing``.
+            everything reachable; () until ``orders.placing`` finds the standing zone or room of
+            that name.
         passes: number of passes.
-        kinds: what is special about each pass; () if nothing is.
-        room: number of the room that it is, whose outline it follows; 0 for none.
+        kinds: settings of each pass; () if all passes are usual.
+        room: number of the room whose outline it follows; 0 for none.
         holes: polygons within ``polygon`` that are not part of it.
-        without: of everything: the rooms that are left out.
-        priority: where time or battery do not allow all, zones of higher priority come first; None
-            for that of its room, or the usual one.
-        ranked: of everything: the rooms with a priority of their own.
-        is_as_usual: whether the order says nothing about passes, so that a room's settings apply.
+        without: for everything: the rooms that are left out.
+        priority: zones of higher priority come first if time or battery do not allow all; None for
+            the room's priority, or the usual one.
+        ranked: for everything: the rooms with a priority of their own.
+        is_as_usual: whether the order gives no passes, so that a room's settings apply.
     """
 
     name: str
@@ -82,11 +82,11 @@ class Zone:
         return USUAL_PRIORITY if self.priority is None else self.priority
 
     def kind(self, number: int) -> Pass:
-        """Return what is special about a pass, from 1."""
+        """Return the settings of a pass, counted from 1."""
         return self.kinds[number - 1] if self.kinds else Pass()
 
     def laid(self, number: int) -> Laid:
-        """Return a pass, from 1, on a lattice."""
+        """Return a pass, counted from 1, with its lanes on a lattice."""
         return laid(self.kinds)[number - 1] if self.kinds else Laid()
 
 
@@ -103,10 +103,10 @@ class MissionOrder:
         keep_out: polygons (x, y) [m] in the map frame that the robot must not touch.
         return_home: whether to drive back to the start at the end.
         keep_covered: whether the first pass skips cells that were covered before.
-        unknown: what becomes of a zone whose name is not known yet: the order is refused, or waits
-            for a room of that name.
+        unknown: whether an order with an unknown zone name is refused, or waits for a room of that
+            name.
         until_min: time after which it ends, with the robot at home [min]; 0 for no limit, None for
-            the one of the configuration.
+            the configured limit.
         given: the order as given, in the map frame, if the polygons are rotated, see
             ``rotated_order``.
     """
@@ -143,7 +143,7 @@ CommandName = Literal[
     "room_merge",
     "room_set",
 ]
-# Why a robot drives somewhere outside of its order; "" for none.
+# Destination of a drive outside the order; "" for none.
 Errand = Literal["", "home", "charge"]
 
 
@@ -166,7 +166,7 @@ class Command(NamedTuple):
 
 
 class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Unknown members are errors."""
+    """A document without unknown members."""
 
 
 class StandingZone(Document, frozen=True):
@@ -180,9 +180,9 @@ class ZoneDocument(Document, frozen=True):
     """An area to cover; without a polygon, the standing zone or else the room of that name.
 
     Attributes:
-        room: number of the room that it is: it follows the room's outline.
-        priority: where time or battery do not allow all, zones of higher priority come first; by
-            default that of its room, or 50.
+        room: number of the room whose outline it follows.
+        priority: zones of higher priority come first if time or battery do not allow all; by
+            default the room's priority, or 50.
     """
 
     name: PlaceName
@@ -196,10 +196,10 @@ class OrderDocument(Document, frozen=True):
     """What to cover. Without zones: everything the robot can reach.
 
     Attributes:
-        passes: of zones without passes, and of everything; without it once, and rooms as their
-            settings say.
-        unknown: what becomes of a zone whose name is not known: the order is refused, or the zone
-            waits, after all others, for a room of that name.
+        passes: passes of everything, and of zones that give none; by default one pass, or for rooms
+            the passes of their settings.
+        unknown: whether an order with an unknown zone name is refused, or the zone waits, after
+            all others, for a room of that name.
         until_min: time after which the order ends, with the robot at home [min]; 0 for no limit,
             null for `mission.until_min` of the configuration.
     """
@@ -214,7 +214,7 @@ class OrderDocument(Document, frozen=True):
 
 
 _Read = TypeVar("_Read", bound=Document)
-# The words of members other than ``command``.
+# The allowed words of members other than ``command``.
 _WORDS: dict[str, object] = {
     "passes": PassWord,
     "covers": Covers,
@@ -227,7 +227,7 @@ def read_order(document: object) -> MissionOrder:
     """Return the order in a parsed JSON or YAML document; None is an order for everything.
 
     Raises:
-        OrderError: naming the member, what was expected and what came.
+        OrderError: a member is wrong; the text names it, the expected and the given value.
     """
     return order_of(converted(document if document is not None else {}, OrderDocument))
 
@@ -248,7 +248,7 @@ def order_document(order: MissionOrder) -> dict[str, object]:
 
 
 def _zone_document(zone: Zone) -> dict[str, object]:
-    # A zone by name alone may be a room, which has passes of its own.
+    # A zone given by name alone may be a room with passes of its own.
     says_none = zone.is_as_usual and zone.polygon == ()
     passes = {} if says_none else {"passes": passes_document(zone.passes, zone.kinds)}
     polygon = {"polygon": zone.polygon} if zone.polygon else {}
@@ -261,7 +261,7 @@ def order_of(document: OrderDocument) -> MissionOrder:
     """Return the order in a document.
 
     Raises:
-        OrderError: naming the member, what is wrong with it, and what is allowed.
+        OrderError: a member is wrong; the text names it, and what is allowed.
     """
     usual, is_usual = passes_of(document.passes or 1, "passes"), document.passes is None
     zones = tuple(
@@ -300,10 +300,10 @@ def order_of(document: OrderDocument) -> MissionOrder:
 
 
 def converted(document: object, kind: type[_Read]) -> _Read:
-    """Return a parsed document as a kind of document.
+    """Return a parsed document as a typed one.
 
     Raises:
-        OrderError: naming the member, what was expected and what came.
+        OrderError: a member is wrong; the text names it, the expected and the given value.
     """
     try:
         return msgspec.convert(document, kind)

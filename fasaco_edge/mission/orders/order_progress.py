@@ -1,4 +1,4 @@
-"""Progress of an order: its zone, its pass, its stage, and which of them is next."""
+"""Progress of an order: its zone, pass and stage, and the next ones."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class PlacesNote:
         of: checksum of these places; "" while they belong to no map.
         frame: frame of that map.
         is_left: whether the map in that frame has shown another building since.
-        left_mask: checksum of a keep-out mask that came as a message, if its map has shown another
-            building since; "" for none.
+        left_mask: checksum of the keep-out mask received as a message if the map in its frame has
+            shown another building since; else "".
     """
 
     of: str = ""
@@ -55,17 +55,16 @@ class OrderProgress:
         pass_number: number of the pass over it, from 1.
         begun: whether that pass has begun.
         tries: number of retries so far.
-        home: the cell (row, col) where the first order began, since a reset or a change of map.
+        home: cell (row, col) where the first order since a reset or a change of map began.
         paused: whether the robot must stand.
-        errand: destination to drive to first.
-        why: why there is no order; for a paused order, what led to the pause; for one that is
-            over, how it ended.
+        errand: destination to drive to before the order continues.
+        why: why there is no order, why it is paused, or how it ended.
         frame: frame of the map that zones, keep-out zones and home were given for; "" while no
             frame is in use.
         places: which map the places of the configuration belong to.
         keep_out: keep-outs of the operator, under any order.
-        reached: cells that have been reachable since the order began; only as kept with the ledger,
-            None in a mission.
+        reached: cells that have been reachable since the order began; set only in the ledger's
+            file, None in a mission.
         spent_s: the robot's time since the order began, if it has a limit [s].
         late: why it ends before all is covered; "" if it does not.
     """
@@ -103,7 +102,7 @@ class OrderProgress:
 
     @property
     def current_pass(self) -> Laid:
-        """The pass being made, on a lattice."""
+        """The present pass, with its lanes on a lattice."""
         zone = self.current_zone
         return Laid() if zone is None else zone.laid(self.pass_number)
 
@@ -150,9 +149,11 @@ class OrderProgress:
         is_first = self.zone == 0 and self.pass_number == 1 and self.stage is Stage.COVERING
         return self.order is not None and (self.begun or not is_first)
 
-    def most_worthwhile_next(self) -> Self:
-        """Return the state with the zones from the present one on by priority, the highest first;
-        those that wait for a room stay last."""
+    def by_priority(self) -> Self:
+        """Return the state with present and later zones by priority, highest first.
+
+        Zones that wait for a room stay last.
+        """
         assert self.order is not None
         given, zones = self.order.as_given, self.order.zones
         to_come = sorted(
@@ -166,7 +167,7 @@ class OrderProgress:
         return replace(self, order=order)
 
     def out_of_time(self, minutes: float) -> Self:
-        """Return the state in which it ends, as its time limit [min] is up."""
+        """Return the state of an order that ends at its time limit [min]."""
         late = f"time is up after {minutes:g} min"
         if self.order is not None and self.stage is Stage.COVERING:
             zone, to_come = self.order.zones[self.zone], self.order.zones[self.zone + 1 :]

@@ -1,4 +1,4 @@
-"""Order state: an order, its progress, and what commands make of it.
+"""Order state: an order and its progress, changed by commands and other maps.
 
 It is kept with the ledger. Nothing here needs a map, so commands are accepted before there is one.
 """
@@ -41,7 +41,7 @@ from fasaco_edge.mission.orders.reached_cells import ReachedCells
 
 __all__ = ["AT_HOME", "NO_ORDER", "NO_PLACES", "OrderState", "PlacesNote", "Stage"]
 
-# Reason of being idle without autostart.
+# Reason for being idle without autostart.
 NO_ORDER = "no order yet: start a mission"
 AT_HOME = "at home"
 _START_AGAIN = "start the mission again; nothing is driven without an order"
@@ -49,7 +49,7 @@ _START_AGAIN = "start the mission again; nothing is driven without an order"
 
 @dataclass(frozen=True, slots=True)
 class OrderState(OrderProgress):
-    """An order and its progress, and what commands and other maps make of them."""
+    """An order and its progress, with the changes by commands and other maps."""
 
     @classmethod
     def autostart(cls) -> OrderState:
@@ -63,7 +63,7 @@ class OrderState(OrderProgress):
 
     @property
     def why_paused(self) -> str:
-        """Why the robot stands while paused."""
+        """Why a paused robot stands still."""
         at_home = "at home, " if self.order is not None and self.why == AT_HOME else ""
         return at_home + "paused by command"
 
@@ -75,11 +75,11 @@ class OrderState(OrderProgress):
         """Return the state after a command.
 
         A repeated command changes nothing. ``start`` replaces another order; the same order
-        continues, unless it is over. ``has_home``: whether the configuration has a home.
+        continues unless it is over. ``has_home``: whether the configuration has a home.
 
         Raises:
-            CommandError: there is nothing to pause, to resume or to plan, or no home.
-            OrderError: a keep-out cannot be added, or there is none of that name.
+            CommandError: there is nothing to pause, resume or plan, or no home.
+            OrderError: a keep-out cannot be added, or no keep-out has the name.
         """
         match command.name:
             case "start":
@@ -125,7 +125,7 @@ class OrderState(OrderProgress):
     def in_other_building(self, why: str) -> OrderState:
         """Return the state in another building, where zones, keep-outs and home are invalid."""
         if self.automatic:
-            # A robot that was sent home must not sweep in the new building instead.
+            # A robot that was sent home must not start to sweep in the new building.
             is_to_stand = self.paused or self.errand == "home"
             return replace(OrderState.autostart(), paused=is_to_stand)
         if self.order is not None:
@@ -179,7 +179,7 @@ class OrderState(OrderProgress):
         return replace(here, frame=self.frame, places=self.places)
 
     def to_json(self) -> str:
-        """Return it as JSON, to be kept with the ledger."""
+        """Return the state as JSON, for the ledger's file."""
         state = {each.name: getattr(self, each.name) for each in fields(self)}
         order = None if self.order is None else order_document(self.order)
         keep_out = msgspec.convert(list(map(keep_out_document, self.keep_out)), _KeepOuts)
@@ -191,7 +191,7 @@ class OrderState(OrderProgress):
         """Return the state encoded by ``to_json``.
 
         Raises:
-            OrderError: it has another version, or is incomplete.
+            OrderError: the note has another version, or is invalid.
         """
         try:
             kept = msgspec.json.decode(note, type=_Note)
@@ -219,10 +219,10 @@ _KeepOuts = Annotated[list[KeepOutDocument], Meta(max_length=MOST_KEEP_OUT)]
 class _Note(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True
 ):
-    """An order state as kept on disk; member names are those of the files.
+    """An order state as kept on disk, with the files' member names.
 
-    Without errand, keep-outs, frame, places, reached cells and time limit the form is the one that
-    older daemons read.
+    Older daemons can read it only without errand, keep-outs, frame, places, reached cells and time
+    limit.
     """
 
     version: Literal[1]

@@ -1,4 +1,4 @@
-"""Passes in documents of orders: a number of equal ones, or a list with one item for each."""
+"""Passes in order documents: the number of equal passes, or a list with an item for each pass."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class PassDocument(
     """A pass of an order.
 
     Attributes:
-        covers: all cells; `edge`, those along walls and furniture; after an `edge` the `rest`,
-            all others.
-        lanes: direction of the lanes: `auto`, as they are cheapest, along the cells' rows if the
-            next pass crosses them; `cross`, across those of the pass before.
+        covers: `all` cells; `edge`, cells along walls and furniture; `rest`, after an `edge` pass,
+            all other cells.
+        lanes: direction of the lanes: `auto`, the cheapest, or along the cells' rows if the next
+            pass is `cross`; `cross`, across the lanes of the pass before.
         angle_deg: angle of the lanes to the x axis of the map frame, in place of `lanes` [deg].
-        overlap: share of the tool's width by which the lanes overlap, in place of the robot's.
-        speed_m_s: speed of the robot, if less than its usual one [m/s].
+        overlap: share of the tool's width by which lanes overlap, in place of the configured one.
+        speed_m_s: speed of the robot, below its usual speed [m/s].
     """
 
     covers: Covers = "all"
@@ -53,14 +53,14 @@ Passes = (
 
 
 def passes_of(document: Passes, where: str) -> tuple[int, tuple[Pass, ...]]:
-    """Return the number of passes, and what is special about each; () if nothing is.
+    """Return the number of passes, and the settings of each; () if all are usual.
 
     Args:
         document: the passes.
-        where: member of the order that has them.
+        where: member of the order that contains them.
 
     Raises:
-        OrderError: they do not go together.
+        OrderError: the passes cannot follow each other.
     """
     if isinstance(document, int):
         return document, ()
@@ -95,7 +95,7 @@ def _item(each: Pass) -> object:
 
 
 def passes_words(document: Passes) -> str:
-    """Return passes as text that follows what they cover; "" for one without anything special."""
+    """Return passes as text that follows the name of what they cover; "" for one usual pass."""
     number, passes = passes_of(document, "passes")
     if not passes:
         return f" {number} times" if number > 1 else ""

@@ -1,6 +1,6 @@
-"""Placing of orders: zones by name become standing zones or rooms, whose outlines they follow.
+"""Placing of orders: zones given by name get the polygons of standing zones, or of rooms.
 
-Polygons are in the map frame, but for ``rotated_order``.
+Polygons are in the map frame, except in ``rotated_order``.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ def located(
     """Return an order with its named zones in place: standing zones first, then rooms.
 
     Raises:
-        OrderError: there is no zone or room of that name, and the order does not wait for one; or
-            no room of that number: none is awaited, as the next one to get it may be any.
+        OrderError: no zone or room has the name, and the order does not wait for one; or no room
+            has the number. An order never waits for a number, as any new room may get it.
     """
     known = {zone.name: tuple(zone.polygon) for zone in standing}
     may_wait = order.unknown == "wait"
@@ -42,7 +42,7 @@ def located(
 def _looked_up(
     zone: Zone, index: int, standing: dict[str, Polygon], book: RoomBook, *, may_wait: bool
 ) -> Zone:
-    """Return a zone with its polygon or the number of its room; without both if it waits."""
+    """Return a zone with its polygon or its room's number; unchanged if it waits for a room."""
     if not zone.room and zone.polygon != ():
         return zone
     if not zone.room and zone.name in standing:
@@ -68,8 +68,10 @@ def _looked_up(
 
 
 def restored(order: MissionOrder, book: RoomBook) -> MissionOrder:
-    """Return an order from before a restart without rooms that the book has lost: their zones keep
-    their polygons, and no other room gets their numbers."""
+    """Return an order from before a restart, without the rooms that the book has lost.
+
+    Their zones keep their polygons, and no other room gets their numbers.
+    """
     lost = {zone.room for zone in order.as_given.zones if zone.room >= book.next_id}
     if not lost:
         return order
@@ -79,14 +81,14 @@ def restored(order: MissionOrder, book: RoomBook) -> MissionOrder:
 
 
 def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder:
-    """Return an order with its rooms as they are now; the same object if nothing has changed.
+    """Return an order with its rooms' present outlines; the same object if nothing has changed.
 
-    Zones that wait for a room come after all others.
+    Zones that wait for a room come last.
 
     Args:
         order: the order.
         book: the rooms.
-        begun: index of the zone that is being covered: up to it zones keep their places.
+        begun: index of the zone being covered; up to it zones keep their sequence.
     """
     rooms = [room for room in book.rooms if room.outline]
     skipped = tuple(_area(room, book) for room in rooms if room.settings.skip)
@@ -125,15 +127,14 @@ def _placed(
 
 
 def _room_of(zone: Zone, book: RoomBook) -> Room | None:
-    """Return the room that a zone is; None if it is not known, or nowhere."""
+    """Return the room of a zone; None if it is unknown, or has no outline."""
     room = book.find(zone.room or zone.name)
     return room if room is not None and room.outline else None
 
 
 def are_same(one: MissionOrder, other: MissionOrder) -> bool:
-    """Return whether two orders ask for the same, wherever the outlines of rooms are by now, and
-    whatever comes first."""
-    # Zones of several priorities may have changed their order since.
+    """Return whether two orders ask for the same, regardless of room outlines and priorities."""
+    # Zones with different priorities may have been sorted since.
     is_ranked = any(len({zone.worth for zone in order.zones}) > 1 for order in (one, other))
     first, second = (_unplaced(order, is_ranked=is_ranked) for order in (one, other))
     return first == second

@@ -1,4 +1,4 @@
-"""Plan scope: which cells of the present pass a plan covers, through which area, at what price."""
+"""Plan scope: which cells of the present pass a plan covers, in which area, at what cost."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 
 
 class PlanScope:
-    """Poses the planning problems of an order, and orders its floor by worth. Times are [s].
+    """Poses the planning problems of an order, floor of high priority first. Times are [s].
 
     Attributes:
         worth: which cells are planned first.
@@ -53,7 +53,7 @@ class PlanScope:
 
         Args:
             cell: the robot's cell.
-            before: int32 (n, 2), the current path from there on.
+            before: int32 (n, 2), the current path from that cell on.
             home: the cell that the order leads back to at its end.
             attempt: see ``CoverageProblem``.
 
@@ -77,7 +77,7 @@ class PlanScope:
             cost=self._cost(),
             before=before,
             attempt=attempt,
-            # An attempt starts on the path, which the robot may have left for another area.
+            # An attempt starts on the path, from which the robot may have moved to another area.
             reachable=reachable if area.contains(cell) else None,
         )
         return self._room_price.added_to(problem)
@@ -90,20 +90,20 @@ class PlanScope:
         return cost.along(state.current_pass.lanes)
 
     def walk_s(self, cells: NDArray[np.int32]) -> float:
-        """Return how long a walk takes in the present pass [s]."""
+        """Return the duration of a walk in the present pass [s]."""
         return self._cost().of_walk(cells)
 
     def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
-        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        """Return the part of an area that a robot in ``cell`` can reach past other robots."""
         return self._company.passable(area, cell, self._config.footprint.robot_radius_m)
 
     def puts_other_first(self, ahead_s: float) -> bool:
-        """Put other floor first if the path ahead, of ``ahead_s`` [s], takes too long."""
+        """Choose again if the path ahead, ``ahead_s`` [s], is too long; return whether it did."""
         area = self._map.area
         if area is None:
             return False
         open_cells = self._cells.open_to_me(area) & area.reachable
-        return self.worth.is_other_first(open_cells, area.lattice.window, ahead_s)
+        return self.worth.puts_other_first(open_cells, area.lattice.window, ahead_s)
 
     @property
     def is_any_planned_left(self) -> bool:
@@ -116,14 +116,14 @@ class PlanScope:
 
     @property
     def is_first_done(self) -> bool:
-        """Whether the cells planned first are covered, and others are left."""
+        """Whether the cells planned first are covered, and other cells are left."""
         is_limited = self.worth.least > 0 and self._cells.left_to_me() > 0
         return is_limited and not self.is_any_planned_left
 
-    def most_worthwhile_next(self, ledger: MissionLedger) -> OrderState:
-        """Return the order with the zones to come by priority, if there is no time for all.
+    def by_priority(self, ledger: MissionLedger) -> OrderState:
+        """Return the order, its remaining zones sorted by priority if time does not allow all.
 
-        Not in a fleet: its robots sweep a zone together, in the order given.
+        A fleet keeps the given sequence, as its robots sweep each zone together.
         """
         state, area = self._state(), self._map.area
         zone = state.current_zone
@@ -137,4 +137,4 @@ class PlanScope:
         if state.order.keep_covered:
             skipped = ledger.current.visits(area.lattice.window) > 0
         cells = sum(visits_due(each, area, skipped) for each in to_come)
-        return state.most_worthwhile_next() if self.worth.are_too_many(cells) else state
+        return state.by_priority() if self.worth.are_too_many(cells) else state

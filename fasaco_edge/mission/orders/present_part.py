@@ -1,4 +1,4 @@
-"""Present part of an order: what of it is planned now, and when the robot gives it up."""
+"""Present part of an order: the cells planned now, and when the robot gives them up."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.plan_scope import PlanScope
 from fasaco_edge.planners.problem import CoverageProblem
 
-# After this many paths in a row that cover no further cell, the cells left wait for the retry: the
-# robot may stop short of its path's end, with the last cell out of the tool's reach.
+# Number of paths in a row without a newly covered cell, after which the cells left wait for a
+# retry. The robot may stop short of a path's end, its tool out of reach of the last cell.
 MAX_IN_VAIN = 3
 OTHERS_SEE = "looks for its part, which others see"
 MAP_ENDS = "looks where the map ends: the floor there was covered before a restart"
@@ -34,8 +34,8 @@ class PresentPart(OrderReach):
     """Poses the problems of the part of an order that is due. Times are [s].
 
     Attributes:
-        cells: the cells left of it.
-        scope: which of these are planned now, and how.
+        cells: the cells left.
+        scope: which of them are planned now, and how.
     """
 
     def __init__(
@@ -49,11 +49,11 @@ class PresentPart(OrderReach):
         super().__init__(map_state, ledger)
         self._config, self._company = config, company
         self._exploration = Exploration()
-        # Number of cells done by the end of the last path, -1 before the first, and of paths in a
-        # row that did not increase it.
+        # Number of cells done at the last path's end (-1 before the first path), and number of
+        # paths in a row that did not increase it.
         self._done, self._in_vain = -1, 0
-        # Whether the next plan is the first of a pass of its own kind.
-        self._is_laid_anew = False
+        # Whether the next plan begins a pass with other lanes than the pass before.
+        self._has_new_lanes = False
         self.cells = CellsLeft(
             *(config, map_state, ledger, company),
             state=lambda: self.order_state,
@@ -64,8 +64,8 @@ class PresentPart(OrderReach):
         )
 
     def _begin_part(self) -> None:
-        """Forget what was found on the way to another part."""
-        self._exploration, self._is_laid_anew = Exploration(), False
+        """Reset exploration, counts and worth for another part."""
+        self._exploration, self._has_new_lanes = Exploration(), False
         self._done, self._in_vain = -1, 0
         self.scope.worth.begin()
 
@@ -76,7 +76,7 @@ class PresentPart(OrderReach):
 
     @property
     def waits_for_others(self) -> bool:
-        """Whether only parts of other robots are left, and these make progress."""
+        """Whether only parts of other robots are left, and those robots make progress."""
         return self._company.others_go_on and not self.cells.left_to_me()
 
     def goal(self, errand: Errand = "home") -> Cell | None:
@@ -105,7 +105,7 @@ class PresentPart(OrderReach):
 
         Args:
             cell: the robot's cell.
-            before: int32 (n, 2), the current path from there on.
+            before: int32 (n, 2), the current path from that cell on.
             attempt: see ``CoverageProblem``.
 
         Raises:
@@ -115,8 +115,8 @@ class PresentPart(OrderReach):
         assert area is not None
         self._exploration.end_if_reached(self.order_state.current_zone, area)
         problem = self.scope.problem(cell, before, self.goal(), attempt)
-        # The walk of another pass has other lanes: a repair would keep them.
-        is_full, self._is_laid_anew = self._is_laid_anew, False
+        # A repair would keep the lanes of the pass before.
+        is_full, self._has_new_lanes = self._has_new_lanes, False
         return replace(problem, is_full=is_full)
 
     def explore(self, cell: Cell) -> str:
@@ -135,16 +135,16 @@ class PresentPart(OrderReach):
         return next(filter(None, looks), "")
 
     def why_standing(self, now: float) -> str:
-        """Return why the robot stands, though a plan is wanted, or ""."""
+        """Return why the robot stands although a plan is wanted, or ""."""
         if self.waits_for_others:
             return "others sweep what is left"
         return self._why_shut() if self._exploration.is_shut_still(now) else ""
 
     def why_looking(self, cell: Cell, now: float) -> str:
-        """Return why the robot stands where it has nothing to cover, or "".
+        """Return why the robot stands without a cell to cover, or "".
 
-        It looks beyond its map, or waits for others that stand in the way to its zone:
-        as long as the retries of an order take.
+        It looks at ground beyond its map; or it waits for robots in the way to its zone, for as
+        long as the retries of an order take.
         """
         exploration, policy = self._exploration, self._config.policy
         if exploration.waits_for_way(now, policy.retries * policy.retry_s):
@@ -156,14 +156,14 @@ class PresentPart(OrderReach):
         return "others stand in the way" + (f" to zone {zone.name!r}" if zone else "")
 
     def note_path_end(self, why: str) -> bool:
-        """Note the end of a path; return whether the cells it left over must wait for a retry.
+        """Note the end of a path; return whether the cells it left must wait for a retry.
 
-        ``why``: why it left them over; "" if that is not known.
+        ``why``: why the path left them; "" if unknown.
         """
         cells = self.cells.left_to_me()
         if cells > 0:
             self._note_failure(why)
-        # Counted by cells done, not by cells left: a map may show further ones at any time.
+        # Cells done are counted, not cells left, as a new map may add cells.
         done = self.done
         self._in_vain = self._in_vain + 1 if cells and done <= self._done else 1
         self._done = done
@@ -174,17 +174,17 @@ class PresentPart(OrderReach):
             self.scope.worth.give_up()
             return False
         if is_given_up and self._company.has_company:
-            # Other robots may leave before they have swept their parts: those come first.
+            # Parts that other robots may leave unswept come before a retry.
             is_given_up, self._in_vain = self._leave_to_others(), 0
         return is_given_up
 
     @property
     def done(self) -> int:
-        """Number of cells that this robot has covered, or has visited only to look from them."""
+        """Number of cells that this robot has covered, or has visited as viewpoints."""
         return self._ledger.current.snapshot().cells + self._exploration.reached
 
     def _leave_to_others(self) -> bool:
-        """Give up what this robot has tried in vain; return whether nothing untried is left."""
+        """Give up the cells tried in vain; return whether no untried cell is left."""
         area = self._map.area
         assert area is not None
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
@@ -192,9 +192,9 @@ class PresentPart(OrderReach):
         return not self._company.untried(unswept, area).any()
 
     def pass_over_unreachable(self) -> bool:
-        """In a fleet pass over cells that are out of reach now; return whether there were any.
+        """In a fleet, pass over cells that are unreachable now; return whether there were any.
 
-        Cells of others' parts that it can reach come before a retry.
+        Reachable cells of others' parts come before a retry.
         """
         area = self._map.area
         if area is None or not self._company.has_company:

@@ -1,4 +1,4 @@
-"""Reached cells: which cells have been reachable since an order began, as kept over a restart."""
+"""Reached cells: which cells have been reachable since an order began, kept over a restart."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ReachedCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
 
     Attributes:
         row0, col0, rows, cols: the window.
-        bits: a bit for each cell, row by row, the first of eight the highest.
-        have_moved: whether they have moved by parts of a cell, so that some may lie in walls.
+        bits: one bit per cell, row by row, most significant bit first.
+        have_moved: whether they have moved by fractions of a cell, so that some may lie in walls.
     """
 
     row0: int
@@ -31,7 +31,7 @@ class ReachedCells(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit
     have_moved: bool = False
 
     def __post_init__(self) -> None:
-        """Check the sizes; raise ValueError where they do not fit."""
+        """Check the sizes; raise ValueError if they do not match."""
         if self.rows * self.cols > MAX_LATTICE_CELLS:
             raise ValueError(f"{self.rows} x {self.cols} cells, {MAX_LATTICE_CELLS} at most")
         if len(self.bits) != -(-self.rows * self.cols // 8):

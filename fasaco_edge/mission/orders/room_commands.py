@@ -1,4 +1,4 @@
-"""Room commands: what people ask about rooms, carried out on the room book."""
+"""Room commands: requests about rooms, applied to the room book."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
 from fasaco_edge.mission.orders.passes import passes_of
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 
-# Commands that need the map, and kernels.
+# Commands that need the map and the kernels.
 ON_MAP = frozenset(("room_split", "room_merge"))
 
 
@@ -15,7 +15,7 @@ def check_before_map(command: str) -> None:
     """Check that a command can be carried out before there is a mission.
 
     Raises:
-        CommandError: it changes where rooms are.
+        CommandError: the command changes outlines of rooms.
     """
     if command in ON_MAP:
         raise CommandError(
@@ -27,7 +27,7 @@ def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
     """Carry out a command.
 
     Raises:
-        OrderError: there is no such room, or it cannot be changed so; nothing has changed.
+        OrderError: there is no such room, or the change is not possible; nothing has changed.
     """
     match command:
         case "room_name":
@@ -41,7 +41,7 @@ def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
             priority = before.priority if asked.priority is None else asked.priority
             book.set(asked.id, RoomSettings(passes, kinds, skip, priority))
         case _:
-            # With kernels, which a daemon without a map has not loaded.
+            # Imports kernels, which a daemon without a map has not loaded.
             from fasaco_edge.mission.map.room_edits import merge, split  # noqa: PLC0415
 
             if command == "room_split":

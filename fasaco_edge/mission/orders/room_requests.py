@@ -1,4 +1,4 @@
-"""Requests of people about rooms: to name, split, merge and set them."""
+"""Requests to name, split, merge and set rooms."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.mission.orders.keep_outs import LONGEST_NAME, PlaceName
 from fasaco_edge.mission.orders.passes import Passes, passes_of
 
-# A merge joins at most this many rooms with one.
+# Most rooms that a merge joins with one.
 MOST_MERGED = 50
 
-# Priority of floor of which nothing is said.
+# Priority of floor for which none is given.
 USUAL_PRIORITY = 50
 Priority = Annotated[int, Meta(ge=0, le=100)]
 RoomNumber = Annotated[int, Meta(ge=1, le=65_000)]
@@ -28,14 +28,14 @@ class RoomRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
 
     Attributes:
         id: its number or its name.
-        name: for `room_name` the new name, or "" for none; for `room_merge`, if given, that of the
-            merged room.
+        name: for `room_name`: the new name, or "" for none; for `room_merge`: optional name of
+            the merged room.
         cut: for `room_split`: a segment from wall to wall.
         others: for `room_merge`: numbers or names of the rooms to merge with it.
-        passes: for `room_set`: passes of an order by its name that gives none itself.
+        passes: for `room_set`: passes over the room in orders that name it and give none.
         skip: for `room_set`: whether orders for everything leave the room out.
-        priority: for `room_set`: where time or battery do not allow all, floor of higher priority
-            comes first.
+        priority: for `room_set`: floor of higher priority comes first if time or battery do not
+            allow all.
     """
 
     id: RoomNumber | PlaceName
@@ -51,7 +51,7 @@ class RoomRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     priority: Priority | None = None
 
 
-# Members that each command takes beside the room itself, and those of them that it must have.
+# For each command: the members it takes besides the room's id, and those it requires.
 _TAKES: dict[str, tuple[set[str], set[str]]] = {
     "room_name": ({"name"}, {"name"}),
     "room_split": ({"cut"}, {"cut"}),
@@ -64,7 +64,7 @@ def checked_room(command: str, asked: RoomRequest | None) -> RoomRequest | None:
     """Return the request of a command; None for a command that takes none.
 
     Raises:
-        OrderError: naming the member that is missing, of another command, or wrong.
+        OrderError: a member is missing, wrong, or for another command; the text names it.
     """
     if (asked is not None) != (command in _TAKES):
         got = "missing" if asked is None else "got it"

@@ -1,4 +1,4 @@
-"""Sequencer: carries out an order: zones pass by pass, then retries, then the return home."""
+"""Sequencer: carries out an order, zones pass by pass, then retries, then the return home."""
 
 from __future__ import annotations
 
@@ -24,9 +24,8 @@ from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.present_part import MAX_IN_VAIN, PresentPart
 from fasaco_edge.mission.orders.zones import in_zones
 
-# A robot is shut in if its reachable area is less than this share of all area ever reachable: the
-# first if home is in it, else the second. A closed door to another room does not shut in a robot at
-# home.
+# Share of the area ever reachable below which a robot is shut in: HOME_SHARE with home in reach,
+# so that a closed door to another room has no effect, else MOST_SHARE.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 CARRIED_OUT = "the order was carried out"
 
@@ -47,18 +46,18 @@ class Sequencer(PresentPart):
         room_price: RoomPrice,
     ) -> None:
         super().__init__(config, map_state, ledger, company, room_price)
-        # Floor that opens while the robot is on its way home.
+        # Whether floor opens while the robot is on its way home.
         self._left_behind = LeftBehind()
-        # Time of the next retry [s]; None if nothing waits.
+        # Time of the next retry [s]; None for none.
         self._retry_at: float | None = None
         self.ending = CARRIED_OUT
-        # Returns at the end of an order how much floor was swept, as text; "" for no text.
+        # Returns the swept floor as text for an order's end.
         self._sum_up: Callable[[], str] = str
-        # Cached result: whether a retry is worthwhile, for a given map and ledger.
+        # Cached: a map and ledger, and whether a retry is worthwhile on them.
         self._retry_check: tuple[object, bool] = (None, False)
 
     def ask_for_floor(self, sum_up: Callable[[], str]) -> None:
-        """Set the function that returns, as text for an order's end, how much floor was swept."""
+        """Set the function that returns the swept floor as text for an order's end."""
         self._sum_up = sum_up
 
     @property
@@ -72,14 +71,14 @@ class Sequencer(PresentPart):
         return self.order_state.stage is Stage.OVER
 
     def start(self, state: OrderState) -> None:
-        """Begin another order, or none."""
+        """Begin with another order, or with none."""
         self.order_state = replace(state, reached=None)
         self._left_behind, self._retry_at = LeftBehind(), None
         is_over = state.stage is Stage.OVER and bool(state.why)
         self.ending = state.why if is_over else CARRIED_OUT
         self._retry_check = (None, False)
         self._begin_part()
-        # Floor that obstacles close for a while stays reachable for another order on the same map.
+        # Floor behind temporary obstacles counts as reachable for the next order on the same map.
         is_crowded = state.home is not None and self._map.obstacles.closed > 0
         self._begin_reach(self._reached_cells() if is_crowded else state.reached)
         self._company.try_again()
@@ -98,7 +97,7 @@ class Sequencer(PresentPart):
     def move_reached(self, motion: Motion) -> None:
         """Move the reached cells with the map."""
         super().move_reached(motion)
-        # Cells that were reachable before lie elsewhere on the map now.
+        # The cells that were reachable have moved on the map.
         self._left_behind.set_out(None)
 
     def shift_reached(self, motion: Motion) -> None:
@@ -107,9 +106,9 @@ class Sequencer(PresentPart):
         self._left_behind.set_out(None)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
-        """Return whether home and most floor, or nearly all floor, are out of reach of an area.
+        """Return whether an area lacks home and most floor, or nearly all floor.
 
-        False if all is covered: then nothing keeps the order from its end.
+        False if all is covered, as the order can end then.
         """
         (reached, once), home = self.reached_m2(area), self.goal()
         share = HOME_SHARE if home is None or area.contains(home) else MOST_SHARE
@@ -121,14 +120,14 @@ class Sequencer(PresentPart):
             self.advance(now)
         if self._retry_at is not None:
             return self._begin_retry(cell) if now >= self._retry_at else ""
-        state = self.order_state = self.scope.most_worthwhile_next(self._ledger)
+        state = self.order_state = self.scope.by_priority(self._ledger)
         if state.begun or state.order is None or state.stage is Stage.OVER or state.waits_for:
             return ""
         zone = state.current_zone
         self.scope.worth.begin()
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             self._forget(zone, state)
-        self._is_laid_anew = zone is not None and bool(zone.kinds)
+        self._has_new_lanes = zone is not None and bool(zone.kinds)
         self.order_state = replace(state, begun=True, home=state.home or cell)
         self._done, self._in_vain = -1, 0
         self._company.try_again()
@@ -137,7 +136,7 @@ class Sequencer(PresentPart):
         return "" if state.automatic else state.title
 
     def _forget(self, zone: Zone, state: OrderState) -> None:
-        """Forget what the pass that begins is to cover again."""
+        """Forget the visits to cells that the new pass covers again."""
         number, covers = state.pass_number, state.current_pass.covers
         if number == 1 or covers == "all":
             self._ledger.forget(partial(in_zones, (zone,)))
@@ -150,9 +149,9 @@ class Sequencer(PresentPart):
             )
 
     def advance(self, now: float) -> None:
-        """Continue with the next part, as nothing more can be done in this one now.
+        """Continue with the next part, as no more of this one can be done now.
 
-        A robot that is shut in has no next part: it waits, and tries this one again.
+        A robot that is shut in waits, and tries the present part again.
         """
         state, area = self.order_state, self._map.area
         self._exploration.viewpoints.clear()
@@ -181,8 +180,11 @@ class Sequencer(PresentPart):
             self._end()
 
     def reopen(self) -> None:
-        """Continue an order after a change of the map: an automatic one that was over; and one on
-        its way home if floor has opened, at most once more than there are retries."""
+        """Continue an order after a change of the map.
+
+        An automatic order continues after its end. A robot on its way home turns back if floor has
+        opened, at most ``retries`` + 1 times.
+        """
         state, area = self.order_state, self._map.area
         if state.late:
             return
@@ -203,8 +205,10 @@ class Sequencer(PresentPart):
         self.order_state = replace(state, spent_s=state.spent_s + seconds)
 
     def run_out_of_time(self, minutes: float) -> None:
-        """End the order, as its time limit [min] is up: at home; of a robot on an errand, or
-        sent home before, at once."""
+        """End the order at its time limit [min].
+
+        The robot drives home first, unless it is on an errand or was sent home.
+        """
         self._retry_at = None
         self.scope.worth.begin()
         state = self.order_state = self.order_state.out_of_time(minutes)
@@ -223,7 +227,7 @@ class Sequencer(PresentPart):
 
     def _begin_retry(self, cell: Cell) -> str:
         self._retry_at = None
-        self._exploration.aim_at(self._viewpoints() - {cell})
+        self._exploration.viewpoints = self._viewpoints() - {cell}
         self._company.try_again()
         # In a retry, one path without progress is enough to give up.
         self._done, self._in_vain = self.done, MAX_IN_VAIN
@@ -245,7 +249,7 @@ class Sequencer(PresentPart):
     def _is_worth_trying(self) -> bool:
         """Return whether a retry is worthwhile; recomputed if anything changed.
 
-        It is also worthwhile while floor is closed for a while: the obstacle may be gone later.
+        Temporarily closed floor makes it worthwhile: the obstacle may leave.
         """
         closed = self._map.obstacles.closed
         key = (self._map.area, self._ledger.version, closed)

@@ -1,6 +1,6 @@
-"""Worth: which floor is planned first where time or battery do not allow all, by its priority.
+"""Worth: which floor is planned first, by priority, if time or battery do not allow all.
 
-Floor of the priorities that fit is one plan, so that its way is short; the rest comes after it.
+One plan covers the floor of all priorities that fit, so that its way is short; the rest follows.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ SHARE = 0.8
 def room_priorities(
     ranked: tuple[RoomArea, ...], others: int, window: Window, cell_m: float
 ) -> NDArray[np.uint8]:
-    """Return the priority of each cell of a window by its room, uint8 (rows, cols), read-only;
-    ``others`` is that of other rooms."""
+    """Return the priority of each cell of a window, uint8 (rows, cols), read-only.
+
+    ``others``: priority of cells outside the ranked rooms.
+    """
     found = np.full((window.rows, window.cols), others, np.uint8)
     for room in ranked:
         found[cells_of(room.outline, room.holes, window, cell_m)] = room.priority
@@ -36,11 +38,11 @@ def room_priorities(
 
 
 def least_priority(counts: NDArray[np.int64], cell_s: float, may_work_s: float) -> int:
-    """Return the priority from which on floor is planned first; 0 for all of it.
+    """Return the lowest priority that is planned first; 0 if all floor is.
 
     Args:
         counts: int64 (101,), number of cells of each priority.
-        cell_s: time that a cell takes [s].
+        cell_s: time per cell [s].
         may_work_s: time left [s].
     """
     above = np.cumsum(counts[::-1])[::-1]
@@ -52,12 +54,12 @@ def least_priority(counts: NDArray[np.int64], cell_s: float, may_work_s: float) 
 
 
 class WorthFirst:
-    """Decides which cells of the present zone are planned first; owns that decision.
+    """Decides which cells of the present zone are planned first.
 
     Attributes:
-        least: priority from which on cells are planned now; 0 for all.
+        least: lowest priority of the cells planned now; 0 for all cells.
         may_work_s: time left until the robot has to turn back [s].
-        given: the priorities that came as a message; None for none.
+        given: priorities received as a message; None for none.
     """
 
     def __init__(
@@ -67,15 +69,14 @@ class WorthFirst:
         zone: Callable[[], Zone | None],
         frame: Callable[[], str],
     ) -> None:
-        """Start without a limit; ``zone`` and ``frame`` return the zone being covered, and the
-        frame of the map."""
+        """Start without a limit; ``zone`` returns the zone being covered, ``frame`` the map's."""
         self.least = 0
         self.may_work_s = float("inf")
         self.given: OccupancyGrid | None = None
         self._cell_m, self._zone, self._frame = cell_m, zone, frame
-        # The priorities given by a message on the cells of a window, int8; -1 for none.
+        # The received priorities on the cells of a window, int8 (rows, cols); -1 for none.
         self._on_cells: tuple[Window, NDArray[np.int8]] | None = None
-        # The least time that a cell takes, by which too much is never put off [s].
+        # Lower bound of the time per cell [s], so that floor which fits is never put off.
         self._cell_s = step_s
         self._is_given_up = False
 
@@ -84,9 +85,9 @@ class WorthFirst:
         self.least, self._is_given_up = 0, False
 
     def take(self, given: OccupancyGrid | None) -> bool:
-        """Take priorities from a message; return whether a new plan has to follow them.
+        """Take priorities from a message; return whether a new plan is needed.
 
-        The same ones again change nothing.
+        Equal priorities change nothing.
         """
         before = self.given
         if before is not None and given is not None:
@@ -94,10 +95,10 @@ class WorthFirst:
             if is_placed_alike and np.array_equal(before.cells, given.cells):
                 return False
         self.given, self._on_cells = given, None
-        return self.choose_anew()
+        return self.choose_again()
 
-    def choose_anew(self) -> bool:
-        """Choose with the next plan what comes first; return whether a plan is wanted for that."""
+    def choose_again(self) -> bool:
+        """Drop the choice; return whether a new plan is needed to choose again."""
         was_chosen, self.least = self.least > 0, 0
         return was_chosen
 
@@ -106,11 +107,11 @@ class WorthFirst:
         self.may_work_s = seconds
 
     def give_up(self) -> None:
-        """Plan all floor of this pass from now on: cells of those planned first are not reached."""
+        """Plan all floor for the rest of this pass, as cells planned first cannot be reached."""
         self.least, self._is_given_up = 0, True
 
     def are_too_many(self, cells: int) -> bool:
-        """Return whether there is no time for a number of cells."""
+        """Return whether the time left is too short for a number of cells."""
         return cells * self._cell_s > self.may_work_s
 
     def first(self, cells: NDArray[np.bool_], window: Window) -> NDArray[np.bool_]:
@@ -120,24 +121,24 @@ class WorthFirst:
 
     @property
     def is_limited(self) -> bool:
-        """Whether there may be something to choose."""
+        """Whether time may be too short for all floor."""
         return self.least > 0 or self.may_work_s < float("inf")
 
     def choose(self, cells: NDArray[np.bool_], window: Window) -> None:
-        """Choose what the next plan covers of the cells that can be, bool (rows, cols)."""
+        """Choose which of the cells to cover, bool (rows, cols), the next plan covers."""
         is_alike = self._priorities(window) is None
         if is_alike or not self.first(cells, window).any():
             self.least = 0
         if not (is_alike or self.least):
             self.least = self._least_of(cells, window)
 
-    def is_other_first(self, cells: NDArray[np.bool_], window: Window, ahead_s: float) -> bool:
-        """Return whether other floor is planned first from now on.
+    def puts_other_first(self, cells: NDArray[np.bool_], window: Window, ahead_s: float) -> bool:
+        """Choose again if the path ahead takes too long; return whether the choice changed.
 
         Args:
-            cells: the cells that can be covered, bool (rows, cols) of the window.
-            window: of the lattice.
-            ahead_s: time that the path ahead takes, which covers what was planned [s].
+            cells: the cells to cover, bool (rows, cols) of the window.
+            window: the lattice's window.
+            ahead_s: time of the path ahead, which covers the cells planned now [s].
         """
         cells = self.first(cells, window)
         planned = int(np.count_nonzero(cells))
@@ -174,7 +175,7 @@ class WorthFirst:
 
     def _given_on(self, window: Window, given: OccupancyGrid) -> NDArray[np.int8]:
         if self._on_cells is None or self._on_cells[0] != window:
-            # In blocks of rows: places take far more than cells.
+            # In blocks of rows, as coordinates take far more memory than cells.
             on_cells = np.empty((window.rows, window.cols), np.int8)
             for part in window.strips(BLOCK):
                 values = given.geometry.values_at(given.cells, centres(part, self._cell_m), -1)

@@ -30,7 +30,7 @@ def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[
 
 @lru_cache(maxsize=4)
 def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
-    """Return the same as ``in_zones`` for zones some of which have holes or leave out rooms."""
+    """Return ``in_zones`` for zones with holes or left-out rooms."""
     cells = np.zeros((window.rows, window.cols), bool)
     for zone in zones:
         if zone.polygon:
@@ -93,7 +93,7 @@ def _add_inside(polygon: Polygon, window: Window, cell_m: float, cells: NDArray[
 
 
 def without(lattice: CoverageLattice, cells: NDArray[np.bool_]) -> CoverageLattice:
-    """Return ``lattice`` with some cells, bool (rows, cols), blocked for driving, too."""
+    """Return ``lattice`` with more cells, bool (rows, cols), blocked."""
     if not cells.any():
         return lattice
     states, steps = lattice.states.copy(), lattice.steps.copy()
@@ -123,7 +123,7 @@ def _inside_any(polygons: tuple[Polygon, ...], window: Window, cell_m: float) ->
     return cells
 
 
-# One bit per cell: a hundred zones take as much as a dozen masks. For zones, and for rooms.
+# One bit per cell, to bound the memory of 100 zones. One entry for zones, one for rooms.
 @lru_cache(maxsize=2)
 def _planes(polygons: tuple[Polygon, ...], window: Window, cell_m: float) -> NDArray[np.uint8]:
     return np.stack([np.packbits(cells_inside(polygon, window, cell_m)) for polygon in polygons])
@@ -135,8 +135,8 @@ def near_polygons(
     """Return which cells of ``window`` are near a polygon, bool (rows, cols).
 
     A cell is near if a polygon touches the square of half-width ``reach_m`` [m] around its centre,
-    or contains it. With half a cell or more, a disc of that radius can drive between the centres of
-    the other cells without touching a polygon.
+    or contains it. If ``reach_m`` is at least half a cell, a disc of that radius can drive between
+    the centres of the other cells without touching a polygon.
     """
     starts = np.zeros((window.rows, window.cols + 1), np.int32)
     inside = np.zeros((window.rows, window.cols), bool)

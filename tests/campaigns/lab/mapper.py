@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from fasaco_edge.grid.rotation import composed, inverse
 from tests.campaigns.lab.settings import (
     BEAMS,
     LEAST_RANGE_M,
@@ -23,6 +22,7 @@ from tests.campaigns.lab.settings import (
     RESOLUTION_M,
     stamp_ns,
 )
+from tests.support.poses import composed, inverse
 
 FRAME = "map"
 MAP_EVERY_S = 3.0
