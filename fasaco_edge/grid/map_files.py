@@ -297,7 +297,7 @@ class _YamlKeys:
     def error(self, key: str, expected: str) -> MapFileError:
         got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"
         if key not in self.values and (near := nearest(key, [*map(str, self.values)])):
-            got += f"; did you mean it by {near[0]}?"
+            got += f"; is {near[0]} meant for it?"
         hint = _OF_KEYS.get(key, f"correct {key} in this file")
         return MapFileError(f"{self.path}: {key} must be {expected}; {got}", hint=hint)
 

@@ -265,7 +265,7 @@ def test_missing_keys_are_named(tmp_path, key):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("resolutoin: 0.05", "the key is missing; did you mean it by resolutoin?"),
+        ("resolutoin: 0.05", "the key is missing; is resolutoin meant for it?"),
         ("", "expected keys and values, got nothing"),
         ("- a", "expected keys and values, got ['a']"),
     ],
