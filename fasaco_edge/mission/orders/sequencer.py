@@ -24,8 +24,8 @@ from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.present_part import MAX_IN_VAIN, PresentPart
 from fasaco_edge.mission.orders.zones import in_zones
 
-# Share of the area ever reachable, below which a robot is shut in: HOME_SHARE with home in reach, so
-# that a closed door to another room has no effect, else MOST_SHARE.
+# Share of the area ever reachable, below which a robot is shut in: HOME_SHARE with home in reach,
+# so that a closed door to another room has no effect, else MOST_SHARE.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 CARRIED_OUT = "the order was carried out"
 
