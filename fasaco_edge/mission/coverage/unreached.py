@@ -153,7 +153,7 @@ class OrderReach:
             once = self._once_on(window)
             here = once[area.lattice.window.slices_in(window)]
             if self._have_moved:
-                # After a motion by a fraction of a cell, some moved cells lie in walls, namely those
+                # After a motion by a fraction of a cell, some moved cells lie in walls: those
                 # that are not coverable and lie beside reachable cells.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
