@@ -66,7 +66,7 @@ def read_command(document: object) -> Command:
 
 
 def read_recorded(document: dict[str, object]) -> Command:
-    """Return a recorded command; without ``discard``, as in older releases, it forgets cells.
+    """Return a recorded command; without ``discard``, as in older releases, it may forget.
 
     Raises:
         OrderError: as ``read_command``.
