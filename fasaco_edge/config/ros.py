@@ -28,7 +28,7 @@ DEFAULT_NODE = "fasaco_edge"
 # History depth of rclcpp's services.
 SERVICE_DEPTH = 10
 # Inputs that a follower needs: poses, and maps to compare scans with.
-OF_DRIVER = ("map", "map_update", "pose", TF_STATIC)
+DRIVER_INPUTS = ("map", "map_update", "pose", TF_STATIC)
 
 
 class RosTopicNames(Section, frozen=True):
@@ -183,7 +183,7 @@ class RosConfig(Section, frozen=True):
 
     def driver_rights(self) -> Role:
         """Return the rights of the role ``driver``."""
-        inputs = [topic for name, topic in self.inputs.items() if name in OF_DRIVER]
+        inputs = [topic for name, topic in self.inputs.items() if name in DRIVER_INPUTS]
         outputs = [*map(self.input_key, (*inputs, self.scan))]
         return ros_rights(self._driven_by, outputs, self._graph)
 

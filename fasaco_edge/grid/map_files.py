@@ -52,9 +52,9 @@ FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 MODES = ("trinary", "scale", "raw")
 
 # What to do about a fault inside a file.
-OF_A_GRID = "give a bool array (rows, cols), True = coverable, as free.astype(bool)"
-_OF_YAML = "correct it: a map file that is not .npy is read as a map_server YAML file"
-_OF_KEYS = {
+GRID_HINT = "give a bool array (rows, cols), True = coverable, as free.astype(bool)"
+_YAML_HINT = "correct it: a map file that is not .npy is read as a map_server YAML file"
+_KEY_HINTS = {
     "image": "correct image in this file: a path from this file's folder, from / or from ~",
     "resolution": "correct resolution in this file: the edge of a pixel in metres, as 0.05",
     "free_thresh": "correct the thresholds in this file: map_saver writes 0.65 and 0.196 or 0.25",
@@ -208,7 +208,7 @@ def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
     if array.ndim != 2 or array.dtype != np.bool_:
         raise MapFileError(
             f"{path}: expected a bool array of two dimensions, got {array.dtype} {array.shape}",
-            hint=OF_A_GRID,
+            hint=GRID_HINT,
         )
     check_size(path, array.shape[1], array.shape[0])
     # Other programs may write any byte except 0 for True; kernels read only the lowest bit.
@@ -280,11 +280,13 @@ def _load_yaml(path: Path) -> dict[str, object]:
             f"{path}: {error.strerror or error}", hint="name a file that exists and may be read"
         ) from error
     except PlainYamlError as error:
-        raise MapFileError(f"{path}: not readable as plain YAML: {error}", hint=_OF_YAML) from error
+        raise MapFileError(
+            f"{path}: not readable as plain YAML: {error}", hint=_YAML_HINT
+        ) from error
     if not isinstance(loaded, dict):
         raise MapFileError(
             f"{path}: expected keys and values, got {shown(loaded) if loaded else 'nothing'}",
-            hint=_OF_YAML,
+            hint=_YAML_HINT,
         )
     return loaded
 
@@ -298,7 +300,7 @@ class _YamlKeys:
         got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"
         if key not in self.values and (near := nearest(key, [*map(str, self.values)])):
             got += f"; is {near[0]} meant for it?"
-        hint = _OF_KEYS.get(key, f"correct {key} in this file")
+        hint = _KEY_HINTS.get(key, f"correct {key} in this file")
         return MapFileError(f"{self.path}: {key} must be {expected}; {got}", hint=hint)
 
     def number(self, key: str, low: float, high: float, unit: str = "") -> float:

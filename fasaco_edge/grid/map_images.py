@@ -45,7 +45,7 @@ _COEFFICIENTS = 2
 # ten on a slow computer.
 SLOW_PIXELS = 1_000_000
 
-_OF_SIZE = "save the part of the map that is to be covered, or the map with larger pixels"
+_SIZE_HINT = "save the part of the map that is to be covered, or the map with larger pixels"
 
 # map_saver's greys for free and never seen, of 255.
 SEEN_FREE, NEVER_SEEN = 254, 205
@@ -141,7 +141,7 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
             return _decoded(path, image)
     except Image.DecompressionBombError as error:
         text = f"{path}: more than {MAX_PIXELS} pixels: {error}"
-        raise MapFileError(text, hint=_OF_SIZE) from error
+        raise MapFileError(text, hint=_SIZE_HINT) from error
     except UnidentifiedImageError as error:
         raise MapFileError(
             f"{path}: not an image (PGM, PNG, BMP or JPEG)", hint="save it as PGM or PNG"
@@ -157,7 +157,7 @@ def check_size(path: str | Path, cols: int, rows: int) -> None:
     """Raise MapFileError unless there is at least one pixel and at most MAX_PIXELS."""
     if not 0 < rows * cols <= MAX_PIXELS:
         text = f"{path}: expected 1 to {MAX_PIXELS} pixels, got {cols} x {rows}"
-        raise MapFileError(text, hint=_OF_SIZE)
+        raise MapFileError(text, hint=_SIZE_HINT)
 
 
 def _check_affordable(path: Path, image: ImageFile, most_bytes: int) -> None:

@@ -12,7 +12,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import MapFileError
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import (
-    OF_A_GRID,
+    GRID_HINT,
     find_map,
     read_bare_image,
     read_coverage_grid,
@@ -88,7 +88,7 @@ def load_map(
         if source.dtype != np.bool_ or source.ndim != 2 or not source.size:
             raise MapFileError(
                 f"a coverage grid is bool (rows, cols), got {source.dtype} {source.shape}",
-                hint=OF_A_GRID,
+                hint=GRID_HINT,
             )
         free = source.copy()
         free.setflags(write=False)

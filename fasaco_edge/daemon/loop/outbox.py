@@ -43,7 +43,7 @@ LOG_PERIOD_S = 10.0
 # Limit on the failures that wait to be counted.
 MOST_FAULTS = 100
 # The topics sent here; the turn log and the fleet have publishers of their own.
-SENT = tuple(
+SENT_TOPICS = tuple(
     topic
     for topic in topics.TOPICS
     if topic.direction == "out" and topic not in (topics.TURNS, topics.FLEET)
@@ -65,11 +65,11 @@ class Outbox:
         self.guard = PublishGuard()
         self._id = bus.id
         self._ros = ros
-        self._publishers = {topic.name: bus.advertise(keys, topic) for topic in SENT}
+        self._publishers = {topic.name: bus.advertise(keys, topic) for topic in SENT_TOPICS}
         self._ros_publishers = {} if ros is None else ros.publishers
         self._lock = threading.Lock()
         self._kept: dict[str, Callable[[], AnyReply]] = {}
-        for topic in SENT:
+        for topic in SENT_TOPICS:
             if topic.name in topics.RPC_NAMES:
                 answer = answering(partial(self._answer, topic.name))
                 for key in (keys.rpc(topic.name), keys.of(topic)):
@@ -107,7 +107,7 @@ class Outbox:
 
     def forget(self) -> None:
         """Drop samples cached for late joiners: another daemon publishes them."""
-        for topic in SENT:
+        for topic in SENT_TOPICS:
             if topic is not topics.STATUS:
                 self._publishers[topic.name].forget()
         for publisher in self._ros_publishers.values():

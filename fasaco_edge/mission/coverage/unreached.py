@@ -153,8 +153,8 @@ class OrderReach:
             once = self._once_on(window)
             here = once[area.lattice.window.slices_in(window)]
             if self._have_moved:
-                # After a motion by part of a cell, some moved cells lie in walls: those beside
-                # reachable cells that are not coverable.
+                # After a motion by a fraction of a cell, some moved cells lie in walls: those
+                # that are not coverable and lie beside reachable cells.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
             self._once, self._newest, self._have_moved = (window, once), area, False

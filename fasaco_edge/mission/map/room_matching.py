@@ -46,8 +46,8 @@ PENALTY = 2
 # A region shows a room if their common area is at least LEAST_SHOWN_M2 [m2], or half of a smaller
 # room, and at least LEAST_SHARE of the smaller of the two.
 LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
-# Least size of a region, as a share of a room, to show all of the room: its other squares are then
-# no floor.
+# Size of a region, as a share of a room, from which it shows the whole room: squares of the room
+# outside the region are then no floor.
 WHOLE = 0.8
 
 

@@ -44,7 +44,7 @@ MOST_PIXELS = 1_000_000
 # Longest delay of a search, until a step without a new map [s], as planning comes first.
 LATE_S = 1.0
 
-ROOMS_STAY = "the robot goes on with the rooms it knows; report it with the log"
+FAILED_HINT = "the robot goes on with the rooms it knows; report it with the log"
 
 
 class RoomWatch:
@@ -75,7 +75,7 @@ class RoomWatch:
             self._look(grid, now)
         except Exception as error:
             why = f"rooms of this map were not published: {type(error).__name__}: {error}"
-            raise NotPublished(why, hint=ROOMS_STAY) from error
+            raise NotPublished(why, hint=FAILED_HINT) from error
 
     def _look(self, grid: OccupancyGrid, now: float) -> None:
         """Search a map at ``now`` [s] if that is due.

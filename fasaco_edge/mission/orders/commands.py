@@ -97,7 +97,7 @@ def _parts(order: object) -> Iterator[tuple[object, int]]:
 
 
 def read_recorded(document: dict[str, object]) -> Command:
-    """Return a recorded command; without ``discard``, as in older releases, it forgets cells.
+    """Return a recorded command; without ``discard``, as in older releases, it may forget.
 
     Raises:
         OrderError: as ``read_command``.
