@@ -198,7 +198,7 @@ def test_held_topics_wait_until_released_and_others_do_not():
     box.post("map", "new")
     box.post("pose", "here")
     assert box.take(0.3) == [("pose", "here")]
-    threading.Timer(0.1, box.let_go).start()
+    threading.Timer(0.1, box.resume).start()
     assert box.take(60.0) == [("map", "new"), ("update", 1)]
     box.post("map", "newer")
     assert box.take(60.0) == [("map", "newer")]

@@ -189,7 +189,7 @@ class Loop:
     def _reload_config(self, batch: Batch) -> None:
         """Apply the configuration that was read; restart the mission if it has changed."""
         reload, watchdog = self._ports.reload, self._ports.watchdog
-        self._ports.mailbox.let_go()
+        self._ports.mailbox.resume()
         config, faults = reload.take(self.config)
         self._status.faults.count(faults, is_logged=True)
         watchdog.remark = f"configuration refused: {faults[0]}" if faults else ""
