@@ -1,4 +1,4 @@
-"""The figures of a status as a table, beside the picture."""
+"""Table of a status's figures, beside the picture."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STATE_COLOURS = {
 }
 LONGEST_BAR = 40
 LABEL_WIDTH = 9
-# Limit on the rooms shown.
+# Largest number of rooms shown.
 MOST_ROOMS = 12
 # Width from which optional parts are shown [characters].
 WIDE = 30
@@ -37,7 +37,7 @@ WIDE = 30
 def figures(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet) -> Table:
     """Return all figures of a status, and of rooms, as a table ``width`` characters wide.
 
-    ``to_go``: how long the rest of the path takes.
+    ``to_go``: the time that the rest of the path takes, in words.
     """
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
@@ -143,7 +143,7 @@ def _mission(mission: MissionReport) -> list[Row]:
 
 
 def _rooms(found: Rooms) -> list[Row]:
-    """Return the swept share of each room; of many, those that are not done, and some others."""
+    """Return the swept share of each room; of more than MOST_ROOMS, unfinished rooms first."""
     known = sorted(found.rooms, key=lambda room: (room.swept == 1.0, room.swept is None))
     shown = sorted(known[:MOST_ROOMS], key=lambda room: room.id)
     parts = [
