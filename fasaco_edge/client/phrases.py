@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from fasaco_edge.text import one_line
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.wire.documents.replies import (
     TROUBLES,
     CoverageReport,
@@ -37,12 +37,6 @@ def swept(floor: FloorReport) -> str:
     if (possible_m2 := floor.possible_m2) is None:
         return share
     return share + possible(f"{possible_m2:.1f} m2")
-
-
-def percent(fraction: float) -> str:
-    """Return a share; never 100.0 % before all is done."""
-    shown = min(100 * fraction, 99.9) if fraction < 1.0 else 100.0
-    return f"{shown:.1f} %"
 
 
 def stage(mission: MissionReport) -> str:

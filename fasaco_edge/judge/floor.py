@@ -5,8 +5,8 @@ Its inputs are a map and a line of points, no cells, walks or planners.
 Reachable floor
     All pixels that the tool's disc touches at positions that the robot's disc can reach from the
     beginning of the line. The robot fits where its disc touches only known free pixels. A tool that
-    sticks out of the robot's disc touches only free pixels that free pixels, about inside the
-    tool's disc, connect with the robot's disc: none behind a wall.
+    sticks out of the robot's disc touches no floor behind a wall: only pixels that are connected
+    with the robot's disc by free pixels, about inside the tool's disc.
 Swept floor
     The reachable floor that the tool's disc passed over along the line, by the same rules.
 Illegal share
@@ -38,6 +38,7 @@ from fasaco_edge.judge.driven_line import (
     drive_seconds,
 )
 from fasaco_edge.judge.pixels import Mask, Patches, through, within
+from fasaco_edge.text import percent
 
 # Largest pixel [m], except on maps that would have more pixels than this.
 FINE_M = 0.025
@@ -123,13 +124,7 @@ class FloorFigures:
 def swept_words(swept_m2: float, reachable_m2: float) -> str:
     """Return swept and reachable floor [m2] in words; 100 % only if all is swept."""
     areas = f"{swept_m2:,.1f} of {reachable_m2:,.1f} m2"
-    return f"{areas} ({share_words(swept_m2 / reachable_m2)})" if reachable_m2 else areas
-
-
-def share_words(share: float) -> str:
-    """Return a share in percent; 100.0 % only if it is the whole."""
-    percent = min(100.0 * share, 99.9) if share < 1.0 else 100.0
-    return f"{percent:.1f} %"
+    return f"{areas} ({percent(swept_m2 / reachable_m2)})" if reachable_m2 else areas
 
 
 @dataclass(frozen=True, slots=True, eq=False)

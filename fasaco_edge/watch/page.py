@@ -9,8 +9,8 @@ from rich.text import Text
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import TROUBLED
-from fasaco_edge.client.phrases import age, clock, percent
-from fasaco_edge.text import one_line
+from fasaco_edge.client.phrases import age, clock
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.picture import MissionPicture

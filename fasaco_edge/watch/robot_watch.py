@@ -11,7 +11,7 @@ from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.text import one_line
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.json_text import decode_json
@@ -79,7 +79,7 @@ class RobotWatch:
         if view.silent_s(now):
             return "the daemon is silent"
         fraction = status.coverage.fraction if status.coverage else 0.0
-        return f"{phrases.percent(fraction)} of cells  {phrases.figures(status)}"
+        return f"{percent(fraction)} of cells  {phrases.figures(status)}"
 
     def page(self, now: float, width: int, height: int) -> list[str]:
         """Return a page of lines."""

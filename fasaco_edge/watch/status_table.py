@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.client import phrases
-from fasaco_edge.text import duration, one_line
+from fasaco_edge.text import duration, one_line, percent
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
@@ -82,7 +82,7 @@ def state_colour(state: str) -> str:
 
 
 def _coverage(coverage: CoverageReport, bar: Text) -> list[Row]:
-    share = Text(phrases.percent(coverage.fraction), "bold")
+    share = Text(percent(coverage.fraction), "bold")
     share.append(f", {coverage.covered} of {coverage.coverable} cells", "not bold")
     return [("covered", share), ("", bar)]
 
@@ -147,7 +147,7 @@ def _rooms(found: Rooms) -> list[Row]:
     known = sorted(found.rooms, key=lambda room: (room.swept == 1.0, room.swept is None))
     shown = sorted(known[:MOST_ROOMS], key=lambda room: room.id)
     parts = [
-        room.title if room.swept is None else f"{room.title} {phrases.percent(room.swept)}"
+        room.title if room.swept is None else f"{room.title} {percent(room.swept)}"
         for room in shown
     ]
     more = len(known) - len(shown)
@@ -192,11 +192,11 @@ def _running(status: Status) -> list[Row]:
 
 
 def _battery(battery: BatteryReport) -> Text:
-    level = "not known" if battery.level is None else phrases.percent(battery.level)
+    level = "not known" if battery.level is None else percent(battery.level)
     is_low = None not in (battery.level, battery.turns_back_at) and (
         (battery.level or 0.0) <= (battery.turns_back_at or 0.0)
     )
-    until = f", goes on at {phrases.percent(battery.goes_on_at)}" if battery.goes_on_at else ""
+    until = f", goes on at {percent(battery.goes_on_at)}" if battery.goes_on_at else ""
     return _text(f"{level}, {battery.power}{until}", "yellow" if is_low else "")
 
 

@@ -10,11 +10,11 @@ from rich.text import Text
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
-from fasaco_edge.client.phrases import clock, percent
+from fasaco_edge.client.phrases import clock
 from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.fleet.watch.feed import FleetFeed
 from fasaco_edge.fleet.watch.view import FleetRobot, FleetView, short
-from fasaco_edge.text import one_line
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
@@ -57,7 +57,7 @@ def total_rows(floor: Survey, unheard: Sequence[str], width: int, glyphs: GlyphS
     if floor.fraction is None:
         return silent
     swept_m2, area_m2 = floor.swept * floor.cell_m2, floor.area * floor.cell_m2
-    share = Text(phrases.percent(floor.fraction), "bold")
+    share = Text(percent(floor.fraction), "bold")
     share.append(f" swept: {swept_m2:.1f} of {area_m2:.1f} m2", "not bold")
     lines = [share, glyphs.bar(floor.fraction, min(width, LONGEST_BAR))]
     if floor.twice_m2:
@@ -189,7 +189,7 @@ class FleetWatch:
         if not robots:
             return f"waiting for robots of fleet {one_line(view.fleet)}"
         fraction = view.floor.fraction
-        share = "" if fraction is None else f"{phrases.percent(fraction)} of cells  "
+        share = "" if fraction is None else f"{percent(fraction)} of cells  "
         return f"{share}{', '.join(f'{robot.name}: {robot.doing}' for robot in robots)}"
 
     def page(self, now: float, width: int, height: int) -> list[str]:
