@@ -56,6 +56,12 @@ def robot(number: int) -> tuple[str, Colour]:
     return ROBOTS[number % len(ROBOTS)]
 
 
+def tint(colour: Colour, opacity: float) -> Colour:
+    """Return a colour painted on white with an opacity."""
+    red, green, blue = (round(255 - opacity * (255 - value)) for value in colour)
+    return red, green, blue
+
+
 # Nine colours, evenly spaced over the first four fifths of Matplotlib's plasma (CC0): perceptually
 # uniform, and without the yellow end, which is hard to see on white.
 _GRADIENT = np.array(

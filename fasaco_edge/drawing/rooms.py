@@ -70,9 +70,4 @@ def _colours(labels: NDArray[np.int32], count: int, reach: int) -> list[palette.
         chosen[number] = min(
             range(len(palette.ROBOTS)), key=lambda colour: (taken.count(colour), used[colour])
         )
-    return [_pale(palette.ROBOTS[colour][1]) for colour in chosen[1:]]
-
-
-def _pale(colour: palette.Colour) -> palette.Colour:
-    red, green, blue = (round(255 - TINT * (255 - value)) for value in colour)
-    return red, green, blue
+    return [palette.tint(palette.robot(colour)[1], TINT) for colour in chosen[1:]]

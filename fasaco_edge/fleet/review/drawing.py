@@ -82,9 +82,7 @@ def draw_fleet_mission(
 
 def robot_tint(number: int) -> palette.Colour:
     """Return the colour of the floor that the robot with a number sweeps."""
-    colour = np.array(_track_colour(number))
-    red, green, blue = np.rint(255 - TINT * (255 - colour)).astype(int).tolist()
-    return red, green, blue
+    return palette.tint(_track_colour(number), TINT)
 
 
 def _track_colour(number: int) -> palette.Colour:
