@@ -26,7 +26,7 @@ from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
-# Number of places of the crate, and distance of two, less than its width [pixels].
+# Number of places of the crate, and their spacing, less than its width [pixels].
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
 # Timeout of a path [s]: before the first one, a slow computer takes long to load the kernels.
 PATH_TIMEOUT_S = 300.0

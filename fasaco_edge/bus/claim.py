@@ -2,9 +2,9 @@
 
 Each process shows a liveliness token that ends with ``<its Zenoh id>/<its state>``: waits, yields,
 or a word for the active process. A process that finds another one active waits until that one is
-gone. The smallest id decides which waiting process is next, and which of two active ones continues
-after a network partition: all agree on it without clocks. Below, the active process is the daemon
-that "plans".
+gone. The process with the smallest id is the next to become active, and the one of two active
+processes that continues after a network partition: so all agree, whatever their clocks show. Below,
+the active process is the daemon that "plans".
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ ASK_PERIOD_S = 1.0
 REJOIN_S = 3.0
 # Zenoh's lease: a session silent for this long is gone for the others [s].
 LEASE_S = 10.0
-# Pause of this process after which it may be gone for the others [s]. It sends four times a lease,
-# so the last message before the pause may be a quarter of a lease old.
+# Pause of this process after which it may be gone for the others [s]: its last message before the
+# pause may already be a quarter of a lease old.
 PAUSE_S = 0.75 * LEASE_S
 # Longest wait for a daemon with a smaller id that does not plan [s]: its lease and a margin.
 PATIENCE_S = 15.0

@@ -1,7 +1,7 @@
 """Subscriber of a latched key: gets the cached samples on joining, and recovers a lost last sample.
 
-Zenoh's advanced subscriber (1.10) does the same, but until the session ends it queries every
-publisher that ever existed once a second, even for undeclared subscribers. This subscriber queries
+Zenoh's advanced subscriber (1.10) does the same, but once a second, until the session ends, it
+queries every publisher that ever existed, even for undeclared subscribers. This subscriber queries
 a bounded number of publishers that exist, found by their liveliness tokens, each at most once a
 second. So open queries and memory stay bounded, whatever the number of publishers over time.
 ``sample_order`` schedules the queries, and orders samples and replies.

@@ -261,7 +261,7 @@ class Bus:
         return self._listens or bool(info.routers_zid() or info.peers_zid())
 
     def keep_in_touch(self, now: float) -> bool:
-        """Return whether samples can arrive; take over the port of the process joined if it ended.
+        """Return whether samples can arrive; take over the port of the joined process if it ended.
 
         To be polled; ``now`` is monotonic [s].
         """

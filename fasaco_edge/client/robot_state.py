@@ -40,7 +40,7 @@ POSE_LASTS_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """Note that a robot's daemon has appeared (``here``) or disappeared."""
+    """News that a robot's daemon has appeared (``here``) or disappeared."""
 
     robot: str
     here: bool

@@ -20,8 +20,8 @@ MAX_WIDTH, MAX_HEIGHT = 1760, 1600
 MAX_CELL = 36
 MARGIN_CELLS = 1.0
 
-# Samples per pixel and axis of small pictures, and of large ones, to save memory; limit between
-# them [pixels].
+# Samples per pixel and axis of pictures of up to FINE_UP_TO pixels, and of larger ones, to save
+# memory.
 FINE, COARSE = 3, 2
 FINE_UP_TO = 1_200_000
 
@@ -101,7 +101,7 @@ def bounds_of(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapLayer:
-    """Marked pixels, bool (rows, cols), and their placement; they may be other than a map's."""
+    """Marked pixels of any raster, bool (rows, cols), and their placement."""
 
     geometry: GridGeometry
     mask: NDArray[np.bool_]

@@ -28,7 +28,7 @@ AGREEING = 5
 FORGET_S = 2.0
 # Commands are stored for this long [s].
 REMEMBER_S = 1.0
-# Candidate delays, the initial delay [s], and the factor on older mismatches with each pose.
+# Candidate delays, the initial delay [s], and the factor by which each pose reduces old mismatches.
 DELAYS_S = tuple(0.03 * step for step in range(12))
 FIRST_DELAY_S = DELAYS_S[1]
 FORGETTING = 0.98

@@ -22,7 +22,7 @@ RATE_HZ = 20.0
 PERIOD_S = 1.0 / RATE_HZ
 # Zeros are sent for this long after a stop; then another program may drive [s].
 ZEROS_S = 1.0
-# Distance ahead of the point that gives the path's direction [m].
+# Distance of the point ahead that gives the path's direction [m].
 LEADS_M = 0.5
 # Distance from its leg beyond which the robot has left the path [m].
 OFF_PATH_M = 0.3
@@ -61,7 +61,7 @@ class Follower(Supervision):
         self._stepped_at: float | None = None
 
     def step(self, now: float) -> Command | None:
-        """Return the command to send now; None for none."""
+        """Return the command to send now, or None."""
         if self._stepped_at is not None:
             self._pursuit.passed(now - self._stepped_at)
         self._stepped_at = now

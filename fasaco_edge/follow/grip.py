@@ -23,8 +23,8 @@ MEAN_S = 1.0
 # The robot was moved if an average is this far [m] from the one this many averages earlier; slower
 # motion is drift of the poses.
 MOVED_M, MEANS = 0.1, 5
-# Noise adds to that distance: this many times the median of the last steps from one average to the
-# next, and at least so many of them. The few steps of a moved robot do not change the median.
+# Noise adds to that distance: this many times the median step from one average to the next. Number
+# of last steps for the median, and least number. The few steps of a moved robot hardly change it.
 # Normal noise alone moves one average in 2^(4^2) that far.
 SCATTERS, STEPS, LEAST_STEPS = 4.0, 30, 6
 

@@ -54,9 +54,9 @@ DONE_M = 0.5
 # has moved this far [m] or the path leads elsewhere, by its direction this far ahead [m].
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
 PROGRESS_M, LEADS_M = 0.5, 0.5
-# A robot that has moved less than this distance [m] for this time stands [s]; near the end of its
-# goal the shorter time applies [s]. Then the result is queried again, as a reply may be lost; after
-# the last time the goal is given up [s].
+# A robot stands if it has moved less than MOVED_M [m] for STANDS_S, or near the end of its goal for
+# ARRIVED_S [s]. Then the result is queried again, as a reply may be lost; after GIVE_UP_S the goal
+# is given up.
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
 # A server that ends a query for a result sooner, without a reply, is gone [s].
@@ -116,7 +116,7 @@ class Nav2Follower(Supervision):
         self._path: PathDriven | None = None
         # The path that replaces the present one, once Nav2 has answered the pending request.
         self._next: Line | None = None
-        # The goal that Nav2 drives, and the one sent but not answered yet.
+        # The goal that Nav2 drives, and the goal sent but not answered yet.
         self._active: Goal | None = None
         self._pending: Goal | None = None
         self._asked_at = -math.inf

@@ -150,7 +150,7 @@ def end_of_piece(line: Line, start: float, near: float) -> float:
     stop = min([stop, *line.reversals(start + LEAST_M, stop)])
     ways = line.ways(start, stop)
     points = [line.at(way) for way in ways]
-    # The poses far enough behind to count, by square of the plane; they are added with the piece.
+    # The poses that are far enough behind along the piece to count, by square of the plane.
     seen: dict[tuple[int, int], list[int]] = {}
     filed = 0
     for index, (way, (x, y)) in enumerate(zip(ways, points, strict=True)):
@@ -177,8 +177,8 @@ TIP_M = 0.1
 # Distances before the end of the last goal at which the next goal may begin, in order of
 # preference, as shares of the largest.
 SHARES = (1.0, 0.6, 0.35, 0.2)
-# A goal extends beyond the last one by as much as it begins before the end of that one, up to this
-# [m].
+# The earlier a goal begins before the end of the last one, the farther it must extend beyond that
+# end: by the same distance, up to this [m].
 AMPLE_M = 2.0
 # Two paths nearer than this to each other are the same [m].
 SAME_M = 0.03

@@ -1,8 +1,8 @@
 """Route along a path: legs, the corners to round or to stop at, and the robot's progress.
 
 A coverage path crosses and touches itself, so the robot's position does not determine its progress.
-The robot is always on one leg. It changes to the next leg only at the end of its leg, however near
-it is to another.
+The robot is always on one leg. It changes to the next leg only at the end of its leg, even if
+another leg is nearer.
 """
 
 from __future__ import annotations
@@ -196,10 +196,8 @@ class Route:
         return index, False
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point that lies on them soon ahead; else none.
-
-        There are none either if the robot is off its leg.
-        """
+        """Return the legs up to a point; none if the point is not on them soon ahead, or the robot
+        is off its leg."""
         way = 0.0
         for index, leg in enumerate(self._ahead()):
             if index == 0:

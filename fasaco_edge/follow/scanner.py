@@ -88,7 +88,7 @@ class Thing(NamedTuple):
     moves: bool
 
 
-# Distance to a thing, and the thing, if there is none.
+# Result of a search that finds no thing.
 NOTHING: Final[tuple[float, Thing | None]] = (math.inf, None)
 
 

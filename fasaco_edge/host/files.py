@@ -112,7 +112,7 @@ def _check_owner(path: str | Path, status: os.stat_result) -> None:
 
 
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-# Largest number of links followed: that of Linux, see path_resolution(7).
+# Largest number of links followed, as by Linux, see path_resolution(7).
 _MOST_LINKS = 40
 
 

@@ -42,7 +42,7 @@ TAIL_S = 3.0
 # Samples within this time are taken in one cycle [ns]: the daemon's loop takes as long to wake up.
 TOGETHER_NS = 1_000_000
 INPUTS = frozenset(RECORDED_INPUTS) - {TURNS.name}
-# Number of proposals of a plan: about those of a small computer in 0.1 s.
+# Number of proposals of a plan, about as many as a small computer makes in 0.1 s.
 PROPOSALS = 200_000
 
 

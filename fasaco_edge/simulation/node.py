@@ -28,7 +28,7 @@ log = logging.getLogger(__name__)
 
 Driver = Literal["ideal", "follow"]
 
-# Longest time of ticks before the loop looks for a new path [s].
+# Longest time that the loop runs ticks before it looks for a new path [s].
 CYCLE_S = 0.02
 # Shortest wait, to bound the wake-ups of a fast simulation [s].
 WAIT_S = 0.004
@@ -37,8 +37,8 @@ DEBT_S = 0.1
 # A robot without a new pose for this real time is no longer an obstacle [s].
 CARRIED_AWAY_S = 10.0
 REPORT_EVERY_S = 0.5
-# Faster than real time, the simulation stops for the follower's next velocity after this simulated
-# time, for up to this real time [s].
+# A simulation faster than real time waits for the next velocity once the last one is this old
+# [simulated s], for up to this real time [s].
 ANSWER_S, PATIENCE_S = 0.1, 0.5
 
 

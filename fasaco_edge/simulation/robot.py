@@ -29,7 +29,7 @@ ARRIVED_M = 1e-3
 # Heading error below which the robot starts to drive [rad]: after 10 m it is then within ARRIVED_M
 # of its corner.
 ALIGNED_RAD = 1e-4
-# Heading error up to which it steers while driving; above, it comes to rest and turns [rad].
+# Heading error up to which the robot steers while driving; above, it comes to rest and turns [rad].
 MISALIGNED_RAD = 0.05
 # Bend up to which the robot steers and does not stop [rad].
 STRAIGHT_RAD = 0.02
@@ -40,7 +40,8 @@ CUT_M = 0.002
 PASSED_WITHIN_M = 0.02
 # As a last resort, the path is joined anywhere within this distance of its start [m].
 JOIN_WITHIN_M = 2.0
-# A way back may leave the track at each of its last points, this many, and at every n-th before.
+# A way back may leave the track at each of its last BACK_POINTS points, and at every BACK_STRIDE-th
+# point before.
 BACK_POINTS, BACK_STRIDE = 100, 10
 
 

@@ -195,7 +195,7 @@ class World:
         )
 
     def _is_due(self, rate_hz: float) -> bool:
-        """Return whether something of a rate is due in this tick; it is in the first tick."""
+        """Return whether a tick at a rate is due now, as it is in the first tick."""
         return (self._ticks - 1) % self.config.period_ticks(rate_hz) == 0
 
     def _drain(self) -> None:
@@ -319,7 +319,7 @@ class World:
             self.touches += self.drive.moving
             self.drive = DriveState(self.pose)
         elif not _fits(self._truth, ahead.pose, self.config):
-            # A robot that commands keep pushing against a wall has one collision.
+            # Commands that keep pushing the robot against a wall count as one collision.
             self.collisions += self._commanded is None or self.drive.moving
             self.drive = DriveState(self.pose)
             self._path, self._corners, self.activity = None, [], Activity.COLLIDED

@@ -207,11 +207,12 @@ class FleetSender:
         self._publisher.put(encode_json(member))
 
     def _frame_sent(self, mission: Mission) -> str:
-        """Return the fleet's frame; the map's own frame if its pose in that one is not known."""
+        """Return the name of the fleet's frame, or of the map's own frame if the map's pose in the
+        fleet's frame is not known."""
         frame = mission.ledger.frame
         if not fleet_of(mission).shared.why_misplaced(frame):
             return self._frame or frame
-        # Other robots must not mistake it for the fleet's frame.
+        # Other robots must not mistake the map's frame for the fleet's.
         return frame if self._frame not in ("", frame) else f"{frame} of another map"
 
 

@@ -25,11 +25,12 @@ from fasaco_edge.mission.core.events import Part
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
-# Number of searches for handicaps with the same seeds: each uses the time per cell that the one
-# before gave each robot.
+# Number of searches for handicaps with the same seeds: after the first, each search uses the
+# robots' times per cell that the last one gave.
 EVENED = 3
-# Factor on the makespan of the seeds before, which favours them. Cost of cells that move to another
-# robot that had a part: their share of all cells times the robots' mean time, times this.
+# Factor on the makespan of the old seeds, below 1 to favour them. Weight of moved cells: they cost
+# the share of cells that move to another robot with a part, times the robots' mean time, times
+# this.
 STABLE, CHANGED = 0.9, 1.0
 
 

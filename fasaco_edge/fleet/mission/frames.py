@@ -37,7 +37,7 @@ def seen_from(frame: Pose2D, other: Pose2D) -> Pose2D:
 
 
 def placed_point(frame: Pose2D, x: float, y: float) -> Point:
-    """Return a point of ``frame`` in its parent: the frame in which the pose of ``frame`` is."""
+    """Return a point of ``frame`` in its parent frame, in which the pose of ``frame`` is given."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return frame.x + cos * x - sin * y, frame.y + sin * x + cos * y
 

@@ -40,7 +40,7 @@ from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# Gap to another robot within which that robot blocks one that stands on its path; least
+# Largest gap between a robot that stands on its path and another robot that blocks it; least
 # displacement that counts as motion [m].
 BESIDE_M, MOVED_M = 0.4, 0.1
 # Distance from the centre of the refuge within which the robot has arrived [m].
@@ -50,8 +50,8 @@ LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
 # Another robot is in the way if its distance from the way has decreased by this since the way was
 # chosen [m].
 COMES_M = 0.05
-# A robot that moves less than STAYS_M [m] plans around its obstruction after LONG_S, even if noisy
-# poses make that robot seem to move, and is reported after TOO_LONG_S [s].
+# A robot that has stayed within STAYS_M [m] for LONG_S plans around the robot that obstructs it,
+# even if the other one's noisy poses seem to move. After TOO_LONG_S it is reported [s].
 STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
 # Least time between two searches for a refuge [s].
 AGAIN_S = 2.0
@@ -286,7 +286,8 @@ class GivingWay(Waiting):
     ) -> PathUpdate | None:
         route, neighbours = self._route, self._neighbours
         if found.robot != self.waits_for:
-            # A moment without an obstruction, or another obstructing robot, is no progress.
+            # Neither a moment without an obstruction nor a change of the obstructing robot is
+            # progress.
             self._since = self._stays_since
         was_waiting = bool(self.waits_for)
         self.waits_for, self._reason = found.robot, found.reason

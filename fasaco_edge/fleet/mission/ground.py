@@ -99,7 +99,7 @@ class SharedGround:
 def viewpoint(
     area: ReachableArea, joint: ReachableArea, wanted: NDArray[np.bool_], cell: Cell
 ) -> Cell | None:
-    """Return a viewpoint for the nearest wanted cell beyond a robot's own area; None for none.
+    """Return a viewpoint for the nearest wanted cell beyond a robot's own area, or None.
 
     It is the last cell (row, col) of the robot's own area on the shortest way to that cell.
 

@@ -57,12 +57,12 @@ class FleetKind(CompanyKind):
 
 
 def fleet_of(mission: Mission) -> FleetLayer:
-    """Return the other robots, of a mission of ``FleetKind``."""
+    """Return the other robots of a mission, which must be of ``FleetKind``."""
     assert isinstance(mission.company, FleetLayer)
     return mission.company
 
 
 def giving_way_of(mission: Mission) -> GivingWay:
-    """Return the part that decides when the robot waits, of a mission of ``FleetKind``."""
+    """Return what decides when the robot waits in a mission, which must be of ``FleetKind``."""
     assert isinstance(mission.giving_way, GivingWay)
     return mission.giving_way

@@ -138,7 +138,7 @@ class Members:
         return silent[0] if silent else ""
 
     def closed(self, area: ReachableArea, radius_m: float) -> NDArray[np.bool_] | None:
-        """Return the cells where robots stand in the way, bool (rows, cols); None for none."""
+        """Return the cells blocked by robots in the way, bool (rows, cols); None without robots."""
         for name in list(self._avoided):
             if not self._is_at_avoided(name):
                 del self._avoided[name]

@@ -43,11 +43,11 @@ def refuge(
     places: Places,
     sees: Sees,
 ) -> NDArray[np.int32] | None:
-    """Return the way to the nearest cell off the discs and paths of other robots; None for none.
+    """Return the cells of the way to the refuge, int32 (n, 2), or None.
 
-    The way avoids all their discs; cells, int32 (n, 2). It starts at the robot's cell or a cell
-    beside it, from which the first drive leads no nearer to any robot. If there is no such way, it
-    starts at the robot's cell.
+    The refuge is the nearest cell off the discs and paths of other robots; the way avoids their
+    discs. It begins at the robot's cell, or a cell beside it, that the robot can drive to without
+    coming nearer to any robot. If there is no such way, it begins at the robot's cell.
 
     Args:
         area: the reachable area.
@@ -89,7 +89,7 @@ def refuge(
         if _leads_away(first, point, beside, sees)
     ]
     way = _nearest(steps, begins, at[is_free], corner)
-    # If each way first leads nearer to another robot, it is tried: that robot may let this one by.
+    # Else the robot first comes nearer to another one, which may still let it pass.
     return _nearest(steps, [(0.0, local)], at[is_free], corner) if way is None else way
 
 

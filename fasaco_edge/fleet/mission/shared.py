@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from fasaco_edge.grid.geometry import Pose2D, Window
     from fasaco_edge.grid.lattice import Cell
 
-# Limits on the robots and, over all of them, on the tiles: 16 million cells.
+# Largest numbers of robots, and of tiles of all robots (16 million cells).
 MOST_ROBOTS, MOST_TILES = 32, 4096
 MOST_TILES_OF_ONE = MOST_TILES // 8
 
@@ -119,7 +119,7 @@ class SharedProgress(OthersCells):
         self.version += 1
 
     def why_misplaced(self, frame: str) -> str:
-        """Return why a map frame's pose in the fleet's frame is not known; "" if it is."""
+        """Return why a map frame's pose in the fleet's frame is not known; "" if it is known."""
         if self._left and frame == self._left:
             return (
                 "the map shows another building than before: `mission reset` makes it the fleet's"

@@ -68,8 +68,8 @@ class Remainder:
         self.note(cells, own, swept, now)
 
 
-# Limits on a division's number: absolute; ahead of this robot's own, which is more than others make
-# while it is out of range for a day; and on the first number of a robot that joins.
+# Largest number of a division; largest lead over this robot's own number, more than others make in
+# a day; largest first number of a robot that joins.
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 
 

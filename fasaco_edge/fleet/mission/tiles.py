@@ -64,7 +64,7 @@ class TileQueue(Generic[Tile]):
         self._is_same = is_same
 
     def next(self, tiles: Mapping[Cell, Tile], most: int) -> list[Cell]:
-        """Return the places of at most ``most`` tiles; places without a tile are forgotten."""
+        """Return the places of up to ``most`` tiles; places without a tile are forgotten."""
         self.sent = {place: tile for place, tile in self.sent.items() if place in tiles}
         new = {
             place

@@ -22,7 +22,8 @@ from fasaco_edge.mission.core.events import MemberReceived
 AHEAD_M, SPACING_M, CLEARANCE_M = 2.0, 0.1, 0.1
 # Two robots conflict if they come too near each other within this time [s].
 SLACK_S = 3.0
-# Distance to a conflict at which a robot waits; least difference of two distances [m].
+# Distance to a conflict at which a robot waits; difference up to which distances are about equal
+# [m].
 WAIT_M, NEARER_M = 1.0, 0.5
 # A robot makes way for another whose path leads over it within this length [m].
 OVER_M = 1.5

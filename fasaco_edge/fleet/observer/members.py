@@ -15,7 +15,7 @@ from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 MOST_MEMBERS = MAX_FLEET_PARTS
 # Silence after which a robot is gone [ns].
 GONE_NS = 5_000_000_000
-# Messages that follow another of the same robot sooner are not read [ns].
+# Least time between two messages of a robot; messages in between are not read [ns].
 LEAST_SPACING_NS = 100_000_000
 JOINED, GONE, WAITING = "joined", "gone", "waiting"
 
@@ -72,7 +72,7 @@ class Member:
         return now_ns - self.received_ns > GONE_NS
 
     def state(self, now_ns: int) -> str:
-        """Return the state of its mission; WAITING if it waits for another robot; GONE."""
+        """Return the state of its mission, or WAITING for another robot, or GONE."""
         if self.is_gone(now_ns):
             return GONE
         return WAITING if self.newest.waits_for else self.newest.state

@@ -120,7 +120,7 @@ class _Head(msgspec.Struct, frozen=True, array_like=True):
 
 
 @dataclass(slots=True)
-class Unnoted:
+class PendingNote:
     """Poses, plans and cells of a robot since its last note."""
 
     _pose: Pose2D | None = None

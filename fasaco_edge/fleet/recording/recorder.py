@@ -24,7 +24,7 @@ from fasaco_edge.fleet.recording.notes import (
     NOTES_VERSION,
     Note,
     NoteBatch,
-    Unnoted,
+    PendingNote,
     encode_notes,
     in_force,
     noted,
@@ -93,7 +93,7 @@ class FleetRecorder:
         self._first: list[Received] = []
         self._gathers = True
         self._poses: dict[str, PoseDecoder] = {}
-        self._unnoted: dict[str, Unnoted] = {}
+        self._pending: dict[str, PendingNote] = {}
         self._notes: list[Note] = []
         self._rates: dict[str, list[int]] = {}
         self._next_note_ns = self._next_write_ns = self._began_ns
@@ -203,7 +203,7 @@ class FleetRecorder:
             if stamped is not None:
                 pose, seat = stamped.pose, member.seat
                 cell = seat.cell_at(pose.x, pose.y)
-                self._unnoted[robot].move(cell, stamped, self._ms(arrival.wall_ns))
+                self._pending[robot].move(cell, stamped, self._ms(arrival.wall_ns))
                 self._scene.add_pose(member, pose)
         elif arrival.topic == PATH.name:
             self._scene.add_path(member, decode_path(sample.payload).xy)
@@ -214,7 +214,7 @@ class FleetRecorder:
             status = decode_tolerant(sample.payload, Status)
             # A second daemon with the robot's name does not plan.
             if status.claim.stand == "plans":
-                self._unnoted[robot].note_status(status)
+                self._pending[robot].note_status(status)
 
     def _take_fleet(self, robot: str, arrival: Arrival) -> None:
         said = decode_member(arrival.sample.payload, self._fleet)
@@ -231,12 +231,12 @@ class FleetRecorder:
             self._join(member)
         elif news:
             self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
-        self._unnoted[robot].note_cells(member, has_moved=bool(news))
+        self._pending[robot].note_cells(member, has_moved=bool(news))
 
     def _join(self, member: Member) -> None:
         """Record a robot from now on."""
         self._poses[member.name] = PoseDecoder(self._schema)
-        self._unnoted[member.name] = Unnoted()
+        self._pending[member.name] = PendingNote()
         self._subscriptions.subscribe(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
         self._scene.join(member)
@@ -252,7 +252,7 @@ class FleetRecorder:
             if member.swept.refused or member.ground.refused:
                 self._warn_once(member.name, TOO_WIDE)
             counts = traffic.messages, traffic.bytes
-            note = self._unnoted[member.name].note(member, self._ms(now_ns), now_ns, counts)
+            note = self._pending[member.name].note(member, self._ms(now_ns), now_ns, counts)
             self._notes.append(note)
             rates = self._rates.setdefault(member.name, [])
             rates.append(traffic.bytes)

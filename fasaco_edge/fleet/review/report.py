@@ -1,8 +1,8 @@
 """Review of a fleet's recording: makespan, balance, floor swept again, waiting, messages.
 
-A robot drives through floor that others have swept, or sweeps it again. Of its steps from entry to
-exit of such floor, as many as the shortest way has count as driving through, the others as sweeping
-again.
+A robot drives through floor that others have swept, or sweeps it again. From entry to exit of such
+floor, it needs as many steps as the shortest way has: these count as driving through, its further
+steps as sweeping again.
 
 Durations are by the robots' own clocks, which run faster than the recorder's in a simulation. The
 recorder's clock decides which robot was first on a cell.
