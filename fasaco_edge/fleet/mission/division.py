@@ -20,8 +20,8 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.core.events import Part
 
-# Above this number of cells only every second, third ... is used. Above this product of robots and
-# cells of the lattice there are fewer rounds.
+# Above this number of cells only every second, third ... is used. Largest product of rounds, robots
+# and cells of the lattice, which reduces the rounds, but not below one.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
