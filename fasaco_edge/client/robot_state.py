@@ -249,8 +249,7 @@ class PathProgress:
         self._find(pose, LOOK_AHEAD_M)
 
     def _find(self, pose: Pose2D, ahead_m: float) -> bool:
-        """Advance to the place nearest to a pose within ``ahead_m`` [m]; return whether there is
-        one."""
+        """Advance to the nearest place up to ``ahead_m`` ahead [m]; return whether there is one."""
         nearest_m, place, begin_m = NEAR_M, None, -self.beyond_m
         for index in range(self.at, len(self.xy) - 1):
             if begin_m > ahead_m:

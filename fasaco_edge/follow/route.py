@@ -196,8 +196,7 @@ class Route:
         return index, False
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point; none if the point is not on them soon ahead, or the robot
-        is off its leg."""
+        """Return the legs up to a point soon ahead; none if it, or the robot, is off the legs."""
         way = 0.0
         for index, leg in enumerate(self._ahead()):
             if index == 0:

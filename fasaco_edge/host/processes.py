@@ -115,8 +115,7 @@ def _field_mb(pid: int | str, name: str) -> float:
 
 
 def _fields(pid: int | str) -> dict[str, str]:
-    """Return the status fields of a process, see proc(5); of this one even without a free
-    descriptor."""
+    """Return a process's fields of proc(5); of this process even without a free descriptor."""
     if pid == "self":
         text = os.pread(_own_status(), 1 << 16, 0).decode("ascii", errors="replace")
     else:

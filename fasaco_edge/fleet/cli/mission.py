@@ -37,13 +37,7 @@ AT_ONCE = 64
 
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """A robot of the fleet, and its answer.
-
-    Attributes:
-        document: the document of a valid answer; else None.
-        refused: why it refused the command; "" if it accepted it.
-        would_forget: whether it refused because it would forget covered cells.
-    """
+    """A robot's answer, None if it is not valid, and why it refused the command, or ""."""
 
     robot: str
     document: dict[str, object] | None

@@ -207,8 +207,7 @@ class FleetSender:
         self._publisher.put(encode_json(member))
 
     def _frame_sent(self, mission: Mission) -> str:
-        """Return the name of the fleet's frame, or of the map's own frame if the map's pose in the
-        fleet's frame is not known."""
+        """Return the fleet's frame, or the map's own if its pose in the fleet's is not known."""
         frame = mission.ledger.frame
         if not fleet_of(mission).shared.why_misplaced(frame):
             return self._frame or frame

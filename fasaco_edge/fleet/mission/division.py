@@ -36,11 +36,7 @@ STABLE, CHANGED = 0.9, 1.0
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot that takes a part.
-
-    Attributes:
-        step_s: its time to sweep one cell [s].
-    """
+    """A robot that takes a part; ``step_s`` is its time to sweep one cell [s]."""
 
     name: str
     cell: Cell
@@ -156,11 +152,7 @@ def _divided(
 
 
 class _Choice:
-    """The best of the divisions offered.
-
-    Attributes:
-        seeds, handicaps_s: of the best division, for each robot; handicaps float32 (k,).
-    """
+    """The best of the divisions offered: seeds, and handicaps, float32 (k,) [s]."""
 
     def __init__(
         self,

@@ -241,8 +241,7 @@ class GivingWay(Waiting):
         return least_apart_m(self._radius_m, near.message)
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
-        """Return whether the robot has arrived in its refuge: near the centre, as it may be in the
-        way at the edge."""
+        """Return whether the robot is at the centre of its refuge: the edge may be in the way."""
         place = self._map.place_of(refuge)
         return place is None or math.dist(here, place) <= ARRIVED_M
 

@@ -326,10 +326,7 @@ class FleetLayer(Company):
         return self._owners[1]
 
     def _why_by_taken(self) -> str:
-        """Return why a plan is wanted after others swept cells of this robot's part, or "".
-
-        It counts only if the progress of others has changed.
-        """
+        """Return why a plan is wanted after others swept cells of this robot's part, or ""."""
         if self._counted == self._ledger.shared.version:
             return ""
         taken = self._count_taken()
