@@ -72,6 +72,12 @@ def is_reported(count: int) -> bool:
     return count & (count - 1) == 0
 
 
+def percent(fraction: float) -> str:
+    """Return a share in percent; 100.0 % only if it is the whole."""
+    shown = min(100.0 * fraction, 99.9) if fraction < 1.0 else 100.0
+    return f"{shown:.1f} %"
+
+
 def duration(seconds: float) -> str:
     """Return a driving time in words."""
     if seconds < 60.0:

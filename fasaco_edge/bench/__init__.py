@@ -1,1 +1,1 @@
-"""Benchmarks of the planner and the daemon: a file each, and one table of them."""
+"""Benchmarks of the planners and of the daemon, for ``fasaco-edge bench``."""

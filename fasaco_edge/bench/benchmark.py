@@ -1,8 +1,8 @@
-"""A benchmark: options, samples one by one, and a report on any number of them.
+"""Benchmark: options, samples one by one, and a report on any number of them.
 
 A new benchmark is a file that ends with a ``Benchmark``, and a row of ``BENCHMARKS`` in
-``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. A user who interrupts it between two
-samples, or within one, still gets the report on the samples so far.
+``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. If a user interrupts it, it reports on
+the samples so far.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fasaco_edge.planners.own.loading import SHAPE, is_place
 
 Sample = TypeVar("Sample")
 
-# Called with the present measurement in a few words.
+# Shows what is being measured, in a few words.
 Say = Callable[[str], None]
 
 
@@ -30,9 +30,9 @@ class Goal:
     """A limit and the measured value, in the same ``unit``.
 
     Attributes:
-        what: what is measured.
+        what: name of the measured value.
         measured: the measured value; None if nothing was measured.
-        limit: the largest good value, or the least if ``at_least``.
+        limit: the largest good value, or the least one if ``at_least``.
         unit: "s", "MB", ...; "" for a plain number.
         at_least: whether more is better.
     """
@@ -69,14 +69,12 @@ class Report:
     """Results, for people and for machines.
 
     Attributes:
-        title: heads the table.
-        header: the table's columns.
-        rows: its cells, as many to a row as there are columns.
-        figures: the same, and more, as JSON values.
-        goals: limits that judge the results.
+        title, header, rows: the first table, see ``ResultTable``.
+        figures: the results as JSON values.
+        goals: the goals, with the measured values.
         remarks: sentences below the table.
         further: tables after the first.
-        faults: what failed meanwhile; the rest was measured.
+        faults: errors of single measurements; the others are in the results.
     """
 
     title: str
@@ -99,15 +97,15 @@ class Benchmark(Generic[Sample]):
     """One benchmark of ``fasaco-edge bench``.
 
     Attributes:
-        name: the word on the command line.
-        summary: what it measures, a line.
-        description: what is done and how to read the result.
-        add_options: declares the options it takes.
-        count: how many samples ``measure`` will yield.
-        measure: yields samples; it closes all that it opened, also if it is closed early.
-        report: sums up the samples so far, even none.
+        name: its name on the command line.
+        summary: what it measures, in one line.
+        description: what it does, and how to read the result.
+        add_options: declares its options.
+        count: returns the number of samples that ``measure`` will yield.
+        measure: yields samples; it releases its resources even if it is closed early.
+        report: returns the report on the samples so far, of which there may be none.
         epilog: examples.
-        write: writes the files that the options ask for, and names them.
+        write: writes the files that the options request, and returns their names.
     """
 
     name: str
@@ -180,7 +178,7 @@ def _place(text: str) -> str:
 
 
 def grid_names(args: argparse.Namespace, default_maps: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the grids and maps asked for, else the default ones."""
+    """Return the requested grids and maps, or else the default maps."""
     return (*args.grids, *args.maps) or default_maps
 
 

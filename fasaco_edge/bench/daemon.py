@@ -1,4 +1,4 @@
-"""``bench daemon``: a daemon's time to start, memory, load, and delay from a map to its path."""
+"""``bench daemon``: a daemon's start-up time, memory, load, and delay from a map to its path."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from fasaco_edge.drawing.spread import Spread, document, median, percentile, tex
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import cpu_seconds, own_mb, peak_mb, resident_mb
 
-# Measures of a start, each with its text and digits.
+# Measured values of a daemon, each with its label and number of decimals.
 MEASURES = (
     ("ready_s", "exec to liveliness token [s]", 3),
     ("status_s", "exec to first status [s]", 3),
@@ -31,28 +31,28 @@ MEASURES = (
     ("warm_own_mb", "of this without pages of files [MB]", 1),
     ("peak_mb", "peak memory [MB]", 1),
 )
-# For each goal its measure, its text, the limit of its median, the unit.
+# Goals: measured value, label, limit of its median, unit.
 GOALS = (
     ("ready_s", "ready", 1.5, "s"),
     ("idle_own_mb", "memory before the first map, without pages of files", 32.0, "MB"),
     ("idle_percent", "share of a core, idle", 0.5, "%"),
     ("warm_own_mb", "memory after map and plan, without pages of files", 135.0, "MB"),
 )
-# Delays from the put of a map to the arrival of its path; the daemon says how long it planned.
+# Delays from the put of a map to the arrival of its path, which states the time of planning.
 DELAYS = (
     ("total_ms", "map put to path received [ms]"),
     ("plan_ms", "of this planning [ms]"),
     ("rest_ms", "all but planning [ms]"),
 )
 GOAL_REST_P99_MS = 20.0
-# Time until memory is read, after the last change [s].
+# Time from the last change to a reading of memory [s].
 SETTLE_S = 1.0
-# Maps whose delays do not count: they include loading of kernels, and the first plan.
+# Number of first maps whose delays do not count: they include loading kernels, and the first plan.
 WARM_UP_MAPS = 5
 PAUSE_S = 0.05
 
 
-# ``MEASURES`` of one daemon; and of each map the time to its path, and of that planning [ms].
+# ``MEASURES`` of one daemon; for each map the delay to its path, and the part of planning [ms].
 DaemonRun = tuple[dict[str, float], list[tuple[float, float]]]
 
 
@@ -101,7 +101,7 @@ def _run(args: argparse.Namespace) -> DaemonRun:
 
 
 def _delay_ms(source: MapSource, grid: OccupancyGrid, crate: int) -> tuple[float, float]:
-    """Return the time from a map with a crate to its path, and of that planning [ms]."""
+    """Return the delay from a map with a crate to its path, and the part of planning [ms]."""
     stamp_ns = time.time_ns()
     put_at = source.put_map(with_crate(grid, crate, stamp_ns))
     at, plan_ms = source.wait_path(stamp_ns)
@@ -109,7 +109,7 @@ def _delay_ms(source: MapSource, grid: OccupancyGrid, crate: int) -> tuple[float
 
 
 def _share_of_core(pid: int, for_s: float) -> float:
-    """Return the share of a core that a process takes for some time."""
+    """Return the share of a core that a process uses, over ``for_s`` [s]."""
     began_s, cpu_s = time.monotonic(), cpu_seconds(pid)
     time.sleep(for_s)
     return (cpu_seconds(pid) - cpu_s) / (time.monotonic() - began_s)

@@ -1,4 +1,4 @@
-"""``bench planners``: the walks of all planners, and of the user's own, side by side."""
+"""``bench planners``: walks of all planners, and of the user's own, side by side."""
 
 from __future__ import annotations
 
@@ -49,13 +49,13 @@ class Run:
 
     Attributes:
         grid: name of the grid.
-        cells: cells to cover.
-        planner: the row's name.
+        cells: number of cells to cover.
+        planner: name of its row.
         walk: figures of the walk; None if the planner failed.
-        cpu_s: time of the planning thread on a processor [s].
+        cpu_s: processor time of the planning thread [s].
         bound_steps: lower bound on the steps.
-        fault: why a planner of the user's own failed.
-        ended_s: time after which it was ended without a walk [s]; None if it was not.
+        fault: error of a planner of the user's own, if it failed.
+        ended_s: time limit that ended it without a walk [s]; None if it was not ended.
     """
 
     grid: str
@@ -99,16 +99,16 @@ def _count(args: argparse.Namespace) -> int:
 
 
 def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
-    # Imported here, so that listing the benchmarks does not load the compiler.
+    # Imported here, so that the list of benchmarks does not load the compiler.
     from fasaco_edge.planners.bound import lower_bound_of  # noqa: PLC0415
     from fasaco_edge.planners.compiling import warm_up  # noqa: PLC0415
     from fasaco_edge.planners.grids import read_grid  # noqa: PLC0415
     from fasaco_edge.planners.problem import CoverageProblem  # noqa: PLC0415
 
-    # Read first, so that a wrong name fails at once and not after minutes.
+    # Read first, so that a wrong name fails at once.
     own = [load(place) for place in dict.fromkeys(args.planner)]
     names = Counter(code.name for code in own)
-    # Files of one name in two folders are two rows.
+    # Planners of one name in two files are two rows, named after their files.
     own = [
         replace(code, name=place) if names[code.name] > 1 else code
         for code, place in zip(own, dict.fromkeys(args.planner), strict=True)
@@ -122,7 +122,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
         end = grid.start if args.end == "home" else None
         problem = CoverageProblem.of(grid.lattice, grid.start, end=end)
         posed.append((grid, problem, lower_bound_of(problem).steps))
-    # The user's own last: nothing is lost if one of them has to be interrupted.
+    # The user's own planners come last: if one hangs, the other results are there already.
     for rows in (_known, partial(_own, own, args.budget)):
         for grid, problem, bound in posed:
             for seed in range(args.seeds):
@@ -144,7 +144,7 @@ def _known(colony: ColonyConfig) -> Generator[tuple[str, CoveragePlanner], None,
     from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
 
     for name, entry in REGISTRY.items():
-        # The threshold of equation (4) that missions use, where they plan by it.
+        # The planner of missions uses the missions' threshold of equation (4).
         q0 = PlannerConfig().q0 if entry.has_local_search else colony.q0
         yield name, planner_of(name, replace(colony, q0=q0))
 
@@ -166,7 +166,7 @@ def _run(
     try:
         path = planner.plan(problem, stop, ignore)
     except (PlannerFailed, IllegalWalk) as error:
-        # The others are measured all the same.
+        # The other planners are measured nevertheless.
         is_late = isinstance(error.__cause__, TookTooLongError)
         ended_s = getattr(planner, "most_s", None) if is_late else None
         return Run(grid.name, problem.cells, name, None, 0.0, bound, error, ended_s)
@@ -197,7 +197,7 @@ def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
             "way home, as in the paper's Table I",
         ),
         further=tuple(others),
-        # The lines below the first may differ from run to run.
+        # One error per kind: the lines below the first may differ from run to run.
         faults=tuple(
             {str(run.fault).split("\n")[0]: run.fault for run in runs if run.fault}.values()
         ),
@@ -205,7 +205,7 @@ def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
 
 
 def _figures(runs: Sequence[Run]) -> dict[str, Any]:
-    """Sum up the runs on one grid, as JSON values."""
+    """Return the figures of the runs on one grid, as JSON values."""
     rows = []
     for name in dict.fromkeys(run.planner for run in runs):
         mine = [run for run in runs if run.planner == name]

@@ -1,4 +1,4 @@
-"""A real daemon in a process of its own, and a session with it."""
+"""Daemon in a process of its own, and a session with it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fasaco_edge.host.processes import python_program
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 
-# Long enough for a busy computer.
+# Timeouts, long enough for a busy computer [s].
 START_TIMEOUT_S = 180.0
 STOP_TIMEOUT_S = 8.0
 LOOK_EVERY_S = 0.002
@@ -30,9 +30,9 @@ PROGRAM = python_program("fasaco_edge")
 
 
 def warm_kernels() -> None:
-    """Compile missing kernels into the cache, so that no daemon has to.
+    """Compile missing kernels into the cache, so that no daemon compiles.
 
-    They are compiled in other processes: this one stays as small as a client on the bus.
+    Another process compiles them: this one stays as small as a client on the bus.
 
     Raises:
         ProcessEnded: compiling failed.
@@ -51,7 +51,7 @@ class DaemonProcess:
 
     Attributes:
         keys: its keys.
-        endpoint: where it listens.
+        endpoint: the endpoint that it listens at.
     """
 
     def __init__(self, config: dict[str, Any] | None = None) -> None:
@@ -78,14 +78,14 @@ class DaemonProcess:
         return self._process.pid
 
     def join(self) -> Bus:
-        """Return a session with it, as soon as it listens.
+        """Return a session with the daemon, as soon as it listens.
 
         Raises:
-            ProcessEnded: it has ended by itself.
+            ProcessEnded: the daemon has ended.
             BusUnavailable: it does not listen in time.
         """
         host, _, port = self.endpoint.removeprefix("tcp/").partition(":")
-        # A refused connection costs the starting process nothing.
+        # Refused connections do not slow down the starting daemon.
         while not _listens(host, int(port)):
             self._wait("listen at " + self.endpoint)
         return self._ends.enter_context(open_bus(BusSettings("client", (self.endpoint,))))
@@ -124,7 +124,7 @@ def _listens(host: str, port: int) -> bool:
 
 @contextmanager
 def _running(words: Sequence[str], log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Run a command of this package for the block, its output in ``log``; then end it."""
+    """Run a command of this package during the block, with its output in ``log``."""
     with log.open("wb") as output:
         command = [*PROGRAM, *words, "--with-parent", str(os.getpid())]
         process = subprocess.Popen(command, stdout=output, stderr=output)

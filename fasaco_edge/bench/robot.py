@@ -1,6 +1,6 @@
-"""A robot that a daemon plans for, and the building it publishes: halls of ten metres with doors.
+"""Robot of a daemon under measurement, and the map that it publishes.
 
-The building is fully known, 50 m x 50 m, as it comes from SLAM. A crate in it moves.
+The map is of a fully known building, 50 m x 50 m, with halls of ten metres. A crate in it moves.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from fasaco_edge.wire.messages.poses import encode_pose_stamped
 
 RESOLUTION_M = 0.05
 HALL_PX, WALL_PX, DOOR_PX, CRATE_PX = 200, 4, 30, 16
-# Places of the crate: each time it moves by less than its width, forth and back.
+# Number of places of the crate, and their spacing, less than its width [pixels].
 CRATE_PLACES, CRATE_STEP_PX = 12, 12
-# Timeout of the first path, which needs the kernels: a slow computer loads them for long.
+# Timeout of a path [s]: before the first one, a slow computer takes long to load the kernels.
 PATH_TIMEOUT_S = 300.0
 
 
@@ -52,8 +52,8 @@ def building(side_px: int = 1000) -> OccupancyGrid:
 def with_crate(grid: OccupancyGrid, number: int, stamp_ns: int) -> OccupancyGrid:
     """Return the building with a crate in the hall farthest from the robot.
 
-    Crates of successive numbers stand at different places, so that each map gains
-    and loses coverable cells against the one before.
+    Crates of successive numbers stand at different places, so that each map gains and loses
+    coverable cells.
     """
     side = grid.geometry.rows
     row, col = side - HALL_PX // 2, side - HALL_PX + 2 * CRATE_PX
@@ -64,7 +64,7 @@ def with_crate(grid: OccupancyGrid, number: int, stamp_ns: int) -> OccupancyGrid
 
 
 def robot_pose(stamp_ns: int) -> StampedPose:
-    """Return a robot that stands in the building's first hall."""
+    """Return the pose of a robot in the building's first hall."""
     return StampedPose(Pose2D(2.5, 2.5), stamp_ns=stamp_ns)
 
 
@@ -88,20 +88,20 @@ class MapSource:
         self._poses.put(encode_pose_stamped(pose))
 
     def put_map(self, grid: OccupancyGrid) -> float:
-        """Publish a map; return when [s, monotonic]."""
+        """Publish a map; return the time of that [s, monotonic]."""
         payload = encode_occupancy_grid(grid)
         at = time.monotonic()
         self._maps.put(payload)
         return at
 
     def wait_path(self, map_stamp_ns: int) -> tuple[float, float]:
-        """Return the arrival [s, monotonic] of the first path planned on the map of that stamp, and
-        how long it was planned [ms].
+        """Return the arrival [s, monotonic] of the first path planned on the map with this stamp,
+        and its time of planning [ms].
 
-        Paths without a plan, a walk cut off before a new obstacle, are skipped.
+        Paths without a plan, which only end before a new obstacle, are skipped.
 
         Raises:
-            NotYet: none came in time.
+            NotYet: no path came in time.
             ProcessEnded: the daemon has ended.
         """
         deadline = time.monotonic() + PATH_TIMEOUT_S

@@ -1,8 +1,8 @@
-"""The only package that imports Zenoh: sessions, publishers, subscriptions, the mailbox."""
+"""Zenoh bus, the only package that imports Zenoh: sessions, publishers, subscriptions, mailbox."""
 
 from __future__ import annotations
 
 from typing import Final
 
 DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
-"""Where a daemon listens, and a client connects to, by default."""
+"""Endpoint where a daemon listens, and a client connects to, by default."""

@@ -1,14 +1,14 @@
 """Access rules, size limits and rate limits for Zenoh, derived from roles and the topic table.
 
-The listening session (or a router) has them in its configuration: Zenoh refuses forbidden messages
-before they reach this program. A role is named after what the *other* side does, as listed in
-``protocol/security.md``.
+They are part of the configuration of the listening session, or of a router: Zenoh refuses forbidden
+messages before they reach this program. A role is named after what the *other* side does, as listed
+in ``protocol/security.md``.
 
 * Everything that is not named is denied. ``**`` does not match a chunk that begins with ``@``, so
   every key is named, and also the key that Zenoh's advanced publishers and subscribers use to serve
   late joiners: ``<key>/@adv/**``.
-* A role that speaks on a key may publish, reply to queries and declare a liveliness token there;
-  one that listens may subscribe, query and look for tokens. Neither may delete.
+* A role that speaks on a key may publish, reply to queries and declare a liveliness token there; a
+  role that listens may subscribe, query and look for tokens. Neither may delete.
 * Rules hold in both directions: a message that a role may not receive is not sent to it.
 """
 
@@ -28,9 +28,9 @@ from fasaco_edge.wire.topics import QUERIES, RPC_NAMES, TOPICS
 SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
 LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
 
-# Bytes of a map beside its cells: some numbers and a frame name. A path's attachment is smaller.
+# Bytes of a map besides its cells: numbers and a frame name. A path's attachment is smaller.
 HEADER_BYTES = 1024
-# The largest pose is a nav_msgs/Odometry with two covariances and two names.
+# Largest size of a pose: a nav_msgs/Odometry with two covariances and two names [bytes].
 POSE_BYTES = 4096
 JSON_BYTES = MAX_JSON_BYTES + HEADER_BYTES
 Hertz = Annotated[float, Meta(gt=0, le=10_000)]
@@ -46,11 +46,11 @@ class Role:
 
     Attributes:
         description: the rights in words, for people.
-        speaks: topics it may publish, and on which it may reply to queries.
-        listens: topics it may subscribe to and query.
-        asked: topics whose subscribers, on this robot's key and on that of all robots, are
+        speaks: topics that it may publish, and on which it may reply to queries.
+        listens: topics that it may subscribe to and query.
+        asked: topics whose subscribers, on this robot's key and on the key of all robots, are
             announced to it: without subscribers it would not publish.
-        includes: another role whose rights it also has; "" for none.
+        includes: another role whose rights it also has, or "".
     """
 
     description: str
@@ -106,11 +106,11 @@ class Grant:
 
     Attributes:
         role: one of ROLES.
-        names: common names of certificates, or user names; one may have several roles.
+        names: common names of certificates, or user names; a name may have several roles.
         prefix: first part of the keys: ``fasaco/@v1/robot``, ``fasaco/@v1/*`` for all robots;
             "" where topics are whole keys.
         of: distinguishes several grants of one role, each with its prefix; "" for a single grant.
-        rights: rights of the role; None for those in ROLES.
+        rights: rights of the role; None for the rights in ROLES.
     """
 
     role: str
@@ -128,8 +128,8 @@ class Grant:
 class Limits(msgspec.Struct, frozen=True):
     """Largest size [bytes] and rate [1/s] of the messages of each sender.
 
-    Zenoh drops larger messages; above the rate it passes the first message of each period and
-    drops the others. Map updates have no rate limit: a lost one would corrupt the map unnoticed.
+    Zenoh drops larger messages; above the rate it passes on the first message of each period and
+    drops the others. Map updates have no rate limit: a lost update would corrupt the map unnoticed.
     """
 
     map_bytes: Annotated[int, Meta(ge=HEADER_BYTES)] = MAX_GRID_CELLS + HEADER_BYTES
@@ -170,7 +170,7 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
     classes: dict[str, list[str]] = {}
     for entry in ENTRIES:
         classes.setdefault(entry.size_class, []).append(entry.suffix)
-    # The keys of these topics reply to queries with their last sample, as a storage would.
+    # Queries on the keys of these topics are answered with the last sample, as by a storage.
     answered = [topic.suffix for topic in TOPICS if topic.name in RPC_NAMES]
     sizes = (
         ("grids and paths", published, classes["large"], most.map_bytes),
@@ -219,7 +219,7 @@ def ros_rights(inputs: Sequence[str], outputs: Sequence[str], graph: Sequence[st
 
 
 def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, Any]:
-    """Return Zenoh's ``transport`` where both sides show a certificate of the CA (PEM files)."""
+    """Return Zenoh's ``transport`` with certificates of a CA on both sides (PEM files)."""
     tls = {
         "root_ca_certificate": root_ca,
         "enable_mtls": True,
@@ -238,7 +238,7 @@ def user_password(user: str, password: str, dictionary_file: str) -> dict[str, A
 
     Args:
         user, password: of this session.
-        dictionary_file: lines ``user:password`` of those that may connect to it; "" for none.
+        dictionary_file: lines ``user:password`` of the users that may connect to it, or "".
     """
     login: dict[str, str] = {"user": user, "password": password}
     if dictionary_file:
@@ -247,7 +247,7 @@ def user_password(user: str, password: str, dictionary_file: str) -> dict[str, A
 
 
 def _parts(grant: Grant) -> Iterator[Grant]:
-    """Yield the grant, and those of the roles that it includes."""
+    """Yield the grant, and the grants of the roles that it includes."""
     yield grant
     included = ROLES[grant.role].includes
     if included:

@@ -17,11 +17,11 @@ class Sample:
 
     Attributes:
         key: its key.
-        schema: message type in its encoding; "" for none.
-        size: of payload and attachment together [bytes].
-        sender: id of the session that published it, as stated in the sample; "" for unknown. If
-        that session sets no timestamps, it may be the id of the first router on the way, or of this
-        session.
+        schema: message type in its encoding; "" without a type.
+        size: size of payload and attachment together [bytes].
+        sender: id of the session that published it, as stated in the sample; "" if unknown. If that
+            session sets no timestamps, it may be the id of the first router on the way, or of this
+            session.
     """
 
     __slots__ = ("_attachment", "_payload", "key", "schema", "sender", "size")
@@ -87,7 +87,7 @@ def _sender_of(sample: zenoh.Sample) -> str:
 
 
 def schema_of(encoding: zenoh.Encoding) -> str:
-    """Return the message type named by an encoding, "" for none."""
+    """Return the message type named by an encoding, or ""."""
     return str(encoding).partition(";")[2]
 
 

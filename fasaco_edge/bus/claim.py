@@ -1,9 +1,10 @@
-"""The claim on a role that one process may have: planning for a robot, driving its base.
+"""Claim on a role that only one process may have at a time: planning for a robot, driving its base.
 
-Each shows a liveliness token that ends with ``<its Zenoh id>/<waits, yields, or a word for the
-active one>``. A process that finds another active waits until that one is gone. The id alone
-decides which of several waiting ones is next, and which of two active ones continues after a
-network partition: so both agree, whatever their clocks say. Below, the active one "plans".
+Each process shows a liveliness token that ends with ``<its Zenoh id>/<its state>``: waits, yields,
+or a word for the active process. A process that finds another one active waits until that one is
+gone. The process with the smallest id is the next to become active, and the one of two active
+processes that continues after a network partition: so all agree, whatever their clocks show. Below,
+the active process is the daemon that "plans".
 """
 
 from __future__ import annotations
@@ -16,17 +17,18 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import Topic
 
-# Time within which two daemons started together see each other's tokens [s].
+# Time within which two daemons that start together see each other's tokens [s].
 SETTLE_S = 0.2
 # Period of token queries while one daemon plans [s]; otherwise every cycle.
 ASK_PERIOD_S = 1.0
 # Time that the others need to reconnect to a restarted router [s].
 REJOIN_S = 3.0
-# A session silent for this long is dead to the others: Zenoh's lease [s]. When a pause begins, its
-# last sign of life may already be a quarter of the lease old.
+# Zenoh's lease: a session silent for this long is gone for the others [s].
 LEASE_S = 10.0
+# Pause of this process after which it may be gone for the others [s]: its last message before the
+# pause may already be a quarter of a lease old.
 PAUSE_S = 0.75 * LEASE_S
-# Longest wait for a daemon that could plan but does not [s]: its lease and a margin.
+# Longest wait for a daemon with a smaller id that does not plan [s]: its lease and a margin.
 PATIENCE_S = 15.0
 
 ID = re.compile(r"[0-9a-f]{1,32}")
@@ -35,8 +37,8 @@ ID = re.compile(r"[0-9a-f]{1,32}")
 class ClaimState(StrEnum):
     """State of a daemon's claim; all but the first are chunks of tokens.
 
-    A daemon that ``yields`` planned before and waits now: it published an empty path to stop the
-    robot.
+    A daemon that ``yields`` has planned before, and waits now: it has published an empty path to
+    stop the robot.
     """
 
     LOOKS = "looks"
@@ -46,7 +48,7 @@ class ClaimState(StrEnum):
 
     @property
     def is_waiting(self) -> bool:
-        """Whether another daemon is to plan."""
+        """Whether this daemon waits for another one."""
         return self in (ClaimState.WAITS, ClaimState.YIELDS)
 
 
@@ -54,13 +56,14 @@ _SHOWN = (ClaimState.WAITS, ClaimState.YIELDS, ClaimState.PLANS)
 
 
 class Claim:
-    """The decision which daemon of a name plans: a pure function of observations and times.
+    """Decision which daemon of a name plans, from observations and times alone.
 
     Attributes:
-        rejoin_s: how long an active daemon stays uncertain after it lost touch with the others [s].
-        state: of this daemon.
-        rival: id of the daemon it waits for, or last waited for; "" for none.
-        rival_yielded: whether this one plans, and another active one has just yielded.
+        rejoin_s: time for which an active daemon that lost its connection stays uncertain after it
+            has reconnected [s].
+        state: state of this daemon.
+        rival: id of the daemon that it waits for, or last waited for; "" without one.
+        rival_yielded: whether this daemon plans, and another active one has just yielded.
     """
 
     rejoin_s = SETTLE_S
@@ -78,9 +81,9 @@ class Claim:
         self._decided_at: float | None = None
 
     def is_uncertain(self, now: float) -> bool:
-        """Return whether another daemon may be planning unseen: then publish nothing.
+        """Return whether another daemon may plan without being visible here: publish nothing then.
 
-        This is so after a pause in which the others may have considered this daemon dead.
+        The others may have taken over while this daemon paused or was disconnected.
         """
         return self.state is ClaimState.PLANS and now < self._uncertain_until
 
@@ -92,7 +95,7 @@ class Claim:
         Args:
             others: the other daemons by id.
             now: time of any monotonic clock [s].
-            in_touch: whether others are visible; otherwise nothing changes.
+            in_touch: whether others are visible; if not, the state does not change.
         """
         self.rival_yielded = False
         self._notice_absence(now, in_touch=in_touch)
@@ -112,7 +115,7 @@ class Claim:
         self._yielding = yielding
 
     def _notice_absence(self, now: float, *, in_touch: bool) -> None:
-        """Be uncertain for a while after the others were not visible."""
+        """Start a time of uncertainty after a pause, or after the others were not visible."""
         paused_s = 0.0 if self._decided_at is None else now - self._decided_at
         self._decided_at = now
         if paused_s > PAUSE_S or (in_touch and not self._was_in_touch):
@@ -121,7 +124,7 @@ class Claim:
         self._was_in_touch = in_touch
 
     def _wait_for_calm(self, first: str, now: float) -> None:
-        """Plan once no other has planned for a while, and no other id is smaller."""
+        """Plan once no other daemon has planned for a while, unless another id is smaller."""
         if self._calm_since is None:
             self._calm_since = now
         is_calm_for_s = now - self._calm_since - self._calm_s
@@ -139,10 +142,10 @@ class BusClaim(Claim):
     """A claim and its token on the bus.
 
     Args:
-        bus: the session; its id is that of the claim.
-        keys: of the robot.
-        topic: the tokens' row, whose key has a chunk for the id and one for the state.
-        active: the last chunk of the token of the one that "plans".
+        bus: the session, whose id is that of the claim.
+        keys: keys of the robot.
+        topic: topic of the tokens, whose key has a chunk for the id and one for the state.
+        active: last chunk of the token of a daemon that "plans".
 
     Attributes:
         is_settled: whether one of the daemons is known to plan.
@@ -167,7 +170,7 @@ class BusClaim(Claim):
     def update(self, now: float) -> bool:
         """Query the others; return whether the state has changed.
 
-        The token follows with ``show``, once the previous role is given up.
+        The caller then gives up or takes the role, and calls ``show`` to change the token.
         """
         before = self.state
         in_touch = self._bus.keep_in_touch(now)
@@ -179,7 +182,7 @@ class BusClaim(Claim):
             self._version = self._token_list.version
             self._others = claims_in(self._token_list.there(), self._active)
             self._others.pop(self._bus.id, None)
-            # If none plans, one soon will.
+            # While none plans, the tokens are queried every cycle.
             self.is_settled = ClaimState.PLANS in (self.state, *self._others.values())
         self.decide(self._others, now, in_touch=in_touch)
         return self.state is not before
@@ -191,13 +194,13 @@ class BusClaim(Claim):
 
 
 def claims_in(keys: Iterable[str], active: str = "plans") -> dict[str, ClaimState]:
-    """Return the state of each daemon by its id, read from the keys of tokens; skip other keys."""
+    """Return the state of each daemon by its id, from the keys of tokens; skip malformed keys."""
     claims: dict[str, ClaimState] = {}
     for key in keys:
         _, own, state = key.rsplit("/", 2)
         state = ClaimState.PLANS if state == active else state
         if ID.fullmatch(own) and state in _SHOWN:
-            # A daemon that changes its state has two tokens for a moment: PLANS comes first.
+            # A daemon that changes its state has two tokens for a moment: PLANS takes precedence.
             before = claims.get(own, ClaimState.WAITS)
             claims[own] = max(ClaimState(state), before, key=_SHOWN.index)
     return claims

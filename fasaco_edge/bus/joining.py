@@ -1,4 +1,4 @@
-"""Joining a bus that may not be there yet."""
+"""Opening a session on a bus that may not be there yet."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ RETRY_S = 1.0
 def join(
     settings: BusSettings, stop: threading.Event, waits: Callable[[bool], None] = lambda _: None
 ) -> Bus | None:
-    """Open a session once a program listens there; None if ``stop`` is set before.
+    """Open a session once a process listens at the endpoint; None if ``stop`` is set before.
 
-    ``waits`` is called before each retry, with True before the first.
+    ``waits`` is called before each retry; its argument is whether this is the first retry.
     """
     is_first = True
     while not stop.is_set():

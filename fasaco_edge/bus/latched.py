@@ -1,10 +1,10 @@
-"""Subscriber of a latched key: receives the cached samples on joining, recovers a lost last one.
+"""Subscriber of a latched key: gets the cached samples on joining, and recovers a lost last sample.
 
-Zenoh's advanced subscriber (1.10) does the same, but as long as the session lives it queries, once
-a second, every publisher that ever existed, even for subscribers that were undeclared. This one
-queries only publishers that exist, known by their liveliness tokens: each at most once a second,
-and a bounded number of them. So open queries and memory stay bounded however many publishers come
-and go. ``sample_order`` schedules the queries, and orders samples and replies.
+Zenoh's advanced subscriber (1.10) does the same, but once a second, until the session ends, it
+queries every publisher that ever existed, even for undeclared subscribers. This subscriber queries
+a bounded number of publishers that exist, found by their liveliness tokens, each at most once a
+second. So open queries and memory stay bounded, whatever the number of publishers over time.
+``sample_order`` schedules the queries, and orders samples and replies.
 
 For the same reason it queries tokens and does not subscribe to them: each key that a subscriber
 has ever received stays in the memory of its session and of its router.
@@ -28,9 +28,10 @@ from fasaco_edge.bus.sample_order import (
     SampleOrder,
 )
 
-# Timeout of a reply [s]: a large map on a slow link takes long. No query is repeated meanwhile.
+# Timeout of a reply [s], long enough for a large map on a slow link. Until then the query is not
+# repeated.
 ANSWER_S = 10.0
-# Limit on the tokens that are read.
+# Largest number of tokens read.
 MOST_TOKENS = 1024
 
 Receive = Callable[[zenoh.Sample], None]
@@ -46,19 +47,20 @@ class Subscription:
         """Query the samples cached for late joiners: none here."""
 
     def end(self) -> None:
-        """Stop receiving; afterwards it only has to be released."""
+        """Stop receiving; afterwards only ``release`` is left to do."""
         subscriber: Any = self._subscriber  # undeclare() has no annotation
         subscriber.undeclare()
 
     def release(self) -> None:
-        """Release the Zenoh objects: a subscriber with a callback goes on receiving otherwise."""
+        """Release the Zenoh objects: otherwise a subscriber with a callback goes on receiving."""
         del self._subscriber
 
 
 class LatchedSubscription(Subscription):
-    """A subscriber that receives the last ``depth`` samples of each publisher, also of later ones.
+    """A subscriber that first receives the last ``depth`` samples of each publisher.
 
-    Samples of one publisher are delivered in order and once, unless ``ask`` queries them again.
+    That includes publishers that appear later. Samples of one publisher are delivered in order and
+    once, unless ``ask`` queries them again.
     """
 
     def __init__(
@@ -88,12 +90,12 @@ class LatchedSubscription(Subscription):
         asker.add(self)
 
     def ask(self) -> None:
-        """Query every publisher for its last samples, also those received already."""
+        """Query every publisher for its last samples, even if they were received already."""
         with self._lock:
             self._publishers.ask_all()
         self._asker.wake()
 
-    def ask_who_is_due(self, now: float) -> float:
+    def send_due(self, now: float) -> float:
         """Send due queries, on the asker's thread; return when the next is due [s, monotonic]."""
         self._query_tokens(now)
         with self._lock:
@@ -103,7 +105,7 @@ class LatchedSubscription(Subscription):
             if asks_all:
                 questions.append((f"{self._caches}?_max={self._depth}", None))
             for publisher in self._publishers.take_due(now):
-                # One key for all where possible: Zenoh remembers each key.
+                # Zenoh remembers each key: a single publisher is queried by the key of all.
                 key = self._caches if len(self._publishers) == 1 else publisher.key
                 questions.append((f"{key}?{self._order.missing(publisher.name)}", publisher))
             next_at = min(self._query_tokens_at, self._publishers.next_at, self._order.next_at)
@@ -141,7 +143,7 @@ class LatchedSubscription(Subscription):
             self._awaits_tokens = False
 
     def _on_tokens(self, tokens: list[str], is_whole: bool) -> None:
-        """Add the publishers of ``tokens``; if these are all tokens, forget other publishers."""
+        """Add the publishers of ``tokens``; forget others if ``tokens`` is complete."""
         found = {"/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2]): key for key in tokens}
         with self._lock:
             self._awaits_tokens = False
@@ -165,7 +167,7 @@ class LatchedSubscription(Subscription):
 
 
 class Asker:
-    """Thread that sends queries of latched subscriptions: Zenoh's own must not call Zenoh."""
+    """Thread that sends queries of latched subscriptions: Zenoh's threads must not call Zenoh."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -209,11 +211,11 @@ class Asker:
             with self._changed:
                 if not (self._is_woken or self._is_ending):
                     waits_s = next_at - time.monotonic()
-                    # A short delay gathers queries that are due soon: one wake-up for all.
+                    # A short delay sends queries that are due soon together.
                     self._changed.wait(None if waits_s == float("inf") else max(waits_s, 0.05))
                 if self._is_ending:
                     return
                 self._is_woken = False
                 subscriptions = list(self._subscriptions)
             now = time.monotonic()
-            next_at = min((one.ask_who_is_due(now) for one in subscriptions), default=float("inf"))
+            next_at = min((one.send_due(now) for one in subscriptions), default=float("inf"))

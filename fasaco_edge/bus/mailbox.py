@@ -1,7 +1,7 @@
-"""Mailbox and slot between Zenoh's threads and a loop: a post costs O(1) and never blocks.
+"""Mailbox and slot between Zenoh's threads and a loop: a post takes O(1) and never blocks.
 
-A newer item replaces the older one of its kind. Kinds whose items all count are queued in order: a
-map update changes the map before it, each pose adds to the swept floor.
+A newer item replaces the older one of its kind. Kinds of which every item counts are queued in
+order: a map update changes the map before it, each pose adds to the swept floor.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Spacing:
     """Rate limit of a kind: least time between two takes, to bound the cost of a flood.
 
     Attributes:
-        kind: the queued kind that is held back; its newest item is kept.
+        kind: the queued kind that is held back.
         seconds: least time from one take of it to the next [s].
         followers: kinds that depend on it, and wait while it waits.
     """
@@ -56,14 +56,14 @@ class Spacing:
 
 @dataclass(frozen=True, slots=True)
 class Queue:
-    """Bounds of the queue of a kind; a full queue drops its oldest, never its newest.
+    """Bounds of the queue of a kind; a full queue drops its oldest item.
 
     Attributes:
-        length: items at most.
-        size: most bytes of all items together; a single item may be larger.
-        at_once: most items that one take returns; the others wait for the next take.
+        length: largest number of items.
+        size: largest size of all items together [bytes]; a single item may be larger.
+        at_once: largest number of items that one take returns; the others wait for the next take.
         after: a queued kind that this one must not overtake: an item waits for the items of that
-        kind that were posted before it.
+            kind that were posted before it.
     """
 
     length: int
@@ -95,8 +95,8 @@ class Mailbox(Generic[Item]):
         self._size_of = size_of
         self._on_lost = on_lost
         self._lost = dict.fromkeys(queued, 0)
-        # How many items of a kind have left their queue, and which item of another kind each waits
-        # for.
+        # Number of items of each kind that have left their queue; for each waiting item of a kind
+        # with ``after``, the number of items of that other kind posted before it.
         self._gone = dict.fromkeys(queued, 0)
         self._waits = {kind: deque[int]() for kind, bounds in queued.items() if bounds.after}
         self._spacing = spacing
@@ -116,7 +116,7 @@ class Mailbox(Generic[Item]):
                 self._changed.notify()
                 return dropped
             queue = self._queued[kind]
-            # The first item that is held back wakes a waiting reader; the others do not.
+            # Of items that are held back, only the first wakes a waiting reader.
             if not queue or kind not in self._held(time.monotonic()):
                 self._changed.notify()
             queue.append(item)
@@ -135,8 +135,8 @@ class Mailbox(Generic[Item]):
     def take(self, timeout_s: float) -> list[tuple[str, Item]]:
         """Return the available items as (kind, item); wait up to ``timeout_s`` [s] for one.
 
-        Newest-only kinds come first. A rate-limited kind stays until its time has come; items
-        beyond ``at_once`` of a queue stay until the next take.
+        Kinds without a queue come first. Rate-limited kinds stay until they are due; items beyond
+        ``at_once`` of a queue stay until the next take.
         """
         deadline = time.monotonic() + timeout_s
         with self._changed:
@@ -149,7 +149,7 @@ class Mailbox(Generic[Item]):
                 self._changed.wait((min(deadline, self._free_at) if held else deadline) - now)
             items = list(self._newest.items())
             self._newest = {}
-            # An item that waits for another kind comes after it.
+            # Kinds that wait for another kind come after it.
             for kind in sorted(ready, key=self._waits.__contains__):
                 most = min(len(self._queued[kind]), self._bounds[kind].at_once)
                 while most > 0 and not self._has_to_wait(kind):
@@ -165,13 +165,13 @@ class Mailbox(Generic[Item]):
             self._free_at = math.inf
 
     def release(self) -> None:
-        """Return the kinds kept by ``hold`` again."""
+        """Let ``take`` return the kinds kept by ``hold`` again."""
         with self._changed:
             self._free_at = -math.inf
             self._changed.notify()
 
     def take_lost(self, kind: str) -> int:
-        """Return how many items of a queued kind were lost since the last call."""
+        """Return the number of items of a queued kind dropped since the last call."""
         with self._changed:
             lost, self._lost[kind] = self._lost[kind], 0
             return lost

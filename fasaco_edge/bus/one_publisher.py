@@ -1,10 +1,10 @@
 """Rule of one publisher: of several publishers of an input, the first one received counts.
 
-Another one takes over once the first has been silent for a stated time (``Topic.one_publisher_s``),
-or its session has ended. So a map, pose or mask does not alternate between publishers, and a
-restarted program is accepted again.
+Another publisher takes over once the first has been silent for ``Topic.one_publisher_s``, or its
+session has ended. So a map, pose or mask does not alternate between publishers, and a restarted
+program is accepted again.
 
-A publisher is known by the Zenoh id of its session, see ``arrival.Sample.sender``. A sample of
+A publisher is identified by the Zenoh id of its session, see ``arrival.Sample.sender``. A sample of
 unknown origin always counts.
 """
 
@@ -20,10 +20,10 @@ class Sessions(Protocol):
     """The bus's view of other sessions, by their Zenoh ids."""
 
     def is_linked(self, session: str) -> bool:
-        """Return whether it is connected to this one directly."""
+        """Return whether it is connected to this session directly."""
         ...
 
-    def only_passes_on(self, session: str) -> bool:
+    def is_relay(self, session: str) -> bool:
         """Return whether it is this session or its router: both mark samples without an id."""
         ...
 
@@ -32,47 +32,47 @@ class OnePublisher:
     """The publisher of one input that counts; used from one thread, or under the caller's lock.
 
     Args:
-        name: what it publishes, in the plural: "maps".
-        silent_s: how long it may be silent before another one counts [s].
-        sessions: of the bus.
+        name: name of the input, in the plural: "maps".
+        silent_s: silence after which another publisher takes over [s].
+        sessions: the sessions on the bus.
     """
 
     def __init__(self, name: str, silent_s: float, sessions: Sessions) -> None:
         self._name, self._silent_s, self._sessions = name, silent_s, sessions
-        # The publisher that counts, the time of its last sample [s], and whether it was linked
+        # The publisher that counts, the time of its last sample [s], and whether it was connected
         # directly.
-        self._first, self._heard_at, self._was_linked = "", float("-inf"), False
-        # The publisher refused last, when, and whether its newest sample is still missing.
+        self._first, self._received_at, self._was_linked = "", float("-inf"), False
+        # The publisher refused last, the time [s], and whether its newest sample was refused.
         self._other, self._refused_at, self._misses = "", float("-inf"), False
 
     def takes(self, sender: str, now: float) -> bool:
         """Return whether a sample counts.
 
         Args:
-            sender: id of its session; "" for unknown.
-            now: by the monotonic clock [s].
+            sender: id of its session; "" if unknown.
+            now: time by the monotonic clock [s].
         """
         if sender != self._first:
-            if not sender or self._sessions.only_passes_on(sender):
+            if not sender or self._sessions.is_relay(sender):
                 return True
             if self._first and not self._is_over(now):
                 self._other, self._refused_at, self._misses = sender, now, True
                 return False
             self._count(sender)
-        self._heard_at, self._misses = now, False
+        self._received_at, self._misses = now, False
         return True
 
     def takes_over(self, now: float) -> bool:
         """Return True once when a refused publisher takes over: its newest sample is missing.
 
-        A silent publisher that is still linked keeps its role until another one publishes.
+        A silent publisher that is still connected counts until another one publishes.
         """
         if not self._misses or not self._is_over(now):
             return False
         if self._was_linked and self._sessions.is_linked(self._first):
             return False
         self._count(self._other)
-        self._heard_at, self._misses = now, False
+        self._received_at, self._misses = now, False
         return True
 
     def refuses(self, sender: str) -> bool:
@@ -80,7 +80,7 @@ class OnePublisher:
         return bool(sender) and sender == self._other
 
     def conflict(self, now: float) -> str:
-        """Return the conflict of two publishers in words; "" for none."""
+        """Return the conflict of two publishers in words, or ""."""
         if not self._other or now - self._refused_at > max(self._silent_s, SHOWN_S):
             return ""
         return (
@@ -95,4 +95,4 @@ class OnePublisher:
 
     def _is_over(self, now: float) -> bool:
         is_gone = self._was_linked and not self._sessions.is_linked(self._first)
-        return is_gone or now - self._heard_at > self._silent_s
+        return is_gone or now - self._received_at > self._silent_s

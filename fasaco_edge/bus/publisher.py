@@ -1,4 +1,4 @@
-"""Publishers: one for a native key with encoding and QoS, one for a ROS 2 topic."""
+"""Publishers of native keys, with encoding and QoS, and of ROS 2 topics."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ JSON = zenoh.Encoding.APPLICATION_JSON
 
 
 def encoding_of(schema: str) -> zenoh.Encoding:
-    """Return the encoding of a CDR type; of JSON for ""."""
+    """Return the encoding of a CDR type, or of JSON for ""."""
     return CDR.with_schema(schema) if schema else JSON
 
 
@@ -40,7 +40,7 @@ class Publisher:
             "priority": getattr(zenoh.Priority, qos.priority.upper()),
             "express": qos.express,
         }
-        # An advanced publisher does not know of its subscribers; a plain one on its key does.
+        # Only a plain publisher reports whether its key has subscribers, an advanced one does not.
         self._plain = session.declare_publisher(key, **options)
         self._latched = partial(_latched, session, key, options, qos.cache) if qos.latched else None
         self._publisher: Any = self._latched() if self._latched else self._plain
@@ -49,14 +49,13 @@ class Publisher:
         """Drop the samples cached for late joiners."""
         if self._latched is not None:
             # The publisher is released, not undeclared: undeclare() of an advanced publisher
-            # (zenoh-python 1.10) waits for Zenoh's locks while it holds the interpreter lock. A
-            # callback that holds Zenoh's locks and waits for the interpreter lock then deadlocks
-            # the process.
+            # (zenoh-python 1.10) waits for Zenoh's locks while it holds the interpreter lock, and
+            # deadlocks with a callback that holds Zenoh's locks and waits for the interpreter lock.
             self._publisher = None
             self._publisher = self._latched()
 
     def put(self, payload: bytes | zenoh.ZBytes, attachment: bytes = b"") -> None:
-        """Send ``payload``."""
+        """Send a sample."""
         self._publisher.put(payload, attachment=attachment or None)
 
     def release(self) -> None:
@@ -75,8 +74,8 @@ def _latched(session: zenoh.Session, key: str, options: dict[str, Any], samples:
         key,
         **options,
         cache=zenoh.ext.CacheConfig(max_samples=samples),
-        # Sequence numbers let a subscriber query a sample that it missed. Heartbeats are of no use:
-        # zenoh-ext 1.10 cannot read those of a key with an "@" chunk.
+        # Sequence numbers let a subscriber query a sample that it missed. No heartbeats: zenoh-ext
+        # 1.10 cannot read heartbeats of a key with an "@" chunk.
         sample_miss_detection=zenoh.ext.MissDetectionConfig(
             heartbeat=None, sporadic_heartbeat=None
         ),

@@ -1,8 +1,8 @@
 """Queries, their replies, and the list of liveliness tokens.
 
-Tokens are queried and not subscribed to. A Zenoh subscriber (1.10) keeps each key that it has ever
-received; after a flood it keeps tokens that no longer exist; and while a token subscriber exists,
-a query may return nothing.
+Tokens are queried and not subscribed to: a Zenoh subscriber (1.10) keeps each key that it has ever
+received, and after a flood also tokens that no longer exist. While a token subscriber exists, a
+query may return nothing.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import zenoh
 from fasaco_edge.bus.arrival import schema_of
 from fasaco_edge.bus.publisher import encoding_of
 
-# Limit on the tokens that are remembered, in case of a flood.
+# Largest number of tokens kept, in case of a flood.
 MOST_TOKENS = 16_384
-# Timeout of replies from routers [s]. A late reply changes nothing. A query that has not ended
-# after twice that time is sent again [s].
+# Timeout of replies from routers [s]; later replies are ignored. A query that has not ended after
+# twice that time is sent again [s].
 ANSWER_S = 2.0
 LOST_S = 2 * ANSWER_S
 # Zenoh's own error for a queryable that did not reply in time.
@@ -34,8 +34,8 @@ def ask_for_tokens(
 ) -> bool:
     """Query the tokens that match a key; return False if the session is closed.
 
-    ``end`` is called on a Zenoh thread within ``ANSWER_S``, with the keys of ``most`` tokens at
-    most, and whether all replies were valid.
+    ``end`` is called on a Zenoh thread within ``ANSWER_S``, with the keys of up to ``most`` tokens,
+    and whether all replies were valid.
     """
     found, wrong = dict[str, None](), list[zenoh.Reply]()
 
@@ -58,7 +58,7 @@ class TokenList:
     """The tokens that match a key.
 
     Attributes:
-        version: counts the replies; 0 before the first.
+        version: counter of replies that changed the list, or were complete; 0 before the first.
     """
 
     def __init__(self, session: zenoh.Session, key: str) -> None:
@@ -75,7 +75,7 @@ class TokenList:
         return self._there
 
     def ask(self, period_s: float) -> None:
-        """Query the tokens if the last query is this long ago [s]; the reply updates the list."""
+        """Query the tokens if ``period_s`` [s] have passed; the reply updates the list."""
         now = time.monotonic()
         with self._lock:
             if now - self._asked_at < (LOST_S if self._is_asking else period_s):
@@ -88,8 +88,8 @@ class TokenList:
     def _take(self, found: list[str], is_whole: bool) -> None:
         with self._lock:
             self._is_asking = False
-            # After an incomplete reply, further tokens may exist. The first reply counts even so: a
-            # frozen peer may never reply.
+            # After an incomplete reply, further tokens may exist: known ones are kept. An
+            # incomplete first reply counts, too, as a frozen peer may never reply.
             there = frozenset(found)
             if not is_whole and len(there | self._there) <= MOST_TOKENS:
                 there |= self._there
@@ -110,7 +110,7 @@ class Reply:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """A message that is published and kept for queries: Zenoh holds its payload once.
+    """A message that is published and kept for queries, without a copy for each.
 
     A path of half a million poses takes 40 MB; each put of bytes would copy it.
     """
@@ -121,7 +121,7 @@ class Shared:
 
     @classmethod
     def of(cls, payload: bytes, schema: str = "", attachment: bytes = b"") -> Shared:
-        """Return the message; this is the only copy of its payload."""
+        """Return the message; this copies its payload once."""
         return cls(zenoh.ZBytes(payload), schema, attachment)
 
 
@@ -131,9 +131,9 @@ class Request:
 
     Attributes:
         key: the key expression of the query; it may have wildcards.
-        parameters: those after ``?``, without Zenoh's own, which begin with ``_``.
-        payload: of the query, b"" for none.
-        attachment: of the query, b"" for none.
+        parameters: parameters after ``?``, without Zenoh's own, which begin with ``_``.
+        payload: payload of the query, or b"".
+        attachment: attachment of the query, or b"".
     """
 
     key: str
@@ -143,7 +143,7 @@ class Request:
 
 
 class Question:
-    """A query that waits for its reply; to be answered once, on any thread.
+    """A query that waits for its reply; it must be answered once, on any thread.
 
     Attributes:
         key: key of the queryable.
@@ -156,7 +156,7 @@ class Question:
         self._query = query
 
     def answer(self, reply: Reply, key: str = "") -> None:
-        """Reply on the queryable's key or another; the other side may be gone by now."""
+        """Reply on the queryable's key, or on ``key``; ignored if the other side is gone."""
         with contextlib.suppress(zenoh.ZError):
             send(self._query, key or self.key, reply)
         query: Any = self._query  # drop() has no annotation

@@ -4,8 +4,8 @@ Samples arrive as they are published, and as replies to queries. A reply may ove
 samples: it has a higher priority, and samples are delivered by another thread. So a reply that
 leaves a gap waits a moment for the missing samples.
 
-Each publisher is queried for its cache: at most once a second, never while its reply is pending,
-and at most MOST_PUBLISHERS of a key.
+The cache of each publisher is queried at most once a second, and not while a reply is pending. Up
+to MOST_PUBLISHERS of a key are queried.
 """
 
 from __future__ import annotations
@@ -20,14 +20,13 @@ import zenoh
 
 # Period of queries to a publisher for a lost last sample [s].
 ASK_PERIOD_S = 1.0
-# Limit on the publishers of a key that are queried; samples of the others are still received.
+# Largest number of publishers of a key that are queried; samples of the others are still received.
 MOST_PUBLISHERS = 16
 # Time that samples after a gap wait, counted from the last sample of their publisher [s].
 UNDER_WAY_S = 0.5
-# Limit on the publishers whose last sample is remembered.
+# Largest number of publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
-# Limit on the bytes of samples that wait for earlier ones: a publisher that does not reply must not
-# fill the memory.
+# Largest size of the samples that wait for earlier ones, in case a publisher does not reply.
 HELD_BYTES = 8_000_000
 _SEQUENCE_NUMBERS = 1 << 32
 
@@ -37,7 +36,7 @@ class AskedPublisher:
     """A publisher that exists.
 
     Attributes:
-        name: as in its liveliness token.
+        name: its name in its liveliness token.
         key: key of its cache.
         ask_at: time of the next query, by the monotonic clock [s].
         is_asked: whether a reply is pending.
@@ -55,7 +54,7 @@ class AskedPublishers:
     def __init__(self) -> None:
         self._publishers: dict[str, AskedPublisher] = {}
         self._open = 0
-        # Whether to query all, and whether also for samples that were received already.
+        # Whether to query all publishers, and whether also for samples received already.
         self._wants_all, self._wants_again = True, False
 
     def __contains__(self, name: str) -> bool:
@@ -71,11 +70,11 @@ class AskedPublishers:
 
     @property
     def is_asking(self) -> bool:
-        """Whether a query is pending, or all publishers are to be queried."""
+        """Whether a query is pending, or all publishers will be queried next."""
         return bool(self._open or self._wants_all)
 
     def ask_all(self) -> None:
-        """Query all at the next poll, also for samples that were received already."""
+        """Query all publishers at the next poll, also for samples received already."""
         self._wants_all = self._wants_again = True
 
     def ask_soon(self, name: str) -> None:
@@ -83,7 +82,7 @@ class AskedPublishers:
         self._publishers[name].ask_at = 0.0
 
     def take_all(self, now: float) -> tuple[bool, bool]:
-        """Return whether to query all now, and whether also for samples received already."""
+        """Return whether to query all publishers, and whether also for samples received already."""
         asks_all, again = self._wants_all, self._wants_again
         if asks_all:
             self._wants_all = self._wants_again = False
@@ -93,7 +92,7 @@ class AskedPublishers:
         return asks_all, again
 
     def take_due(self, now: float) -> list[AskedPublisher]:
-        """Return the publishers to query now, each with a query of its own."""
+        """Return the publishers to query now, each by its own query."""
         due = [one for one in self._publishers.values() if now >= one.ask_at and not one.is_asked]
         for publisher in due:
             publisher.ask_at, publisher.is_asked = now + ASK_PERIOD_S, True
@@ -101,7 +100,7 @@ class AskedPublishers:
         return due
 
     def end_query(self, publisher: AskedPublisher | None) -> None:
-        """Note that a query has ended; None: the query to all publishers."""
+        """Note that the query to a publisher, or to all (None), has ended."""
         self._open -= 1
         if publisher is not None:
             publisher.is_asked = False
@@ -113,7 +112,7 @@ class AskedPublishers:
         return min(waiting, default=float("inf"))
 
     def forget_others(self, names: Iterable[str]) -> list[str]:
-        """Forget all but these; return the names forgotten."""
+        """Forget all publishers but ``names``; return the names forgotten."""
         gone = [name for name in self._publishers if name not in names]
         for name in gone:
             del self._publishers[name]
@@ -123,11 +122,11 @@ class AskedPublishers:
         """Add new publishers while there is room; return their names.
 
         Args:
-            keys: by name, the key of its cache.
-            now: by the monotonic clock [s].
+            keys: for each name the key of its cache.
+            now: time by the monotonic clock [s].
         """
         came = [name for name in keys if name not in self._publishers]
-        # Earlier publishers reply to the first query, and are not queried twice.
+        # Publishers reply to a pending query to all, and are not queried again at once.
         waits_s = ASK_PERIOD_S if self.is_asking else 0.0
         for name in (added := came[: MOST_PUBLISHERS - len(self._publishers)]):
             self._publishers[name] = AskedPublisher(name, keys[name], now + waits_s)
@@ -138,10 +137,10 @@ class SampleOrder:
     """Puts the last ``depth`` samples of each publisher in order; the caller holds the lock.
 
     Args:
-        depth: how many samples of a publisher count.
+        depth: number of last samples of a publisher that count.
         publishers: the publishers that are queried.
         receive: called with each sample, in order.
-        wake: called when publishers are to be queried, or ``deliver_due`` is due earlier.
+        wake: called when a query, or ``deliver_due``, becomes due earlier.
     """
 
     def __init__(
@@ -155,36 +154,36 @@ class SampleOrder:
         self._receive, self._wake = receive, wake
         # For each publisher its mark: the sequence number or timestamp of its last sample.
         self._last_mark = OrderedDict[str, int]()
-        # When that was published, by the publisher's clock; 0 if unknown.
+        # When that sample was published, by the publisher's clock; 0 if unknown.
         self._stamps = OrderedDict[str, int]()
-        # The marks of publishers without a token. Used only to drop cached replies that were
-        # received already: a reset of the publisher's clock would go unnoticed.
+        # The marks of publishers without a token. They only serve to drop replies received already:
+        # without a token, a reset of the publisher's clock goes unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
-        # Samples that wait for earlier ones, which are under way or were queried.
+        # Samples that wait for earlier ones.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
-        # Until when samples after a gap wait [s, monotonic]; infinite without any.
+        # Until when samples after a gap wait [s, monotonic]; infinite without such samples.
         self._gap_until = math.inf
 
     def missing(self, name: str) -> str:
-        """Return the query for the samples after the last one of a publisher."""
+        """Return the query for the samples after a publisher's last one."""
         last = self._last_mark.get(name)
         if last is None or name.endswith("/uhlc"):
             return f"_max={self._depth}"
         return f"_sn={(last + 1) % _SEQUENCE_NUMBERS}.."
 
     def forget(self, name: str) -> None:
-        """Forget a publisher that is gone: it may return under the same name and count from 0."""
+        """Forget a publisher that is gone: under the same name it may return and count from 0."""
         self._last_mark.pop(name, None)
 
     def confirm(self, name: str) -> None:
-        """Note that a publisher has a token: marks of its earlier samples count from now on."""
+        """Note that a publisher has a token: the mark of its last sample counts from now on."""
         if name in self._unconfirmed:
             _remember(self._last_mark, name, self._unconfirmed.pop(name))
 
     @property
     def next_at(self) -> float:
-        """Time when ``deliver_due`` has something to do [s, monotonic]."""
+        """Time when ``deliver_due`` is due [s, monotonic]."""
         return self._gap_until
 
     def deliver_due(self, now: float) -> None:
@@ -198,15 +197,14 @@ class SampleOrder:
         waits = self._depth > 1 and self._publishers.is_asking
         is_listed = sample.source_info or name in self._last_mark or name in self._publishers
         if not name or not (is_listed or waits):
-            # The publisher has no cache, or is not yet found.
+            # The publisher has no cache, or has not been found yet.
             if name:
                 _remember(self._unconfirmed, name, mark)
             self._receive(sample)
             return
         last = self._last_mark.get(name)
         if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
-            # The publisher was restarted under the same name: samples that a reply has overtaken
-            # are older.
+            # Number 0 and a newer stamp: the publisher was restarted under the same name.
             del self._last_mark[name]
             last = None
         is_gap = name in self._publishers and _leaves_gap(name, mark, last)
@@ -214,12 +212,12 @@ class SampleOrder:
             self._hold(name, mark, sample)
         elif _is_newer(mark, last):
             self._deliver(name, mark, sample)
-            # A missing sample of this publisher has come: others may be under way, too.
+            # A missing sample has arrived: more of them may follow.
             if self._gap_until < math.inf and any(one[0] == name for one in self._held):
                 self._gap_until = time.monotonic() + UNDER_WAY_S
 
     def take_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
-        """Take a reply; with ``again`` the last sample counts though it was received already."""
+        """Take a reply; with ``again``, deliver the last sample even if it was received already."""
         name, mark = _origin(sample)
         last = self._last_mark.get(name, self._unconfirmed.get(name))
         if self._depth > 1 or (not again and _leaves_gap(name, mark, last)):
@@ -228,10 +226,9 @@ class SampleOrder:
             self._deliver(name, mark, sample)
 
     def deliver_held(self, *, over_gaps: bool = False) -> None:
-        """Deliver waiting samples, as when all replies have come.
+        """Deliver waiting samples, once all replies have arrived.
 
-        Those after a gap wait on, as the missing ones may be under way, until these have come, or
-        their time is over (``over_gaps``).
+        Samples after a gap go on waiting for the missing ones, except with ``over_gaps``.
         """
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
@@ -270,7 +267,7 @@ class SampleOrder:
 
 
 def _remember(marks: OrderedDict[str, int], name: str, mark: int) -> None:
-    """Note the last mark of a publisher; the oldest notes are dropped."""
+    """Note the last mark of a publisher; drop the oldest if there are too many."""
     marks[name] = mark
     marks.move_to_end(name)
     if len(marks) > MOST_REMEMBERED:

@@ -1,7 +1,7 @@
 """Session on the Zenoh bus: publishers, subscribers, queryables, queries.
 
-Latched topics have advanced publishers with a cache of one sample, so that a late joiner has the
-newest path at once (ROS calls this transient local). Callbacks run on Zenoh's threads and only
+Latched topics have advanced publishers with a cache of one sample, so that a late joiner gets the
+newest path at once (ROS calls this transient local). Callbacks run on Zenoh's threads, and only
 pass the sample on.
 """
 
@@ -37,8 +37,7 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
 from fasaco_edge.wire.topics import IN_ORDER
 
-# Timeout for closing a session [s]: if a peer no longer reads, Zenoh tries for ten seconds to flush
-# its queue, and then fails.
+# Timeout for closing a session [s]: if a peer no longer reads, Zenoh would wait ten seconds.
 CLOSE_S = 1.2
 
 
@@ -63,8 +62,8 @@ class Bus:
         self._listens = listens
         self._declared: list[Any] = []
         self._served: list[_Served] = []
-        # Zenoh objects that callers hold as well; ``close`` releases them. One that is left to the
-        # interpreter's last garbage collection may deadlock with Zenoh's threads.
+        # Zenoh objects that callers hold, too. ``close`` releases them: the interpreter's last
+        # garbage collection may deadlock with Zenoh's threads.
         self._lent: list[Publisher | Subscription] = []
         self._asker = Asker()
 
@@ -80,7 +79,7 @@ class Bus:
         return str(self._session.zid())
 
     def met(self) -> list[str]:
-        """Return the sessions that this one is connected to, like "a router" or "3 peers"."""
+        """Return the sessions that this session is connected to, like "a router" or "3 peers"."""
         info = self._session.info
         met = (("router", info.routers_zid()), ("peer", info.peers_zid()))
         counts = [(kind, len(ids)) for kind, ids in met if ids]
@@ -112,13 +111,12 @@ class Bus:
     ) -> Subscription:
         """Call ``callback`` with each sample on ``key``, on a Zenoh thread.
 
-        A latched subscription first receives the newest sample of each latched publisher, or the
-        newest ``history`` samples, also of publishers that appear later.
+        A latched subscription first receives the newest ``history`` samples of each latched
+        publisher, also of publishers that appear later.
 
         By default each subscription has a thread of its own: samples of two subscriptions may be
-        reordered. Subscriptions with ``in_order`` receive samples in the order of sending, across
-        all of them, on the thread that reads the link; the callback must not call Zenoh, and must
-        return soon.
+        reordered. Subscriptions with ``in_order`` together receive samples in the order of sending,
+        on the thread that reads the link; the callback must not call Zenoh, and must return soon.
         """
 
         def receive(sample: zenoh.Sample) -> None:
@@ -136,7 +134,7 @@ class Bus:
         return subscription
 
     def unsubscribe(self, subscription: Subscription) -> None:
-        """End a subscription; samples under way may still arrive."""
+        """End a subscription; samples already sent may still arrive."""
         self._asker.remove(subscription)
         self._lent.remove(subscription)
         subscription.end()
@@ -145,9 +143,9 @@ class Bus:
     def serve(
         self, key: str, answer: Callable[[Request], Reply | Shared | None], complete: bool = True
     ) -> None:
-        """Reply to queries on ``key``, on a Zenoh thread; None leaves a query to other queryables.
+        """Reply to queries on ``key``, on a Zenoh thread; for None, only other queryables reply.
 
-        ``complete``: no other queryable has to be queried.
+        ``complete``: whether this queryable alone can reply to a query.
         """
 
         def receive(query: zenoh.Query) -> None:
@@ -160,10 +158,10 @@ class Bus:
     def take_questions(
         self, key: str, receive: Callable[[Question], None], most_bytes: int, too_long: Reply
     ) -> None:
-        """Call ``receive`` with each query on ``key``, on a Zenoh thread; to be answered later.
+        """Call ``receive`` with each query on ``key``, on a Zenoh thread, to be answered later.
 
-        A query of more than ``most_bytes`` gets ``too_long`` as its reply at once, because a query
-        is held in memory until its reply.
+        A query larger than ``most_bytes`` gets the reply ``too_long`` at once, as queries stay in
+        memory until they are answered.
         """
 
         def take(query: zenoh.Query) -> None:
@@ -179,7 +177,7 @@ class Bus:
         self._served.append(_Served(key, receive, complete, declared))
 
     def let_others_answer(self, yes: bool) -> None:
-        """If ``yes``, reply only to queries that go to all queryables; otherwise to any."""
+        """Set whether other queryables come first: then this one only gets queries to all."""
         for served in self._served:
             if served.complete:
                 served.declared.undeclare()
@@ -190,7 +188,7 @@ class Bus:
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
         """Query ``selector`` (a key, parameters after ``?``), with JSON or b"" as its payload.
 
-        Returns all replies that come within ``timeout_s`` [s].
+        Returns all replies that arrive within ``timeout_s`` [s].
         """
         encoding = JSON if payload else None
         replies = self._session.get(
@@ -209,8 +207,8 @@ class Bus:
     ) -> None:
         """Query all queryables on ``key``, as clients of ROS 2 services do.
 
-        ``end`` is called with the replies, on a Zenoh thread: when all have come, or there is no
-        queryable, or after ``timeout_s`` (an error is among them then).
+        ``end`` is called with the replies, on a Zenoh thread, when all have arrived, or there is no
+        queryable, or after ``timeout_s`` [s]; in the last case an error is among them.
         """
         replies = list[Reply]()
         answered: Any = zenoh.handlers.Callback
@@ -250,22 +248,23 @@ class Bus:
         """Return whether another session, by its id, is connected to this one directly."""
         return any(session == str(each.zid) for each in self._session.info.transports())
 
-    def only_passes_on(self, session: str) -> bool:
-        """Return whether an id is this session's or that of a router it is connected to.
+    def is_relay(self, session: str) -> bool:
+        """Return whether an id is of this session, or of a router that it is connected to.
 
         Both put their ids on samples without a timestamp, whose publisher is unknown.
         """
         return session == self.id or session in map(str, self._session.info.routers_zid())
 
     def is_in_touch(self) -> bool:
-        """Return whether samples can arrive: a session is connected, or could be at any time."""
+        """Return whether samples can arrive: a session is connected, or may connect at any time."""
         info = self._session.info
         return self._listens or bool(info.routers_zid() or info.peers_zid())
 
     def keep_in_touch(self, now: float) -> bool:
-        """Return whether samples can arrive; replace the listener that was joined if that is gone.
+        """Return whether samples can arrive; take over the port of the joined process if it ended.
 
-        To be polled; ``now`` is monotonic [s]."""
+        To be polled; ``now`` is monotonic [s].
+        """
         in_touch = self.is_in_touch()
         if self._stand_in is not None:
             self._stand_in.poll(now, is_alone=not in_touch)
@@ -277,8 +276,8 @@ class Bus:
         return [str(reply.ok.key_expr) for reply in replies if reply.ok]
 
     def watch_tokens(self, key: str, callback: Callable[[str, bool], None]) -> None:
-        """Call ``callback`` with the key of each liveliness token that matches ``key``, on a
-        Zenoh thread: True when it appears or is there already, False when it is gone."""
+        """Call ``callback`` on a Zenoh thread, with the key of each liveliness token that matches
+        ``key``, and whether it exists: True also for earlier tokens, False when it disappears."""
 
         def receive(sample: zenoh.Sample) -> None:
             callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
@@ -319,7 +318,7 @@ def open_bus(settings: BusSettings) -> Bus:
     try:
         return Bus(zenoh.open(session_config(settings)), bool(settings.listen))
     except zenoh.ZError as error:
-        # A secured session connects only to what is configured.
+        # A secured session connects only to endpoints configured in ``connect``.
         taken = settings.listen and "Address already in use" in str(error)
         if not taken or settings.secured:
             raise BusUnavailable(first_line(error)) from error

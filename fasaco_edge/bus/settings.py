@@ -1,11 +1,11 @@
 """Settings of a session on the Zenoh bus, and the Zenoh configuration made from them.
 
-The same for every process, with reasons:
+The same for every process:
 
-* no multicast scouting and no shared memory: only what is configured can be reached, and the idle
-  session stays small;
+* no multicast scouting and no shared memory: a session reaches only configured endpoints, and an
+  idle session stays small;
 * each topic has its QoS, see ``wire.topics``: samples that a planner publishes are dropped on
-  congestion, so that a frozen subscriber never blocks it.
+  congestion, so that a frozen subscriber never blocks the planner.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 if TYPE_CHECKING:
     import zenoh
 
-# Timeout of the handshake of an incoming connection [ms], and how many may be pending.
+# Timeout of the handshake of an incoming connection [ms], and largest number of pending ones.
 ACCEPT_TIMEOUT_MS, ACCEPT_PENDING = 3000, 1000
-# A map or a path is many packets of 64 kB. By default two packets fill the queue: a computer that
-# is busy for 50 ms drops the map, and the last of several cohorts sent at once. These queues take a
-# megabyte, only while needed.
+# Length of the queues [packets of 64 kB]. A map or a path has many packets, and Zenoh's default of
+# two loses it if the computer is busy for 50 ms. These queues take a megabyte, only while needed.
 QUEUED_BATCHES = dict.fromkeys(
     ("interactive_high", "data_high", "data", "data_low", "background"), 16
 )
@@ -34,13 +33,13 @@ QUEUED_BATCHES = dict.fromkeys(
 
 @dataclass(frozen=True, slots=True)
 class BusSettings:
-    """How to join the bus.
+    """Settings of a session.
 
     Attributes:
         mode: "peer", "client" or "router".
         connect: endpoints to connect to.
-        listen: endpoints to listen on. Where another process listens there
-            already, the session joins that one instead, unless it is secured.
+        listen: endpoints to listen on. If another process listens there already, the session
+            connects to it instead, unless the session is secured.
         secured: authentication and access rules, a part of Zenoh's configuration, see
             ``bus.access``. It may hold a password, and is never shown.
     """
@@ -67,7 +66,7 @@ def check_settings(settings: BusSettings) -> None:
 
 
 def session_config(settings: BusSettings) -> zenoh.Config:
-    """Return Zenoh's configuration of a session: the common part, and its security.
+    """Return Zenoh's configuration of a session: the common part, and ``secured``.
 
     Raises:
         zenoh.ZError: it has unknown keys or impossible values.
@@ -90,8 +89,8 @@ def session_config(settings: BusSettings) -> zenoh.Config:
         "timestamping": {"enabled": True},
         "transport": {
             "shared_memory": {"enabled": False},
-            # Connections without a handshake must not block others: by default a hundred of them
-            # do, for twelve seconds.
+            # With Zenoh's defaults, a hundred connections without a handshake block all others for
+            # twelve seconds.
             "unicast": {"accept_timeout": ACCEPT_TIMEOUT_MS, "accept_pending": ACCEPT_PENDING},
             "link": {
                 "rx": {"max_message_size": MAX_MESSAGE_BYTES},

@@ -1,4 +1,4 @@
-"""A listener that takes the place of a process whose port this session found taken."""
+"""Stand-in for a listener: this process takes over the port of a process that has ended."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ import zenoh
 
 LOG = logging.getLogger(__name__)
 
-# A port without a listener for this long [s] is taken over: a process that only restarts gets its
-# port back. Retry period if another process has taken it over first [s].
+# Time without a listener after which the port is taken over: a process that only restarts keeps it
+# [s]. Retry period if another process has taken the port over first [s].
 ABSENT_S, RETRY_S = 2.0, 1.0
 
 
 class StandIn:
-    """Listener that replaces a process that this session had joined and that is gone.
+    """Listener on the port of a process that this session was connected to.
 
-    A session that finds its port taken connects as a client to the process that holds it. Once that
-    process is gone, no other session could reach this one: so it listens there itself, with a
-    second session that the first one finds.
+    A session that finds its port taken connects as a client to the process that listens there. Once
+    that process has ended, other sessions could no longer reach this one. So this process opens a
+    second session that listens there; the first one reconnects to it.
 
     Args:
-        config: of a session that listens there.
+        config: configuration of a session that listens on the port.
     """
 
     def __init__(self, config: zenoh.Config) -> None:

@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     from fasaco_edge.serve.served_view import ServedView
 
     here = robot_on_bus(args)
-    with Feed(here.bus, here.keys, hears_fleet=True) as feed:
+    with Feed(here.bus, here.keys, with_fleet=True) as feed:
         server = LiveServer(feed, ServedView(here.keys), guard)
         return _serve(server, args, address, guard)
 

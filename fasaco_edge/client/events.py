@@ -1,4 +1,4 @@
-"""The event log of a robot in words: entries, and changes of a status."""
+"""Event log of a robot in words: entries, and changes of a status."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class EventLog:
         self.count = 0
 
     def add(self, at_s: float, text: str, tone: str = PLAIN) -> None:
-        """Note what happened at ``at_s``, since the epoch [s]."""
+        """Add an event at ``at_s``, time since the epoch [s]."""
         self.entries.append(Event(at_s, one_line(plain(text)), tone))
         self.count += 1
 
@@ -68,7 +68,7 @@ def differences(before: Status | None, after: Status) -> list[tuple[str, str]]:
 
 
 def _troubles(before: Status | None, after: Status) -> Iterator[tuple[str, str]]:
-    """Yield the troubles that began and ended; a degraded mission's own trouble is its reason."""
+    """Yield the troubles that began and ended, except a trouble that is the mission's reason."""
     known, present = (
         {each.code: each.text for each in (status.troubles if status else ())[: len(TROUBLES)]}
         for status in (before, after)

@@ -1,4 +1,4 @@
-"""The feed of samples of one robot from the bus, joined as soon as possible."""
+"""Feed of the samples of one robot from the bus, which it joins as soon as possible."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fasaco_edge.wire.topic_types import NEWEST, Topic
 from fasaco_edge.wire.topics import FLEET, FLOOR, PHEROMONE, TOPICS, UNSWEPT
 
 RETRY_S = 0.5
-# Timeout at the end for a host that does not answer.
+# Longest wait at the end for a host that does not answer [s].
 END_S = 0.5
 
 
@@ -47,7 +47,7 @@ class Joining(ABC):
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
-        # An interpreter that ends while a thread returns from Zenoh aborts.
+        # The interpreter would abort if it ended while a thread returns from Zenoh.
         self._joining.join(END_S)
         with self._lock:
             if self._bus is not None:
@@ -55,7 +55,7 @@ class Joining(ABC):
 
     @abstractmethod
     def _listen(self, bus: Bus) -> None:
-        """Declare the subscriptions; on the thread that joined, with the lock held."""
+        """Declare the subscriptions; called on the joining thread, with the lock held."""
 
     def _join(self) -> None:
         while not self._ended.is_set():
@@ -76,7 +76,7 @@ class Joining(ABC):
 
 
 WATCHED = [topic for topic in TOPICS if topic.queues.watch is not None]
-# The daemon makes these only while a subscriber exists: they are requested.
+# Topics that the daemon publishes only while a subscriber exists.
 ON_REQUEST = (PHEROMONE, FLOOR, UNSWEPT)
 SUBSCRIBED = [topic for topic in WATCHED if topic not in ON_REQUEST]
 # Queue length of messages of a fleet's other robots.
@@ -95,7 +95,7 @@ def _size_of(item: object) -> int:
 class Feed(Joining):
     """The samples of one robot, and the names of all robots; a context manager.
 
-    ``hears_fleet``: also the fleet messages of all robots.
+    ``with_fleet``: also the fleet messages of all robots.
     """
 
     def __init__(
@@ -103,12 +103,12 @@ class Feed(Joining):
         settings: BusSettings,
         keys: Keys,
         *,
-        hears_fleet: bool = False,
+        with_fleet: bool = False,
     ) -> None:
         super().__init__(settings)
         self._keys = keys
         self._mailbox: Mailbox[object] = Mailbox(QUEUED, size_of=_size_of)
-        self._hears_fleet = hears_fleet
+        self._with_fleet = with_fleet
         self._wanted: set[Topic] = set()
         self._requested: dict[Topic, Subscription] = {}
 
@@ -129,7 +129,7 @@ class Feed(Joining):
         Args:
             query: name of the query, parameters after ``?``.
             payload: its JSON payload.
-            timeout_s: how long to wait for a reply [s].
+            timeout_s: timeout of the replies [s].
 
         Raises:
             BusUnavailable: the bus is not joined yet.
@@ -152,7 +152,7 @@ class Feed(Joining):
         bus.watch_tokens(f"{prefix}/*/alive", self._note_token)
         for topic in SUBSCRIBED:
             self._subscribe(bus, topic)
-        if self._hears_fleet:
+        if self._with_fleet:
             bus.subscribe(self._keys.of_all(FLEET), partial(self._post, FLEET.name))
         self._request(bus)
 

@@ -1,10 +1,10 @@
-"""The wording of states, shares and times in a terminal."""
+"""Wording of states, shares and times in a terminal."""
 
 from __future__ import annotations
 
 import time
 
-from fasaco_edge.text import one_line
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.wire.documents.replies import (
     TROUBLES,
     CoverageReport,
@@ -17,9 +17,9 @@ from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import DriveReport, Status
 from fasaco_edge.wire.reasons import possible
 
-# Offset of the wall clock from the monotonic one, when this module was imported [s].
+# Offset of the wall clock from the monotonic clock when this module was imported [s].
 _OFFSET_S = time.time() - time.monotonic()
-# A longer time is none that a robot needs [s].
+# A time to go above this is an error, and is not shown [s].
 LONGEST_S = 1e7
 
 
@@ -37,12 +37,6 @@ def swept(floor: FloorReport) -> str:
     if (possible_m2 := floor.possible_m2) is None:
         return share
     return share + possible(f"{possible_m2:.1f} m2")
-
-
-def percent(fraction: float) -> str:
-    """Return a share; never 100.0 % before all is done."""
-    shown = min(100 * fraction, 99.9) if fraction < 1.0 else 100.0
-    return f"{shown:.1f} %"
 
 
 def stage(mission: MissionReport) -> str:
@@ -64,11 +58,11 @@ def zone_progress(zone: ZoneReport) -> tuple[str, str]:
 
 
 def time_to_go(status: Status) -> str:
-    """Return how long the rest of the path takes by the clock; "" where that is not known."""
+    """Return the time that the rest of the path takes by the clock; "" if not known."""
     path = status.path
     if path is None or path.line_s is None or not path.remaining_steps:
         return ""
-    # A simulated robot may be faster than the clock.
+    # A simulation may be faster than real time.
     scale = known_settings(status.config).robot.time_scale
     return age(path.line_s / scale) if scale > path.line_s / LONGEST_S else ""
 
@@ -115,7 +109,7 @@ def steady_now() -> float:
 
 
 def clock(at_s: float) -> str:
-    """Return a monotonic time as text, by the present setting of the wall clock."""
+    """Return a time of ``steady_now`` as text, by the present setting of the wall clock."""
     wall_s = time.time() - (steady_now() - at_s)
     return time.strftime("%H:%M:%S", time.localtime(round(wall_s, 3)))
 

@@ -1,4 +1,4 @@
-"""The state of a robot by its newest pose, status and commands, and the latest events.
+"""State of a robot by its newest pose, status and commands, and the latest events.
 
 Without numpy, for small programs.
 """
@@ -29,18 +29,18 @@ if TYPE_CHECKING:
 
     Points = Sequence[tuple[float, float]] | NDArray[np.float64]
 
-# The daemon publishes a status once a second.
+# Time without a status, which comes once a second, after which the daemon is silent [s].
 SILENCE_S = 3.5
-# A map is complete once it has not grown for this long [s], and for this share of the time in which
-# it grew: while a robot sweeps what it has found, minutes pass without anything new.
+# A map is complete once it has not grown for this time [s], and for this share of the time in which
+# it grew: a robot that sweeps explored floor finds nothing new for minutes.
 COMPLETE_S, COMPLETE_SHARE = 180.0, 0.5
-# If no pose has come on its own key for this long [s], the poses in the status are shown.
+# Time without a pose on its own key after which the poses in the status are used [s].
 POSE_LASTS_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Token:
-    """A robot's daemon that has appeared (``here``) or gone."""
+    """News that a robot's daemon has appeared (``here``) or disappeared."""
 
     robot: str
     here: bool
@@ -50,15 +50,15 @@ class RobotState:
     """The newest pose and status of one robot, and the latest events.
 
     Attributes:
-        pose: where the robot is; None before the first pose.
-        status: the newest one; None before the first.
-        document: its bytes, b"" before the first.
-        settings: of the daemon, from the status.
-        rooms: the newest ones; none before the first, and of a daemon that finds none.
+        pose: pose of the robot; None before the first.
+        status: newest status; None before the first.
+        document: bytes of the newest status; b"" before the first.
+        settings: settings of the daemon, from the status.
+        rooms: newest rooms; empty before the first.
         walk: the path, and the robot's progress on it.
         robots: names of all robots on the bus with a daemon.
         trouble: why the bus cannot be reached; "" if it can.
-        gone_since: when the daemon disappeared, since the epoch [s]; None while it is present,
+        gone_since: time since the epoch when the daemon disappeared [s]; None while it is present,
             and before it first appeared.
     """
 
@@ -90,7 +90,7 @@ class RobotState:
         return self.robot in self.robots
 
     def grows(self, now: float) -> bool:
-        """Whether more floor may come into reach: the rest of the work is not known then."""
+        """Return whether more floor may become reachable, so that the work left is not known."""
         least_s = COMPLETE_S / max(self.settings.robot.time_scale, 1.0)
         quiet_s = max(least_s, COMPLETE_SHARE * (self._grew_at - self._began_at))
         return now - self._grew_at < quiet_s
@@ -101,7 +101,7 @@ class RobotState:
         return silent if self.status is not None and silent > SILENCE_S else 0.0
 
     def take(self, topic: str, item: object, now: float) -> None:
-        """Take in a sample of ``topic`` or a Token that arrived ``now``, since the epoch [s].
+        """Take in a sample of ``topic``, or a Token; ``now`` is time since the epoch [s].
 
         An unreadable sample is dropped and noted.
         """
@@ -116,7 +116,7 @@ class RobotState:
     def note_unreadable(self, topic: str, error: FasacoError, now: float) -> None:
         """Note that a sample of ``topic`` could not be read."""
         self._malformed += 1
-        # A faulty publisher may send only malformed ones.
+        # A faulty publisher may send many malformed samples.
         if is_reported(self._malformed):
             text = f"{topic} cannot be read ({self._malformed} so far): {error}"
             self.events.add(now, text, BAD)
@@ -129,7 +129,7 @@ class RobotState:
             self.events.add(now, "the daemon is gone; waiting for it to return", BAD)
         elif self.is_here and not was_here:
             back = self.gone_since is not None
-            # The daemon has not had the time to publish a status.
+            # The daemon has not had time to publish a status.
             self.gone_since, self._reported_at = None, now
             self.events.add(now, f"the daemon is {'back' if back else 'there'}", GOOD)
 
@@ -144,7 +144,7 @@ class RobotState:
         if not status.state:
             raise MalformedMessage("status: it has no state", hint=OF_JSON)
         if status.claim.stand != "plans":
-            # The sender may be a second daemon of this name, whose state is not the robot's.
+            # The sender is a second daemon of this name, whose state is not the robot's.
             if status.claim.stand != "looks":
                 self.events.add(now, f"a second daemon is {status.state}: {status.reason}", BAD)
             return
@@ -155,9 +155,9 @@ class RobotState:
         self._watch_growth(status, now)
         self.status, self.document, self._reported_at = status, sample.payload, now
         if status.path is None:
-            # A restarted daemon has none of the old paths.
+            # A restarted daemon has no path yet.
             self.walk = PathProgress()
-        # The steps of a line that is not driven from cell to cell are not those of its points.
+        # The number of steps left gives the progress only if the path's points are its cells.
         elif (status.path.revision, status.path.steps) == (
             self.walk.revision,
             len(self.walk.xy) - 1,
@@ -168,7 +168,7 @@ class RobotState:
             self._move(Pose2D(pose.x, pose.y, pose.yaw))
 
     def _watch_growth(self, status: Status, now: float) -> None:
-        """Note when there was more floor in reach than before, for the same order."""
+        """Note when the reachable floor has grown, for the same order."""
         before = self.status
         if before is None or before.coverage is None or _order_of(before) != _order_of(status):
             self._began_at = now
@@ -182,7 +182,7 @@ class RobotState:
         self._follow(decode_json(sample.payload), now)
 
     def _follow(self, document: dict[str, object], now: float) -> None:
-        """Note a command that the mission has taken."""
+        """Note a command that the mission has accepted."""
         order = document.get("order")
         names = [str(zone["name"]) for zone in _zones(order)]
         about = f" with {', '.join(names)}" if names else ""
@@ -199,7 +199,7 @@ class RobotState:
 
 
 def _order_of(status: Status) -> tuple[object, ...]:
-    """Return what distinguishes orders."""
+    """Return values that distinguish orders."""
     return status.mission.ordered, *(zone.name for zone in status.mission.zones)
 
 
@@ -209,10 +209,11 @@ def _zones(order: object) -> list[dict[str, object]]:
     return [zone for zone in found if isinstance(zone, dict) and "name" in zone]
 
 
-# Poses are frequent: further ahead on its way, a path may pass the position again [m].
+# Largest progress along the path from one pose to the next [m], as the path may pass the same place
+# again farther ahead.
 LOOK_AHEAD_M = 2.5
-# A robot farther than this from its path is not on it; of places equally near to within the second
-# value, the first one on the path counts [m].
+# Largest distance of a robot that is on its path; largest difference of distances that count as
+# equal, so that the first place on the path is used [m].
 NEAR_M, EQUAL_M = 0.5, 0.02
 
 
@@ -223,7 +224,7 @@ class PathProgress:
         xy: points (x, y) [m]; an array, float64 (n, 2), or a list.
         revision: number of the path.
         at: index of the last point reached.
-        beyond_m: how far the robot is beyond that point, along the path [m].
+        beyond_m: distance of the robot beyond that point, along the path [m].
     """
 
     def __init__(self, xy: Points = (), revision: int = 0) -> None:
@@ -233,13 +234,13 @@ class PathProgress:
         self.beyond_m = 0.0
 
     def left(self, steps: int) -> None:
-        """Note the daemon's number of remaining steps, each from point to point."""
+        """Note the number of remaining steps, each from one point to the next."""
         at = len(self.xy) - 1 - max(steps, 0)
         if at > self.at:
             self.at, self.beyond_m = at, 0.0
 
     def join(self, pose: Pose2D) -> None:
-        """Note the robot's position on a path of which it may have driven a part before."""
+        """Note the robot's position on a path of which it may have driven a part already."""
         if not self._find(pose, LOOK_AHEAD_M):
             self._find(pose, math.inf)
 
@@ -248,7 +249,7 @@ class PathProgress:
         self._find(pose, LOOK_AHEAD_M)
 
     def _find(self, pose: Pose2D, ahead_m: float) -> bool:
-        """Move on to the place nearest to a pose, up to a distance ahead; return whether it is."""
+        """Advance to the nearest place up to ``ahead_m`` ahead [m]; return whether there is one."""
         nearest_m, place, begin_m = NEAR_M, None, -self.beyond_m
         for index in range(self.at, len(self.xy) - 1):
             if begin_m > ahead_m:

@@ -1,1 +1,1 @@
-"""Checks of a computer, its bus and a configuration: ``fasaco-edge doctor``."""
+"""Checks of a computer, its bus and a configuration, for ``fasaco-edge doctor``."""

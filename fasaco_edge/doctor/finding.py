@@ -22,10 +22,10 @@ PROPERTIES = (
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """The unit as systemd has loaded it, drop-ins included.
+    """The unit as systemd has loaded it, with drop-ins.
 
     Attributes:
-        properties: of ``systemctl show``.
+        properties: properties that ``systemctl show`` prints.
     """
 
     properties: Mapping[str, str]
@@ -37,7 +37,7 @@ class Unit:
 
     @property
     def environ(self) -> dict[str, str]:
-        """The daemon's environment, as far as checks need it."""
+        """The part of the daemon's environment that checks need."""
         words = shlex.split(self.properties.get("Environment", ""))
         environ = dict(word.partition("=")[::2] for word in words)
         if state := self.properties.get("StateDirectory", "").split():
@@ -45,7 +45,7 @@ class Unit:
         return environ
 
     def run_as(self, command: str) -> str:
-        """Return how to run a command as the daemon's user, with its folders."""
+        """Return the command line that runs a command as the daemon's user, with its folders."""
         dynamic = self.properties.get("DynamicUser") == "yes"
         user = self.properties.get("User") or (NAME.partition(".")[0] if dynamic else "")
         given = {
@@ -57,13 +57,13 @@ class Unit:
         return " ".join(["systemd-run --wait", *words, command])
 
     def limit(self, name: str) -> int | None:
-        """Return a limit [bytes]; None for none."""
+        """Return a limit [bytes]; None if it is not set."""
         value = self.properties.get(name, "infinity")
         return int(value) if value.isdecimal() else None
 
 
 def find_unit(root: Path = Path("/")) -> Unit | None:
-    """Query systemd; None if it does not run here, has no such unit, or does not answer."""
+    """Return the unit; None if systemd does not run here, has no such unit, or does not answer."""
     if not (root / "run/systemd/system").is_dir():
         return None
     command = ["systemctl", "show", NAME, f"--property={','.join(PROPERTIES)}"]
@@ -92,7 +92,7 @@ class Finding:
     Attributes:
         level: its severity.
         found: the finding in words.
-        to_do: what to do about it; "" for nothing.
+        to_do: what to do about it, or "".
         details: more lines, shown on request.
     """
 
@@ -108,9 +108,9 @@ class CheckContext:
 
     Attributes:
         config: the daemon's configuration.
-        file: where that was read; None for the defaults.
-        unit: the daemon's unit, as systemd has it; None where there is none.
-        recordings: folder for recordings; None if none was given.
+        file: file of the configuration; None for the defaults.
+        unit: the daemon's systemd unit; None if there is none.
+        recordings: folder for recordings, if one is given.
         root: root of the computer's file system.
     """
 
@@ -122,17 +122,17 @@ class CheckContext:
 
     @property
     def environ(self) -> Mapping[str, str]:
-        """The environment the daemon would find: its unit's, else ours."""
+        """The environment of the daemon: its unit's, or else that of this process."""
         return self.unit.environ if self.unit else os.environ
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A question about a daemon and its computer.
+    """A check of a daemon and its computer.
 
     Attributes:
-        name: one or two words.
-        look: runs the check; it changes nothing.
+        name: its name, one or two words.
+        look: runs the check, which changes nothing.
         of_machine: whether it also runs without a configuration.
     """
 
@@ -147,7 +147,7 @@ def ok(found: str, details: Iterable[str] = ()) -> Finding:
 
 
 def warn(found: str, to_do: str, details: Iterable[str] = ()) -> Finding:
-    """Return a finding that deserves attention: it works."""
+    """Return a finding that deserves attention, although the daemon works."""
     return Finding(Level.WARN, found, to_do, tuple(details))
 
 

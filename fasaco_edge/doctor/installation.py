@@ -16,7 +16,7 @@ from fasaco_edge.kernels.folder import outdated, wanted_folder
 from fasaco_edge.kernels.manifest import why_missing
 from fasaco_edge.planners.stages import STAGES
 
-# The ledger takes a few hundred kilobytes, the kernels fifty megabytes.
+# Least free space [MB]: the ledger takes a few hundred kilobytes, the kernels fifty megabytes.
 LEAST_MB = {"state": 20.0, "kernel cache": 100.0}
 
 
@@ -97,7 +97,7 @@ def _state_faults(context: CheckContext) -> list[Finding]:
     except FileNotFoundError:
         return []  # the daemon makes it
     except OSError as error:
-        # The folder of a service with its own user, inside a folder that only root can read.
+        # The folder of a service with its own user may be inside a folder that only root can read.
         return [ok(f"{folder}: {error.strerror}")] if context.unit else []
     if status.st_mode & stat.S_IWOTH:
         found = f"{folder}: all users of this computer may change what counts as covered"
@@ -142,7 +142,7 @@ def _distrusted(why: str, details: Sequence[str] = ()) -> Finding:
 
 
 def _warmup(context: CheckContext) -> str:
-    """Return the command that compiles the kernels into that folder, as the daemon's user."""
+    """Return the command that compiles the kernels into the daemon's folder, as its user."""
     if context.unit is None:
         return "fasaco-edge warmup"
     given = context.environ.get("NUMBA_CACHE_DIR")
@@ -151,7 +151,7 @@ def _warmup(context: CheckContext) -> str:
 
 
 def _user(context: CheckContext) -> int | None:
-    """Return the daemon's user; None where systemd will choose one."""
+    """Return the daemon's user; None if systemd will choose one at the start."""
     if context.unit is None:
         return os.geteuid()
     pid = context.unit.pid

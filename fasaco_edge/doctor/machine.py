@@ -13,21 +13,21 @@ from pathlib import Path
 from fasaco_edge.daemon.memory import afforded, has_default_sizes, limits_mib
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 
-# adjtimex(2): struct timex, and the positions of members in it.
+# Size of struct timex of adjtimex(2), and positions of its members [bytes].
 TIMEX_BYTES, MAXERROR_AT, STATUS_AT = 208, 24, 40
 STA_UNSYNC = 0x40
 TIME_ERROR = 5
-# Memory above that of a daemon with a plan of a large building.
+# Memory that a daemon needs at most to plan a large building [MB].
 WANTED_MB = 350
-# The doctor mentions a limit below the pixels of a map of 100 m x 100 m at 5 cm.
+# A limit below this number of pixels is a warning: a map of 100 m x 100 m at 5 cm.
 WANTED_PIXELS = 4_000_000
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
 
 def system(context: CheckContext) -> Finding:
-    """Name computer, system and Python; planning needs a core."""
+    """Name computer, system and Python; warn if planning has no core of its own."""
     cores = len(os.sched_getaffinity(0))
-    # A board has a name; of a PC the processor has one.
+    # A board has a name; a PC is named after its processor.
     board = _read(context.root / "proc/device-tree/model").rstrip("\0\n")
     model = board or _field(context.root / "proc/cpuinfo", r"model name\s*: ")
     found = f"{model or platform.machine()}, {cores} cores; Python {platform.python_version()}"
@@ -40,7 +40,7 @@ def system(context: CheckContext) -> Finding:
 
 
 def clock(context: CheckContext) -> Finding:
-    """Check the clock, on which recordings, certificates and stamps depend."""
+    """Check the clock: recordings, certificates and stamps depend on it."""
     written = (Path(__file__)).stat().st_mtime
     now = time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime())
     wait = "timedatectl set-ntp true, or wait for the network"
@@ -71,13 +71,13 @@ def kernel_clock() -> tuple[bool, float] | None:
 
 
 def _field(file: Path, before: str) -> str:
-    """Return the rest of the first line with this beginning; "" without one."""
+    """Return the rest of the first line that begins with ``before``; "" if there is none."""
     match = re.search(f"^{before}(.*)$", _read(file), re.MULTILINE)
     return match[1].strip() if match else ""
 
 
 def memory(context: CheckContext) -> Finding:
-    """Check how much memory there is, and whether limits on it hold."""
+    """Check the size of the memory, and whether limits on it are enforced."""
     total_mb, free_mb = _meminfo_mb(context.root, "Total"), _meminfo_mb(context.root, "Available")
     found = f"{free_mb:.0f} MB of {total_mb:.0f} MB free"
     version = controller(context.root)
@@ -105,7 +105,7 @@ def memory(context: CheckContext) -> Finding:
 
 
 def controller(root: Path) -> int | None:
-    """Return the version of control groups that limits memory; None if none does."""
+    """Return the version of control groups that limits memory; None if memory is not limited."""
     if "memory" in _read(root / "sys/fs/cgroup/cgroup.controllers").split():
         return 2
     # Version 1 lists the names of its controllers even if the kernel was built without them.

@@ -1,4 +1,4 @@
-"""The report: runs all checks, each in a thread. A new check is a function and a row here."""
+"""Report of all checks, each run in a thread. A new check is a function and a row of ``CHECKS``."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ CHECKS = (
 )
 
 
-# Timeout of all checks together [s]: a disk, a network or a peer on the bus may not answer.
+# Timeout of all checks together [s]: a disk, a network or a peer on the bus may hang.
 PATIENCE_S = 2.0
 
 
 class _RunningCheck:
-    """A check in a thread of its own, which may hang."""
+    """A check in a thread of its own, as it may hang."""
 
     def __init__(self, check: Check, context: CheckContext) -> None:
         self._check, self._context = check, context
@@ -66,11 +66,11 @@ def findings(
 ) -> Iterator[tuple[str, Finding]]:
     """Yield the name and finding of each check.
 
-    The first is the configuration; if it is refused only the computer is checked besides.
+    The configuration is checked first; if it is refused, only the computer is checked, too.
 
     Args:
-        path: a configuration; None for the defaults.
-        checks: what to look at besides.
+        path: file of the configuration; None for the defaults.
+        checks: the further checks.
         recordings: folder for recordings.
     """
     deadline = time.monotonic() + PATIENCE_S

@@ -22,7 +22,7 @@ SHOWS = {
 
 
 def endpoints(context: CheckContext) -> Finding:
-    """Check where the daemon listens, and from where and by whom that can be reached."""
+    """Check where the daemon listens, and who can reach it from where."""
     bus = context.config.bus
     kind = bus.security.kind
     details = [f"{endpoint}: {_reach(endpoint)}, {SHOWS[kind]}" for endpoint in bus.listen]
@@ -91,7 +91,7 @@ HOW_TO = "protocol/security.md, shows how to make them"
 
 
 def identity(context: CheckContext) -> Finding:
-    """Check the daemon's certificate or password, and until when it holds."""
+    """Check the daemon's certificate or password, and when it expires."""
     bus = context.config.bus
     security, listens = bus.security, bool(bus.listen)
     if security.kind == "none":
@@ -140,7 +140,7 @@ def secret_files(context: CheckContext) -> Finding:
 
 
 def _login(bus: BusConfig) -> Finding:
-    """Check user and password; the files can be read."""
+    """Check user and password; the files are known to be readable."""
     security, user = bus.security, bus.security.user
     names = []
     text = Path(user.dictionary_file).read_text(encoding="utf-8") if user.dictionary_file else ""

@@ -32,7 +32,7 @@ STREAMS = ("tcp", "tls", "ws")
 
 
 def address_of(endpoint: str) -> tuple[str, int] | None:
-    """Return the address of an endpoint for a TCP connection from here; None if there is none."""
+    """Return the address of an endpoint for a TCP connection from here; None for other kinds."""
     if protocol_of(endpoint) not in STREAMS:
         return None
     port = re.search(r":(\d+)(?:[?#]|$)", endpoint)
@@ -41,7 +41,7 @@ def address_of(endpoint: str) -> tuple[str, int] | None:
 
 
 def answers(endpoint: str) -> bool | None:
-    """Return whether a program listens at an endpoint; None if that is unknown."""
+    """Return whether a program listens at an endpoint; None if not known."""
     address = address_of(endpoint)
     if address is None:
         return None
@@ -71,9 +71,9 @@ def why_not_bound(endpoint: str) -> str:
 # Time to listen for maps and poses [s]; poses come ten times a second.
 LISTEN_S = 0.7
 ASK_S = 0.7
-# What to do about two publishers of one thing.
+# What to do about two publishers of one input.
 ONE_ONLY = "stop all but one: the daemon uses the first it receives, until that is silent"
-# Limit on the listed maps under other names.
+# Largest number of maps under other names that are listed.
 MOST_PLACES = 8
 # Positions of the entity's kind and of its topic's type in a token of rmw_zenoh
 # (``wire.ros_keys``).
@@ -81,7 +81,7 @@ TOKEN_KIND, TOKEN_TYPE = 5, 10
 
 
 def session(context: CheckContext) -> Finding:
-    """Check that a session can be opened as the daemon would, or name what prevents it."""
+    """Check that the daemon could open its session, or name what prevents it."""
     bus = context.config.bus
     try:
         check_settings(bus.settings(context.config.keys().prefix, context.config.ros2 or None))
@@ -100,7 +100,7 @@ def session(context: CheckContext) -> Finding:
     silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
     details += [f"{endpoint}: no answer" for endpoint in silent]
     if len(silent) == len(bus.connect) > 0:
-        # A client with credentials exits, as they may be wrong; a service restarts it.
+        # A client with credentials exits, as these may be wrong; systemd restarts it.
         ends = bus.mode == "client" and bus.security.kind != "none"
         make, then = (fail, "does not start") if ends else (warn, "waits for it")
         found = f"no answer at {', '.join(silent)}: the daemon {then}"
@@ -118,7 +118,10 @@ def session(context: CheckContext) -> Finding:
 
 
 def peers(context: CheckContext, listen_s: float = LISTEN_S) -> Finding:
-    """Check the participants of the bus: daemon, other robots, maps and poses within a time [s]."""
+    """Check the participants of the bus: daemon, other robots, and publishers of maps and poses.
+
+    ``listen_s``: time to listen for maps and poses [s].
+    """
     if not any(answers(endpoint) is not False for endpoint in _ways(context)):
         return ok("neither a daemon nor a router answers")
     try:
@@ -182,10 +185,10 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
 
 
 class MapsElsewhere:
-    """Maps that are published under other names than this daemon's.
+    """Maps that are published under other names than this daemon's map.
 
     Args:
-        bus: the session to search, from now on.
+        bus: the session to search.
         own: keys that the daemon's own map may have.
     """
 
@@ -193,12 +196,15 @@ class MapsElsewhere:
         self._bus = bus
         self._own = own
         self._keys: set[str] = set()
-        # Maps on the native key of any robot, and on that of a bridge in any namespace.
+        # Maps on the native key of any robot, and on the key of a bridge in any namespace.
         for key in (f"**/{VERSION}/*/{topics.MAP.suffix}", f"**/{topics.MAP.suffix}"):
             bus.subscribe(key, lambda sample: self._keys.add(sample.key), latched=True)
 
     def places(self) -> list[str]:
-        """Return where maps are, at most ``MOST_PLACES``; rmw_zenoh's are found by their tokens."""
+        """Return the keys and topics of maps, at most ``MOST_PLACES``.
+
+        Topics of rmw_zenoh are found by their tokens.
+        """
         found = {f"key {key}" for key in set(self._keys) if key not in self._own}
         for token in self._bus.alive("@ros2_lv/**", ASK_S):
             parts = token.split("/")
@@ -207,7 +213,7 @@ class MapsElsewhere:
                 continue
             topic = parts[TOKEN_TYPE - 1].replace("%", "/")
             is_own = any(key.startswith(f"{parts[1]}{topic}/") for key in self._own)
-            # Costmaps and our own coverage are grids, too.
+            # Costmaps, and the daemon's coverage, are occupancy grids, too.
             if topic.endswith(f"/{topics.MAP.name}") and not is_own:
                 found.add(f"ROS_DOMAIN_ID {parts[1]}, topic {topic}")
         return sorted(one_line(place) for place in found)[:MOST_PLACES]
@@ -216,9 +222,9 @@ class MapsElsewhere:
 def _listen(
     bus: Bus, wanted: dict[str, list[str]], listen_s: float, chained: Collection[str] = ()
 ) -> dict[str, Counter[str]]:
-    """Return how many samples of each kind came from each session.
+    """Return for each kind the number of samples from each session, by its id.
 
-    "" stands for unknown sessions, and for those of the keys ``chained``.
+    The id is "" for unknown sessions, and for samples on the keys ``chained``.
     """
     received, lock = {kind: Counter[str]() for kind in wanted}, threading.Lock()
 
@@ -239,9 +245,9 @@ def _listen(
 
 
 def _several(bus: Bus, received: dict[str, Counter[str]]) -> str:
-    """Return what comes from several publishers; "" for nothing."""
+    """Return the kinds that come from several publishers, in words, or ""."""
     counts = {
-        kind: sum(1 for each in senders if each and not bus.only_passes_on(each))
+        kind: sum(1 for each in senders if each and not bus.is_relay(each))
         for kind, senders in received.items()
     }
     return "; ".join(f"{n} publishers of {kind}s" for kind, n in counts.items() if n > 1)

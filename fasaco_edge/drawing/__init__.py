@@ -1,1 +1,1 @@
-"""Values to pictures: maps, walks, pheromone and finished missions, drawn with Pillow."""
+"""Pictures of maps, walks, pheromone and finished missions, drawn with Pillow."""

@@ -1,4 +1,4 @@
-"""The colours of all pictures, so that the same thing looks the same everywhere."""
+"""Palette of all pictures, so that a thing has the same colour in each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ UNREACHABLE: Colour = (200, 60, 60)
 START: Colour = (13, 128, 92)
 END: Colour = (190, 24, 60)
 
-# Okabe and Ito's colours, safe for colour-blind eyes, without the yellow: hard to see on white.
+# Okabe and Ito's colours, safe for colour-blind people, without yellow, which white hides.
 BLUE: Colour = (0, 114, 178)
 VERMILION: Colour = (213, 94, 0)
 GREEN: Colour = (0, 158, 115)
@@ -38,7 +38,7 @@ ORANGE: Colour = (230, 159, 0)
 
 BROWN: Colour = (140, 86, 75)
 VIOLET: Colour = (117, 80, 200)
-# The robots of a fleet by number, and what these colours are called.
+# Colours of a fleet's robots by number, with their names.
 ROBOTS: tuple[tuple[str, Colour], ...] = (
     ("blue", BLUE),
     ("orange", ORANGE),
@@ -49,6 +49,18 @@ ROBOTS: tuple[tuple[str, Colour], ...] = (
     ("brown", BROWN),
     ("violet", VIOLET),
 )
+
+
+def robot(number: int) -> tuple[str, Colour]:
+    """Return name and value of the colour of the robot with a number; colours repeat."""
+    return ROBOTS[number % len(ROBOTS)]
+
+
+def tint(colour: Colour, opacity: float) -> Colour:
+    """Return a colour painted on white with an opacity."""
+    red, green, blue = (round(255 - opacity * (255 - value)) for value in colour)
+    return red, green, blue
+
 
 # Nine colours, evenly spaced over the first four fifths of Matplotlib's plasma (CC0): perceptually
 # uniform, and without the yellow end, which is hard to see on white.

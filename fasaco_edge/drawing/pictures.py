@@ -21,27 +21,27 @@ from fasaco_edge.grid.rooms import FoundRooms
 
 
 def draw_swept(plot: Plot, swept: MapLayer, words: str) -> list[KeyEntry]:
-    """Tint the swept floor; return the meaning of the tint and of a line's marks."""
+    """Paint the swept floor; return the key of its colour and of a line's marks."""
     plot.paint(swept, palette.COVERED)
     return [*ENDS, KeyEntry("tile", palette.COVERED, f"{words} ({swept.area_m2:,.1f} m2)")]
 
 
 def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
-    """Paint unswept reachable floor; return the meaning of the colour."""
+    """Paint unswept reachable floor; return the key of its colour."""
     plot.paint(unswept, palette.UNSWEPT)
     label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
 
 
 def draw_by_others(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
-    """Paint floor that other robots swept; return the meaning of the colour."""
+    """Paint floor that other robots swept; return the key of its colour."""
     plot.paint(swept, palette.BY_OTHERS)
     label = f"swept by other robots of its fleet ({swept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.BY_OTHERS, label)]
 
 
 def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
-    """Outline the zones and keep-out zones of an order; return the meaning of the colours."""
+    """Outline the zones and keep-out zones of an order; return the key of their colours."""
     key = []
     for polygons, colour, label in (
         (zones, palette.BLUE, "zone to cover"),
@@ -55,7 +55,7 @@ def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]
 
 Points = NDArray[np.float64]
 
-# Cosine of a turn; what turns less goes straight on.
+# Cosine of the angle up to which a walk goes straight on.
 STRAIGHT = 0.999
 
 
@@ -67,22 +67,22 @@ def directions(points: Points) -> Points:
 
 
 def lanes(points: Points, offset: float) -> tuple[Points, Points]:
-    """Return start and end of every segment, both (m, 2), of the line beside ``points``.
+    """Return start and end of every segment, both (m, 2), of a line parallel to ``points``.
 
     Args:
         points: a walk or any other line (n, 2), no two points in succession equal.
-        offset: how far to the right of the walk [same unit].
+        offset: distance of the parallel line to the right [same unit].
     """
     along = directions(points)
     right = np.stack([along[:, 1], -along[:, 0]], axis=1)
     cosine = (along[:-1] * along[1:]).sum(axis=1)
     corner, back = np.abs(cosine) < STRAIGHT, cosine <= -0.5
     at_start, at_end = right.copy(), right.copy()
-    # Where it turns, the two lanes meet beside the corner.
+    # Where the walk turns, the two lanes meet beside the corner.
     corner &= ~back
     beside = (right[:-1] + right[1:])[corner] / (1 + cosine[corner])[:, None]
     at_end[:-1][corner] = at_start[1:][corner] = beside
-    # Where it turns back, they are joined a little beyond the centre.
+    # Where it turns back, the lanes are joined a little beyond the centre.
     at_end[:-1][back] += along[:-1][back]
     at_start[1:][back] += along[:-1][back]
     starts, ends = points[:-1] + offset * at_start, points[1:] + offset * at_end
@@ -92,7 +92,7 @@ def lanes(points: Points, offset: float) -> tuple[Points, Points]:
 
 
 def arrow_places(points: Points, every: float) -> NDArray[np.intp]:
-    """Return which segments of a walk carry an arrow: straight ones, about ``every`` apart."""
+    """Return the indices of segments with an arrow: straight ones, about ``every`` apart."""
     along = directions(points)
     travelled = np.cumsum(np.hypot(*np.diff(points, axis=0).T))
     goes_on = (along[1:] * along[:-1]).sum(axis=1) > 0.99
@@ -134,17 +134,17 @@ def draw_walk(
 
     Args:
         lattice: the planning grid.
-        cells: int32 (n, 2), n >= 1: the walk's cells (row, col), the start first; all
-            inside the lattice's window.
-        grid: the map the lattice was made from; None draws the lattice's own states.
+        cells: the walk's cells (row, col) from the start, in the lattice's window, int32 (n, 2),
+            n >= 1.
+        grid: the map that the lattice was made from; None draws the lattice's own states.
         title: heading.
         lines: caption below it.
-        line_xy: float64 (n, 2), n >= 1: the line driven instead, points (x, y) [m] joined by
-            straight segments; None for the centres of the cells.
-        is_backward: bool (n - 1,), which of its segments are driven backward, if it is a curve.
-        swept: floor that it sweeps, to be drawn in place of the cells; None for these.
-        unswept: reachable floor that it leaves; None where that is not known.
-        rooms: to be drawn in place of the cells and the swept floor; None for none.
+        line_xy: points (x, y) [m] of the line driven instead, float64 (n, 2), n >= 1; None for the
+            centres of the cells.
+        is_backward: which of its segments are driven backward, bool (n - 1,), if it is a curve.
+        swept: floor that it sweeps, drawn instead of the visited cells; None for the cells.
+        unswept: reachable floor that it leaves; None if not known.
+        rooms: rooms, drawn instead of cells and swept floor; None without rooms.
     """
     centres = lattice.centres(cells)
     driven = centres if line_xy is None else line_xy
@@ -168,7 +168,7 @@ def draw_walk(
 def draw_driven(
     plot: Plot, line: Points, is_backward: NDArray[np.bool_] | None, cell_m: float
 ) -> list[KeyEntry]:
-    """Draw a line, or a curve, with its ends; return what its colours mean."""
+    """Draw a line, or a curve, with its ends; return the key of its colours."""
     key: list[KeyEntry] = []
     if is_backward is None:
         draw_line(plot, in_pieces(line, cell_m), cell_m)
@@ -181,9 +181,9 @@ def draw_driven(
 
 
 def in_pieces(line: Points, longest: float) -> Points:
-    """Return a line (n, 2), n >= 1, with points added so that neighbours are near enough.
+    """Return a line (n, 2), n >= 1, with points added so that no piece is longer than ``longest``.
 
-    A slightly longer piece stays whole: rounding may lengthen a piece of one cell.
+    A tolerance keeps pieces whole that rounding made slightly longer.
     """
     ways = np.diff(line, axis=0)
     counts = np.maximum(np.ceil(np.hypot(*ways.T) / longest - 1e-3), 1).astype(np.int64)
@@ -194,7 +194,7 @@ def in_pieces(line: Points, longest: float) -> Points:
 
 
 def draw_line(plot: Plot, line: Points, cell_m: float) -> None:
-    """Draw a line, points (n, 2) with n >= 2 [m], beside its middle, and arrows along it."""
+    """Draw a line, points (n, 2) with n >= 2 [m], a little to its right, and arrows along it."""
     moves = np.ones(len(line), np.bool_)
     moves[1:] = (np.diff(line, axis=0) != 0).any(axis=1)
     points = line[moves]
@@ -206,9 +206,9 @@ def draw_line(plot: Plot, line: Points, cell_m: float) -> None:
 def draw_curve(
     plot: Plot, curve: Points, is_backward: NDArray[np.bool_], cell_m: float
 ) -> list[KeyEntry]:
-    """Draw a curve, points (n, 2) [m], where it is, and arrows along it; return its meaning.
+    """Draw a curve, points (n, 2) [m], and arrows along it; return the key of its colours.
 
-    ``is_backward``, bool (n - 1,), are segments driven backward.
+    ``is_backward``: which segments are driven backward, bool (n - 1,).
     """
     plot.track(curve[:-1], curve[1:], LINE_WIDTH * cell_m)
     changes = np.flatnonzero(np.diff(is_backward, prepend=False, append=False)).tolist()
@@ -231,7 +231,7 @@ def _draw_arrows(plot: Plot, points: Points, offset: float, cell_m: float) -> No
 
 # In cells.
 DRIVEN_WIDTH = 0.12
-# The border of a room, on the finished picture.
+# Width of the border of a room.
 ROOM_PX = 1.2
 
 
@@ -255,17 +255,17 @@ def draw_mission(
     """Return a picture, RGB, of a mission's result.
 
     Args:
-        grid: the map at its end.
-        lattice: the planning grid at its end.
-        driven_xy: float64 (n, 2), n >= 1: where the robot was, (x, y) [m], in order.
-        visits: uint16, shape of the lattice: how often each cell was covered; None with ``swept``.
+        grid: the map at the mission's end.
+        lattice: the planning grid at the mission's end.
+        driven_xy: the robot's positions (x, y) [m], in order, float64 (n, 2), n >= 1.
+        visits: number of visits of each cell, uint16, shape of the lattice; None with ``swept``.
         title: heading.
         lines: caption below it.
-        space: the most the map may take (width, height) [px].
-        driven: bool (n - 1,), which places are joined to the next; None for all.
-        swept: reachable floor that was swept, shown in place of the cells; None to show these.
-        unswept: reachable floor that was not swept; None where that is not known.
-        by_others: floor that other robots swept; None without them.
+        space: largest size of the map (width, height) [px].
+        driven: which positions are joined with the next one, bool (n - 1,); None for all.
+        swept: reachable floor that was swept, drawn instead of visited cells; None for the cells.
+        unswept: reachable floor that was not swept; None if not known.
+        by_others: floor that other robots swept; None without other robots.
         zones, keep_out: polygons of the order [m].
         rooms: names and outlines [m].
     """

@@ -1,4 +1,4 @@
-"""The drawing area in map coordinates: its view and scale, and drawing on it."""
+"""Drawing area in map coordinates: its view, its scale, and operations to draw on it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ MAX_WIDTH, MAX_HEIGHT = 1760, 1600
 MAX_CELL = 36
 MARGIN_CELLS = 1.0
 
-# Three samples a pixel and axis look better, two need less memory.
+# Samples per pixel and axis of pictures of up to FINE_UP_TO pixels, and of larger ones, to save
+# memory.
 FINE, COARSE = 3, 2
 FINE_UP_TO = 1_200_000
 
@@ -54,9 +55,9 @@ class View:
         """Return a view of ``bounds`` (x0, y0, x1, y1) [m], with a margin around.
 
         Args:
-            bounds: what to show.
+            bounds: the area to show.
             cell_m: edge of a cell [m], the width of the margin.
-            widest, highest: the most the picture may take [px].
+            widest, highest: largest size of the picture [px].
         """
         margin = MARGIN_CELLS * cell_m
         x0, y0, x1, y1 = bounds
@@ -72,7 +73,7 @@ class View:
         return self.scale * self.oversampling
 
     def samples(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the places in the oversampled picture of points (x, y) [m], both (n, 2)."""
+        """Return points (x, y) [m] as places in the oversampled picture [px], both (n, 2)."""
         corner, up = np.array([self.left, self.top]), np.array([1.0, -1.0])
         samples: NDArray[np.float64] = (points - corner) * up * self.samples_per_metre
         return samples
@@ -81,7 +82,7 @@ class View:
 def bounds_of(
     grid: OccupancyGrid | None, lattice: CoverageLattice, points: NDArray[np.float64]
 ) -> Bounds:
-    """Return the bounds [m] of all that is known: of the map, or else the lattice, and points."""
+    """Return the bounds [m] of the known part of the map, or else of the lattice, and of points."""
     if grid is not None:
         known = known_bounds(grid) or grid.geometry.bounds()
     else:
@@ -100,7 +101,7 @@ def bounds_of(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapLayer:
-    """Marked pixels, bool (rows, cols), and where they lie; they need not be those of a map."""
+    """Marked pixels of any raster, bool (rows, cols), and their placement."""
 
     geometry: GridGeometry
     mask: NDArray[np.bool_]
@@ -111,7 +112,7 @@ class MapLayer:
         return int(np.count_nonzero(self.mask)) * self.geometry.resolution**2
 
 
-# Below this many pixels a cell, lines between cells would be all there is to see.
+# Least size of a cell for lines between cells [px].
 RULED_CELL_PX = 14
 HATCH_PX = 7
 LINE_PX, OUTLINE_PX = 1.2, 2.5
@@ -149,7 +150,7 @@ class Plot:
     def _placed(
         self, geometry: GridGeometry, values: NDArray[np.uint8], outside: Colour | int
     ) -> Image.Image:
-        """Return pixels of a map, uint8 (rows, cols) or (rows, cols, 3), where they lie."""
+        """Return a map's pixels, uint8 (rows, cols) or (rows, cols, 3), as an image of the view."""
         step = 1 / self.view.samples_per_metre
         left, top = self.view.left, self.view.top
         col, row = geometry.to_pixels(left, top)
@@ -168,7 +169,7 @@ class Plot:
         self._image.paste(colour, mask=placed)
 
     def tint(self, lattice: CoverageLattice, colours: NDArray[np.uint8]) -> None:
-        """Tint cells, uint8 (rows, cols, 3); white leaves a cell as it is."""
+        """Tint cells with colours, uint8 (rows, cols, 3); white leaves a cell unchanged."""
         layer = self._spread(lattice, colours, palette.PAPER)
         if lattice.cell_m * self.view.scale >= RULED_CELL_PX:
             self._rule(layer, lattice.cell_m)
@@ -191,7 +192,7 @@ class Plot:
         """Draw segments (n, 2) to (n, 2) [m], coloured from the first to the last."""
         colours = palette.gradient(np.linspace(0.0, 1.0, len(starts))).tolist()
         thinnest = LINE_PX * self.view.oversampling
-        # Whole numbers and odd widths, or the round ends stand out from the line.
+        # With fractions or even widths, the round ends would stand out from the line.
         radius = round(max(width_m * self.view.samples_per_metre, thinnest)) // 2
         width = 2 * radius + 1
         places = np.hstack([self.view.samples(starts), self.view.samples(ends)])
@@ -201,7 +202,7 @@ class Plot:
             self._draw.ellipse((x1 - radius, y1 - radius, x1 + radius, y1 + radius), colour)
 
     def line(self, points: NDArray[np.float64], colour: Colour, width_px: float) -> None:
-        """Draw a line, points (n, 2) [m], so wide on the finished picture."""
+        """Draw a line, points (n, 2) [m], ``width_px`` wide on the finished picture."""
         if len(points) > 1:
             places = [*map(tuple, self.view.samples(points).tolist())]
             self._draw.line(places, colour, round(width_px * self.view.oversampling), "curve")
@@ -211,10 +212,10 @@ class Plot:
         self.line(np.array((*polygon, polygon[0]), np.float64), colour, OUTLINE_PX)
 
     def arrow(self, at: NDArray[np.float64], along: NDArray[np.float64], size_m: float) -> None:
-        """Draw an arrow head, its middle at (x, y) [m], pointing ``along`` a unit vector."""
+        """Draw an arrow head with its middle at (x, y) [m], in the direction of a unit vector."""
         across = np.array([-along[1], along[0]])
         for grown, colour in ((1.6, palette.PAPER), (1.0, palette.INK)):
-            # A triangle's incircle lies a third up: so the rim is as wide on all sides.
+            # The middle is the centre of the triangle's incircle: so all rims are of one width.
             front = along * size_m * (grown * 2 / 3)
             back = along * size_m * (-grown / 3)
             side = across * size_m * (grown * 0.58)
@@ -222,17 +223,17 @@ class Plot:
             self._draw.polygon([*map(tuple, self.view.samples(corners).tolist())], colour)
 
     def start_mark(self, point: NDArray[np.float64]) -> None:
-        """Mark where it began, (x, y) [m], with a disc."""
+        """Mark the start, (x, y) [m], with a disc."""
         for radius, colour in ((1.35, palette.PAPER), (1.0, palette.START), (0.35, palette.PAPER)):
             self._draw.ellipse(self._box(point, radius), colour)
 
     def end_mark(self, point: NDArray[np.float64]) -> None:
-        """Mark where it ended, (x, y) [m], with a square."""
+        """Mark the end, (x, y) [m], with a square."""
         for radius, colour in ((1.25, palette.PAPER), (0.9, palette.END), (0.3, palette.PAPER)):
             self._draw.rectangle(self._box(point, radius), colour)
 
     def text(self, words: str, point: Point) -> None:
-        """Write a few words, their middle at a point (x, y) [m]."""
+        """Write a few words, centred on a point (x, y) [m]."""
         x, y = self.view.samples(np.array([point]))[0].tolist()
         size = NAME_PX * self.view.oversampling
         rim = RIM_PX * self.view.oversampling

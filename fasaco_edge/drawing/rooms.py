@@ -1,4 +1,4 @@
-"""Pictures of rooms: each in a colour that none of its neighbours has, with its number."""
+"""Pictures of rooms: each with its number, in a colour that differs from its neighbours'."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms
 from fasaco_edge.kernels.rooms.clearance import clearances
 
-# Pale, to see what lies on them: share of the colour on white.
+# Share of the colour on white, low so that drawings on a room are visible.
 TINT = 0.38
-# Rooms nearer than this are neighbours: a door is as deep as its wall [m].
+# Distance up to which rooms are neighbours, the depth of a door [m].
 NEAR_M = 0.2
-# What the margin around the map is measured in [m].
+# Edge of a cell, for the margin around the map [m].
 CELL_M = 0.3
 
 
@@ -53,7 +53,7 @@ def number_rooms(plot: Plot, rooms: FoundRooms) -> None:
 
 
 def _colours(labels: NDArray[np.int32], count: int, reach: int) -> list[palette.Colour]:
-    """Return a colour of each room, such that neighbours differ while there are enough."""
+    """Return a colour for each room; neighbours differ if there are enough colours."""
     near: list[set[int]] = [set() for _ in range(count + 1)]
     for axis in (0, 1):
         for by in range(1, reach + 1):
@@ -70,9 +70,4 @@ def _colours(labels: NDArray[np.int32], count: int, reach: int) -> list[palette.
         chosen[number] = min(
             range(len(palette.ROBOTS)), key=lambda colour: (taken.count(colour), used[colour])
         )
-    return [_pale(palette.ROBOTS[colour][1]) for colour in chosen[1:]]
-
-
-def _pale(colour: palette.Colour) -> palette.Colour:
-    red, green, blue = (round(255 - TINT * (255 - value)) for value in colour)
-    return red, green, blue
+    return [palette.tint(palette.robot(colour)[1], TINT) for colour in chosen[1:]]

@@ -1,4 +1,4 @@
-"""The sheet around a plot: title and caption above, colour bar, scale bar and key below."""
+"""Sheet around a plot: title and caption above, colour bar, scale bar and key below."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OVERSAMPLING = 4
 # Longest line of a caption [characters].
 MOST_CHARACTERS = 400
 
-# Pillow's own font knows little beyond ASCII; it needs no file, so it stays.
+# Pillow's built-in font, which needs no file, has few letters beyond ASCII.
 IN_FONT = frozenset("·°±…“”‘’")
 SPELT_OUT = str.maketrans({"×": "x", "–": "-", "—": "-", "→": "->", "≤": "<=", "≥": ">="})
 
@@ -56,7 +56,7 @@ class Sheet:
         key: symbols and their meaning.
         bar: labels at the beginning and the end of the colour bar; None for no bar.
         scale: pixels per unit of the plot.
-        unit: of the scale bar.
+        unit: unit of the scale bar.
     """
 
     title: str
@@ -138,7 +138,7 @@ def font_of(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 
 def _drawable(text: str) -> str:
-    """Return ``text`` in letters the font has: m² becomes m2, é becomes e."""
+    """Return ``text`` in letters that the font has: m² becomes m2, é becomes e."""
     decomposed = "".join(
         letter if letter in IN_FONT else unicodedata.normalize("NFKD", letter)
         for letter in one_line(text, MOST_CHARACTERS).translate(SPELT_OUT)
@@ -151,7 +151,7 @@ def _drawable(text: str) -> str:
 
 
 def wrapped(lines: Sequence[str], size: int, width: int) -> list[str]:
-    """Return ``lines`` in letters the font has, broken where they are wider than ``width`` [px]."""
+    """Return ``lines`` in letters that the font has, broken to fit into ``width`` [px]."""
     font, broken = font_of(size), []
     for line in map(_drawable, lines):
         current = ""

@@ -1,4 +1,4 @@
-"""The spread of repeated measurements in three numbers: a mean is sensitive to other load."""
+"""Spread of repeated measurements: median, least and most, as other load would distort a mean."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Spread:
 
     @classmethod
     def of(cls, values: Sequence[float]) -> Self | None:
-        """Sum up ``values``; None where there are none."""
+        """Return the spread of values; None without values."""
         if not values:
             return None
         return cls(statistics.median(values), min(values), max(values))
@@ -30,12 +30,12 @@ class Spread:
 
 
 def median(spread: Spread | None) -> float | None:
-    """Return the median, None where nothing was measured."""
+    """Return the median; None if nothing was measured."""
     return spread.median if spread else None
 
 
 def document(spread: Spread | None) -> dict[str, float] | None:
-    """Return a spread as JSON values, None where nothing was measured."""
+    """Return a spread as JSON values; None if nothing was measured."""
     return spread.document() if spread else None
 
 
@@ -47,10 +47,9 @@ def text(spread: Spread | None, digits: int) -> tuple[str, str]:
 
 
 def percentile(values: Sequence[float], percent: float) -> float | None:
-    """Return the least of ``values`` that ``percent`` of them do not exceed (nearest rank).
+    """Return the percentile of values by nearest rank, which is one of them; None without values.
 
-    One of the values, never a number between two: of 200, the 99th percentile is
-    the third from the top.
+    Of 200 values, the 99th percentile is the third largest.
     """
     if not values:
         return None

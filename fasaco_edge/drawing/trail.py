@@ -1,4 +1,4 @@
-"""The picture of a pheromone trail: its direction at each cell, and how decided it is."""
+"""Picture of a pheromone trail: its direction at each cell, and how decided it is."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ WAYS = {
     WEST: ("left", palette.ORANGE),
     SOUTH: ("down", palette.PURPLE),
 }
-# Arrows closer together than this cannot be distinguished.
+# Least spacing of arrows.
 ARROW_EVERY_PX = 16
 SMALLEST, LARGEST = 0.2, 0.5
-"""Arrow heads, as a share of the way from one to the next."""
+"""Sizes of arrow heads, as a share of their spacing."""
 
 
 def draw_trail(
@@ -41,7 +41,7 @@ def draw_trail(
     Args:
         lattice: the planning grid.
         tau: the trail, over the lattice's window.
-        grid: the map the lattice was made from; None draws the lattice's own states.
+        grid: the map that the lattice was made from; None draws the lattice's own states.
         title: heading.
         lines: caption below it.
     """
@@ -51,7 +51,7 @@ def draw_trail(
     key = []
     for direction, (name, colour) in WAYS.items():
         here = (pointed == direction) & (decided > 0.0)
-        # White where the trail is undecided: multiplied with the map, white leaves it unchanged.
+        # Undecided cells are white: a multiplication by white leaves the map unchanged.
         share = 0.15 + 0.85 * decided[here][:, np.newaxis]
         colours[here] += share * (np.array(colour) - palette.PAPER)
         key.append(KeyEntry("tile", colour, f"{name} ({np.count_nonzero(here):,} cells)"))
@@ -71,17 +71,17 @@ def draw_trail(
 
 
 def pointed_and_decided(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float64]]:
-    """Return the direction of the strongest step out of each cell, and how far it stands out.
+    """Return the direction of the strongest step out of each cell, and how decided the cell is.
 
     Returns:
-        int8 (rows, cols), -1 for no step; float64 (rows, cols): 0 where all steps have as much
-        pheromone, 1 where this one has all of it, or is the only one there is.
+        direction, int8 (rows, cols), -1 without a step; decidedness, float64 (rows, cols): 0 if all
+        steps have equal pheromone, 1 if the strongest has all of it, or is the only one.
     """
     pointed, share = directions(tau)
     ways = np.count_nonzero(tau > 0, axis=2)
     even = 1.0 / np.maximum(ways, 1)
     decided = np.where(ways == 1, 1.0, (share - even) / np.maximum(1.0 - even, 1e-9))
-    # A rounding error in an even cell is no direction.
+    # A rounding error in an even cell decides nothing.
     decided[(decided < 1e-5) | (ways == 0)] = 0.0
     return pointed, np.minimum(decided, 1.0)
 
@@ -94,7 +94,7 @@ def _compared(decided: NDArray[np.float64], tau: Tau) -> NDArray[np.float64]:
 
 
 def _most_decided(decided: NDArray[np.float64], every: int) -> list[tuple[int, int]]:
-    """Return the cell that stands out most of each block of ``every`` by ``every`` cells."""
+    """Return the most decided cell of each block of ``every`` by ``every`` cells."""
     rows, cols = decided.shape
     padded = np.pad(decided, ((0, -rows % every), (0, -cols % every)))
     down, across = padded.shape[0] // every, padded.shape[1] // every

@@ -1,4 +1,4 @@
-"""Cells of a lattice, tinted by how often a walk visits them."""
+"""Cells of a lattice, tinted by a walk's number of visits."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ def draw_visits(
     visits: NDArray[np.integer],
     start: Cell,
 ) -> list[KeyEntry]:
-    """Tint the lattice's cells by number of visits; return the meaning of the tints.
+    """Tint the lattice's cells by number of visits; return the key of the tints.
 
     Args:
-        plot: what to draw on.
+        plot: the plot to draw on.
         lattice: the planning grid.
-        visits: shape of the lattice: how often each cell was visited.
-        start: cell (row, col) from where the others can be reached or not.
+        visits: number of visits of each cell, shape of the lattice.
+        start: cell (row, col) from which reachable cells are found.
     """
     never = lattice.coverable & (visits == 0)
     reachable = _reachable(lattice, start)
@@ -48,7 +48,7 @@ def draw_visits(
 
 def _reachable(lattice: CoverageLattice, start: Cell) -> NDArray[np.bool_]:
     if not lattice.contains(start) or lattice.states[lattice.local(start)] != COVERABLE:
-        # Without a start, no cell is called unreachable.
+        # Without a valid start, all cells count as reachable.
         return np.ones(lattice.states.shape, np.bool_)
     return reachable_from(lattice.steps, *lattice.local(start)).astype(np.bool_)
 
@@ -73,7 +73,7 @@ def _entry(symbol: str, colour: palette.Colour, label: str, cells: NDArray[np.bo
 
 
 def visits_of(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return how often a walk visits each cell of a lattice."""
+    """Return the number of visits of a walk to each cell, int64, shape of the lattice."""
     visits = np.zeros(lattice.states.shape, np.int64)
     window = lattice.window
     np.add.at(visits, (cells[:, 0] - window.row0, cells[:, 1] - window.col0), 1)

@@ -1,10 +1,10 @@
-"""Fleets: several robots that share one area. A single robot does not use it.
+"""Fleets: several robots that share one area. A single robot does not use this package.
 
-mission/kind         what a robot of a fleet uses in place of ``mission.company_kind``
-mission/layer        the other robots, and this one's part of the remaining area
+mission/kind         the parts of a mission that replace those of a single robot
+mission/layer        the other robots, and this robot's part of the remaining area
 mission/giving_way   when the robot waits for other robots, and makes way for them
 mission/shared       cells that the others have swept
-mission/division     who sweeps what, while a mission goes on
+mission/division     which robot sweeps which of the remaining cells
 mission/message      what this robot sends to the others
 
 daemon/exchange      the messages of a fleet, received and sent

@@ -42,11 +42,11 @@ _Value = TypeVar("_Value")
 
 # Retry period of a cancellation [s].
 CANCEL_EVERY_S = 1.0
-# Limit on the goals cancelled at a time, the newest ones: a server drives no other.
+# Largest number of goals being cancelled; the oldest are dropped, as the server has ended them.
 MOST_CANCELLED = 8
-# Timeout of a reply [s], and of a result, which comes only when the goal has ended.
+# Timeouts of a reply, and of a result, which arrives only when the goal has ended [s].
 ANSWER_S, RESULT_S = 2.5, 300.0
-# How long the end of goals is waited for at the exit [s].
+# Longest wait at the exit for the server to confirm cancellations [s].
 END_S = 1.0
 # Period of searching the graph for the action's server [s].
 LOOK_EVERY_S = 2.0
@@ -61,7 +61,7 @@ class SendGoal:
 
 @dataclass(frozen=True, slots=True)
 class AskResult:
-    """A query for the result of a goal; the reply comes when it has ended."""
+    """A query for the result of a goal; the reply arrives when the goal has ended."""
 
     id: bytes
 
@@ -77,10 +77,10 @@ Request = SendGoal | AskResult | CancelGoal
 
 
 class Sender(Protocol):
-    """Who sends goals, and takes what comes of them."""
+    """Owner of goals: takes in the server's replies."""
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether a goal was accepted; None without an answer: the server must end it."""
+        """Take in whether a goal was accepted; None without an answer: it must be cancelled."""
 
     def take_ending(
         self,
@@ -89,18 +89,18 @@ class Sender(Protocol):
         why: str,
         now: float,
     ) -> None:
-        """Take in how a goal ended; None if the server's words are malformed."""
+        """Take in how a goal ended; None if the reply is malformed."""
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
-        """Take in that a query for a result ended after some time [s] without a reply."""
+        """Take in that a query for a result ended after ``waited_s`` [s] without a reply."""
 
 
 class Cancellations:
-    """The goals to cancel, each second until the server confirms it."""
+    """The goals to cancel: each is requested every second until the server confirms it."""
 
     def __init__(self) -> None:
-        # Time of the last request, by goal [s]; and the goals that the server has not answered:
-        # it may not know them yet.
+        # Time of the last request for each goal [s]; goals whose acceptance is not answered: the
+        # server may not know them yet.
         self._asked_at: dict[bytes, float] = {}
         self._unanswered: set[bytes] = set()
 
@@ -116,7 +116,7 @@ class Cancellations:
 
     @property
     def are_open(self) -> bool:
-        """Whether the server has to confirm any."""
+        """Whether the server has yet to confirm any."""
         return bool(self._asked_at)
 
     def take_sent(self, goal_id: bytes) -> None:
@@ -132,7 +132,7 @@ class Cancellations:
             self._asked_at[goal_id] = -math.inf
 
     def take_answer(self, goal_id: bytes, code: int | None) -> None:
-        """Take in the answer to a cancellation; None without one."""
+        """Take in the answer to a cancellation; None without an answer."""
         if goal_id not in self._unanswered and code in (TAKEN, NO_SUCH_GOAL, ENDED_BEFORE):
             self.drop(goal_id)
 
@@ -155,8 +155,8 @@ class ActionClient:
     Args:
         bus: the session.
         ros: how ROS is connected to Zenoh, as in ``FollowSettings``.
-        action: its name.
-        types: its types.
+        action: name of the action.
+        types: types of its services.
         sender: takes the replies, in ``turn``.
         read_ending: decodes a result.
         clock: returns the time for the sender [s].
@@ -193,7 +193,7 @@ class ActionClient:
         return self._token_list is not None
 
     def keys(self) -> dict[Call, str]:
-        """Return the keys of the server's services; none if the graph shows no server."""
+        """Return the keys of the server's services; empty if the graph shows no server."""
         if self._token_list is None:
             return bridge_keys(self._action)
         return served_keys(self._domain, self._action, self._token_list.there(), self._types)
@@ -207,14 +207,14 @@ class ActionClient:
         self._cancel()
 
     def end(self) -> None:
-        """Wait a little until the server has confirmed all cancellations."""
+        """Wait up to END_S until the server has confirmed all cancellations."""
         ends = time.monotonic() + END_S
         while self._cancellations.are_open and time.monotonic() < ends:
             self.turn()
             time.sleep(0.01)
 
     def ask(self, request: Request, goal: bytes = b"") -> None:
-        """Send a request; ``goal``: what is sent to begin a goal."""
+        """Send a request; ``goal``: the payload that begins a goal."""
         if isinstance(request, SendGoal):
             self._cancellations.take_sent(request.id)
             self._ask("send_goal", goal, partial(self._take_accepted, request.id))
@@ -249,7 +249,7 @@ class ActionClient:
     def _read(
         self, decode: Callable[[bytes], _Value], reply: bytes | None
     ) -> tuple[_Value | None, str]:
-        """Return what a reply says; None, and why, without a reply or for a malformed one."""
+        """Return a decoded reply and "", or None and why there is no valid reply."""
         if reply is None:
             return None, f"{self._action} did not answer"
         try:
@@ -258,7 +258,7 @@ class ActionClient:
             return None, str(error)
 
     def _ask(self, call: Call, payload: bytes, take: Callable[[bytes | None], None]) -> None:
-        """Send a request; ``take`` gets the reply in ``turn``, None for none."""
+        """Send a request; ``take`` gets the reply in ``turn``, or None without a reply."""
 
         def end(replies: list[Reply]) -> None:
             reply = next((reply.payload for reply in replies if not reply.is_error), None)

@@ -1,13 +1,14 @@
-"""The partners of a follower: the daemons of its robot, and the other followers of its base.
+"""Partners of a follower: the daemons of its robot, and the other followers of its base.
 
-Only samples of the daemon that plans count: the status of another one, which waits or restarts in a
-loop, is no sign of life of the planner, and its path is not driven. Samples of one daemon may
-arrive in any order, a path before the token of its claim, so the newest of each is kept.
+Only samples of the daemon that plans count. Another daemon, which waits or restarts in a loop, does
+not prove by its status that the planner runs, and its path is not driven. Samples of one daemon may
+arrive in any order, for instance a path before the token of its claim, so the newest of each kind
+are kept.
 
 Of several followers of one robot, one drives. Each shows a token ``driver/<its Zenoh id>/<waits,
-yields or drives>``. One that waits sends nothing, no zeros either. A session sees its own token
-even where access rules hide it from others: so a second session must see the token before the first
-command.
+yields or drives>``. A follower that waits sends no commands, not even zeros. A session sees its own
+token even where access rules hide it from others. So a second session must see the token before the
+follower sends its first command.
 """
 
 from __future__ import annotations
@@ -32,11 +33,10 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES, MAX_JSON_INTEGER
 
-# Limit on the daemons whose samples are kept; beyond it the samples of the oldest daemon are
-# dropped.
+# Largest number of daemons whose samples are kept; further ones displace the oldest.
 MOST_DAEMONS = 16
-# Limit on the claims that are kept; further ones are ignored. A claim dropped in their place would
-# not be sent again.
+# Largest number of claims kept; further ones are ignored. They do not displace older claims, which
+# would not arrive again.
 MOST_CLAIMS = 1_000
 
 PLANS = "plans"
@@ -47,13 +47,13 @@ class News:
     """The newest samples of a daemon.
 
     Attributes:
-        planner: its id; "" for none.
-        status_at: arrival of its newest status [s]; None without a new one.
-        state: by its newest status; "" before there is one.
-        path: its newest path; None without a new one.
-        revision: of its newest path; 0 if unknown.
-        speed_m_s: limit of the speed on its newest path; infinity without one [m/s].
-        unnamed: newest path that names no daemon; None without a new one.
+        planner: its id; "" without a daemon.
+        status_at: arrival of its newest status [s]; None without a new status.
+        state: its state, by the newest status; "" before the first status.
+        path: its newest path; None without a new path.
+        revision: revision of its newest path; 0 if unknown.
+        speed_m_s: speed limit on its newest path [m/s]; infinity without a limit.
+        unnamed: newest path without a daemon's id; None without a new one.
     """
 
     planner: str = ""
@@ -66,9 +66,9 @@ class News:
 
 
 class Daemons:
-    """Keeps the newest samples of each daemon, and returns those of the one that plans.
+    """Keeps the newest samples of each daemon, and returns those of the daemon that plans.
 
-    Samples come on Zenoh's threads.
+    Samples arrive on Zenoh's threads.
     """
 
     def __init__(self) -> None:
@@ -78,10 +78,10 @@ class Daemons:
         self._unnamed: Sample | None = None
 
     def take_claim(self, key: str, is_there: bool) -> None:
-        """Take in that the token of a claim appeared or is gone."""
+        """Take in that the token of a claim appeared or disappeared."""
         _, _, claim = key.rpartition("/claim/")
         own, _, stand = claim.partition("/")
-        # The daemons ignore other tokens, too.
+        # Daemons ignore malformed tokens, too.
         if stand != PLANS or not _is_id(own):
             return
         with self._lock:
@@ -91,7 +91,7 @@ class Daemons:
                 self._planners.add(own)
 
     def take_status(self, payload: bytes, now: float) -> None:
-        """Take in a status; one that is malformed, or whose daemon does not plan, is ignored."""
+        """Take in a status; it is ignored if it is malformed, or its daemon does not plan."""
         document = _object(payload)
         claim = document.get("claim")
         own = claim.get("id") if isinstance(claim, dict) and claim.get("stand") == PLANS else None
@@ -162,8 +162,8 @@ def _object(payload: bytes) -> dict[str, Any]:
 log = logging.getLogger(__name__)
 
 DRIVES = "drives"
-# Number of queries of the second session for the token, the pause between two [s], and the pause
-# after the last one [s].
+# Number of times that the second session queries the token, the pause between two queries [s], and
+# the pause before the next second session [s].
 LOOKS, LOOK_S, LOOK_AGAIN_S = 5, 0.2, 5.0
 
 NO_RIGHT = "access rules keep its token from others: the role driver needs `driver/*/*`, too"
@@ -172,8 +172,8 @@ NO_RIGHT = "access rules keep its token from others: the role driver needs `driv
 class BaseClaim(BusClaim):
     """The claim of this follower."""
 
-    # Another follower that drives sees this token with its next query: until then this one must not
-    # drive.
+    # Time within which another follower that drives sees this token; this one must not drive
+    # before.
     rejoin_s = ASK_PERIOD_S + 2.0 * SETTLE_S
 
     def __init__(self, bus: Bus, settings: FollowSettings) -> None:

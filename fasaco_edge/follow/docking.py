@@ -1,8 +1,8 @@
 """Docking and undocking by Nav2's docking server: the daemon's state and poses in, requests out.
 
-The path ends in front of the dock. There the daemon's state says that the robot charges, and the
-docking server moves the robot in; before the next path is driven, it moves the robot out again. No
-clock, no session.
+The path ends in front of the dock. Once the daemon's state is ``charging`` there, the docking
+server moves the robot in; before the next path is driven, it moves the robot out again. No clock,
+no session.
 
 ``DockingNode`` sends the requests to the server as queries, and handles its replies once a cycle.
 """
@@ -42,16 +42,15 @@ from fasaco_edge.wire.messages.docking import (
 from fasaco_edge.wire.messages.follow_path import GOAL_ID_BYTES, UNKNOWN
 from fasaco_edge.wire.ros_keys import DOCK_ROBOT, UNDOCK_ROBOT
 
-# A robot this near to the dock's pose is in its dock [m].
+# Distance from the dock's pose within which the robot is in its dock [m].
 DOCKED_M = 0.1
 # Pause after an error before the next goal [s], doubled each time up to the maximum.
 RETRY_S, MOST_RETRY_S = 10.0, 300.0
 # Period of queries for the result, as a reply may be lost; time after which a goal is given up [s].
 RESULT_EVERY_S, GIVE_UP_S = 20.0, 1200.0
-# States of the daemon in which the robot leaves its dock; and those in which it has charged, or is
-# to drive elsewhere: in all others docking continues.
-DRIVES = ("planning", "covering", "returning", "degraded")
-LEAVES = ("planning", "covering", "returning", "paused", "idle", "done")
+# States of the daemon in which the robot undocks; and those in which docking is cancelled.
+UNDOCKS = ("planning", "covering", "returning", "degraded")
+CANCELS = ("planning", "covering", "returning", "paused", "idle", "done")
 
 
 class Move(enum.Enum):
@@ -79,12 +78,12 @@ class Docking:
 
     Args:
         dock: the robot's pose in the dock.
-        approach: how far in front of it paths end [m].
+        approach: distance in front of the dock at which paths end [m].
         new_id: makes the id of a goal.
 
     Attributes:
         holds: why the robot must not drive along its path now; "" if it may.
-        trouble: the last error, "" for none.
+        trouble: the last error, or "".
     """
 
     def __init__(self, dock: Pose2D, approach: float, new_id: Callable[[], bytes]) -> None:
@@ -103,14 +102,14 @@ class Docking:
 
         Args:
             now: the time [s].
-            state: of the daemon, "" before the first status.
-            here: the robot's pose; None without one.
+            state: the daemon's state; "" before the first status.
+            here: the robot's pose; None if unknown.
             drives: whether there is a path to drive.
         """
         if here is not None:
             far = math.hypot(here.x - self._dock.x, here.y - self._dock.y)
             if self._is_docked is None:
-                # A robot that was switched on in its dock.
+                # The robot may have been switched on in its dock.
                 self._is_docked = far <= max(DOCKED_M, 0.5 * self._approach)
             elif self._goal is None and far > self._approach + 2.0 * DOCKED_M:
                 self._is_docked = False
@@ -119,7 +118,7 @@ class Docking:
         elif here is not None and now >= self._retry_at:
             if state == "charging" and not self._is_docked:
                 self._start(Move.DOCK, now)
-            elif self._is_docked and drives and state in DRIVES:
+            elif self._is_docked and drives and state in UNDOCKS:
                 self._start(Move.UNDOCK, now)
         is_in = bool(self._is_docked) and drives
         self.holds = self._goal.move.value if self._goal else "in its dock" if is_in else ""
@@ -127,7 +126,7 @@ class Docking:
         return requests
 
     def end(self) -> list[DockRequest]:
-        """Return the requests that end all goals; the next pose shows whether it is docked."""
+        """Return the requests that end the goal; the next pose shows whether it is docked."""
         self._is_docked = None
         if (goal := self._goal) is None:
             return []
@@ -148,7 +147,7 @@ class Docking:
         self._fail(why or "refused: is the docking server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: DockEnding | None, why: str, now: float) -> None:
-        """Take in how a goal ended; None if the server will not answer."""
+        """Take in how a goal ended; None if the reply is malformed."""
         goal = self._goal
         if goal is None or goal.id != goal_id:
             return
@@ -167,7 +166,7 @@ class Docking:
             self._fail(goal_error(ending, ERRORS, "no code"), now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
-        """Take in that a query for a result ended without one: it is asked for again."""
+        """Do nothing: ``step`` queries the result again."""
 
     def _start(self, move: Move, now: float) -> None:
         self._goal = _Goal(move, self._new_id(), now, asked_at=now)
@@ -178,7 +177,7 @@ class Docking:
 
     def _watch(self, goal: _Goal, now: float, state: str) -> None:
         """Query the result again; cancel an unwanted goal; give up a goal that never ends."""
-        if goal.move is Move.DOCK and state in LEAVES and not goal.is_cancelled:
+        if goal.move is Move.DOCK and state in CANCELS and not goal.is_cancelled:
             goal.is_cancelled = True
             self._cancel(goal)
         if now - goal.sent_at > GIVE_UP_S:
@@ -209,7 +208,7 @@ class DockingNode:
         docking = self._docking = Docking(pose, dock["approach_m"], new_id)
         names = dock["id"], dock["type"]
         client = partial(ActionClient, bus, settings.ros, sender=docking, clock=time.monotonic)
-        # The client of each motion, and what is sent to begin a goal, by its id.
+        # For each motion its client, and the payload that begins a goal of an id.
         self._actions: dict[Move, tuple[ActionClient, Callable[[bytes], bytes]]] = {
             Move.DOCK: (
                 client(dock["dock_action"], DOCK_ROBOT, read_ending=decode_dock_ending),

@@ -1,13 +1,13 @@
-"""The pose estimate between two poses: the newest pose, advanced by the commands sent since.
+"""Pose estimate between two poses: the newest pose, advanced by the commands sent since.
 
-Poses arrive, for example, ten times a second, and velocities are sent twenty times. A command takes
-a while to move the base, and a pose to arrive: together that is the delay. The estimate is the pose
-after all sent commands have taken effect: a pose is advanced by the commands sent from one delay
-before its arrival on. The delay is measured when the robot starts, brakes and turns: the poses
-follow the commands after it.
+Poses arrive about ten times a second, and commands are sent twenty times a second. The delay is the
+time from a command to the arrival of a pose that shows its effect. The estimate is the pose after
+all sent commands have taken effect: the newest pose, advanced by all commands sent later than one
+delay before it arrived. The delay is measured when the robot starts, brakes and turns: it is the
+shift in time at which poses and commands fit best.
 
-A pose far from the expected one is not accepted at once: a momentary error of the localiser must
-not make the robot turn. After a jump, poses that agree with each other are accepted after a while.
+A pose far from the expected one is not accepted at once, so that a momentary error of the localiser
+does not turn the robot. After a jump, several poses that agree with each other are accepted.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from dataclasses import dataclass
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.motion import limited
 
-# A pose further than this from the expected one is a jump [m, rad].
+# A pose farther than this from the expected one is a jump [m, rad].
 JUMP_M, JUMP_RAD = 0.3, 0.8
 # A jump is accepted after this many poses that agree with each other.
 AGREEING = 5
-# Timeout of the pose: after it the robot may be anywhere [s].
+# Time without a pose after which any pose is accepted [s].
 FORGET_S = 2.0
 # Commands are stored for this long [s].
 REMEMBER_S = 1.0
-# Candidate delays [s], the initial one, and the decay of old poses from one pose to the next.
+# Candidate delays, the initial delay [s], and the factor by which each pose reduces old mismatches.
 DELAYS_S = tuple(0.03 * step for step in range(12))
 FIRST_DELAY_S = DELAYS_S[1]
 FORGETTING = 0.98
 # Least change of the commands from which the delay can be measured.
 VARIED_M_S, VARIED_RAD_S = 0.05, 0.2
-# Time constant of the pose filter [s]: poses scatter.
+# Time constant of the filter against noise of the poses [s].
 BLEND_S = 0.15
 
 
@@ -43,12 +43,12 @@ class Limits:
     """The limits of the base.
 
     Attributes:
-        speed: [m/s].
-        acceleration: and deceleration [m/s^2].
-        turn_rate: on the spot [rad/s].
-        turn_acceleration: [rad/s^2].
+        speed: largest speed [m/s].
+        acceleration: largest acceleration and deceleration [m/s^2].
+        turn_rate: largest turn rate on the spot [rad/s].
+        turn_acceleration: largest change of the turn rate [rad/s^2].
         steered: largest bend that is steered while driving [rad].
-        turn_radius: of the tightest arc [m]; 0 if it turns on the spot.
+        turn_radius: radius of the tightest arc [m]; 0 if it turns on the spot.
     """
 
     speed: float
@@ -79,15 +79,15 @@ class PoseEstimate:
     """Poses and commands in, the robot's pose at any time out.
 
     Args:
-        limits: of the base, which executes commands as fast as it can.
+        limits: limits of the base, which follows commands as fast as these allow.
 
     Attributes:
         jump: distance [m] and angle [rad] of the newest pose from the expected one; None if it is
             accepted.
         measured: the newest accepted pose, unfiltered.
-        commanded: motion along x and y [m] and turn [rad] that the commands up to that pose should
-            have caused, along the measured headings.
-        delay: between a command and its effect on an arriving pose [s].
+        commanded: motion along x and y [m], and turn [rad], commanded up to that pose, summed along
+            the measured headings.
+        delay: time from a command to the arrival of a pose that shows its effect [s].
     """
 
     def __init__(self, limits: Limits) -> None:
@@ -96,7 +96,7 @@ class PoseEstimate:
         self.delay = FIRST_DELAY_S
         # Mismatch between poses and commands, for each candidate delay.
         self._mismatches = [0.0] * len(DELAYS_S)
-        # The filtered pose, and the arrival of the newest one accepted.
+        # The filtered pose, and the arrival of the newest accepted pose.
         self._pose, self._pose_at = Pose2D(0.0, 0.0), -math.inf
         self.measured, self.commanded = self._pose, (0.0, 0.0, 0.0)
         self._doubted, self._agreeing = self._pose, 0
@@ -122,7 +122,7 @@ class PoseEstimate:
             self._accept(pose, pose, now)
 
     def sent(self, command: Command, now: float) -> None:
-        """Note the command sent to the base, in force from now on."""
+        """Note a command sent to the base now."""
         if self._sent:
             (before, last), limits = self._sent[-1], self._limits
             faster, rate = limits.acceleration * (now - before), limits.turn_acceleration

@@ -1,4 +1,4 @@
-"""The follower: paths, poses and heartbeats of the daemon in, a command and a state out.
+"""Follower of a base that takes velocities: paths, poses and heartbeats in, command and state out.
 
 No clock, no session: the caller passes the monotonic time.
 """
@@ -22,9 +22,9 @@ RATE_HZ = 20.0
 PERIOD_S = 1.0 / RATE_HZ
 # Zeros are sent for this long after a stop; then another program may drive [s].
 ZEROS_S = 1.0
-# The path leads in the direction of its point this far ahead [m].
+# Distance of the point ahead that gives the path's direction [m].
 LEADS_M = 0.5
-# Largest distance of the robot from its leg; beyond it the robot has left the path [m].
+# Distance from its leg beyond which the robot has left the path [m].
 OFF_PATH_M = 0.3
 
 
@@ -35,8 +35,8 @@ class Follower(Supervision):
         limits: of the base.
         patience: timeouts of pose and status.
         moves: whether the base executes the commands; in a dry run it does not.
-        sight: finds obstacles that the map does not show; None to go by the map alone.
-        radius: of the robot's disc [m]; 0 if unknown.
+        sight: finds obstacles that the map does not show; None to use the map alone.
+        radius: radius of the robot's disc [m]; 0 if unknown.
     """
 
     def __init__(
@@ -54,14 +54,14 @@ class Follower(Supervision):
         self._estimate = PoseEstimate(limits)
         self._pursuit = (CurvePursuit if limits.turn_radius else Pursuit)(limits, PERIOD_S)
         self._grip = Grip()
-        # The route that is driven, and the one to join.
+        # The route that is driven, and the route to join next.
         self._route: Route | None = None
         self._next: Route | None = None
         self._driven_at = -math.inf
         self._stepped_at: float | None = None
 
     def step(self, now: float) -> Command | None:
-        """Return the command to send now; None for none."""
+        """Return the command to send now, or None."""
         if self._stepped_at is not None:
             self._pursuit.passed(now - self._stepped_at)
         self._stepped_at = now
@@ -78,7 +78,7 @@ class Follower(Supervision):
         return command
 
     def take_scan(self, payload: bytes, now: float) -> None:
-        """Take in a scan on arrival; before the first pose it cannot be placed."""
+        """Take in a scan on arrival; before the first pose it is ignored."""
         if self._sight is not None and self.newest_pose is not None:
             self._sight.take_scan(payload, self._estimate.at(now - self._estimate.delay), now)
 
@@ -138,7 +138,7 @@ class Follower(Supervision):
         return command
 
     def _limit(self, pose: Pose2D, route: Route) -> Limit:
-        """Return what the scan allows."""
+        """Return the limit that the scan sets."""
         if self._sight is None or not self._sight.things:
             return NO_LIMIT
         line = route.line_ahead((pose.x, pose.y), AHEAD_M)

@@ -1,9 +1,9 @@
 """Check that the base moves as commanded: a base that pushes against an obstacle must stop.
 
-Poses scatter, so no two of them are compared: all poses of a look are fitted to the commanded
-motion. The measured share of that motion is about 1 for a robot that moves and 0 for one that does
-not, however it drives and turns. Scatter raises the share as often as it lowers it: if scatter
-hides all motion, one look in two ends in a pause.
+Poses are noisy, so all poses of an interval are fitted to the commanded motion. The fitted share of
+that motion is about 1 for a robot that moves and 0 for one that does not, however it drives and
+turns. Noise raises the share as often as it lowers it: if noise hides all motion, every second
+interval ends in a pause.
 
 While a robot rests, averaged poses show whether something moves it.
 """
@@ -23,9 +23,9 @@ MEAN_S = 1.0
 # The robot was moved if an average is this far [m] from the one this many averages earlier; slower
 # motion is drift of the poses.
 MOVED_M, MEANS = 0.1, 5
-# If poses scatter, the distance is larger: this many times the usual step from one average to the
-# next. The usual step is the median of the last steps, at least of so many: a few steps of a moved
-# robot do not change it. With normal noise, scatter alone moves one average in 2^(4^2) that far.
+# Noise adds to that distance: this many times the median step from one average to the next. Number
+# of last steps for the median, and least number. The few steps of a moved robot hardly change it.
+# Normal noise alone moves one average in 2^(4^2) that far.
 SCATTERS, STEPS, LEAST_STEPS = 4.0, 30, 6
 
 # Position and turn, as lengths [m].
@@ -43,11 +43,11 @@ class Rest:
 
     @property
     def least(self) -> float:
-        """The distance from which on it counts as moved [m]."""
+        """The least distance that proves that the robot was moved [m]."""
         return MOVED_M + SCATTERS * median(self._steps or (0.0,))
 
     def begin(self, now: float) -> None:
-        """Begin a rest; the measured scatter of the poses is kept."""
+        """Begin a rest; the measured noise of the poses is kept."""
         self._poses.clear()
         self._means.clear()
         self._ends = now + MEAN_S
@@ -67,11 +67,11 @@ class Rest:
         return len(self._steps) >= LEAST_STEPS and far >= self.least
 
 
-# A look takes at least this commanded distance [m], of which the robot must have moved this share;
-# a radian of turning counts as the third value [m]. It also takes at least this time [s] and this
-# number of poses.
+# Least commanded distance of an interval [m], the share of it that the robot must have moved, and
+# the distance that a turn counts as [m/rad]; least duration of an interval [s], and number of
+# poses.
 LEAST_WAY_M, LEAST_SHARE, WAY_M_RAD = 0.2, 0.15, 0.2
-LOOK_S, LEAST_POSES = 2.0, 3
+INTERVAL_S, LEAST_POSES = 2.0, 3
 # Pause after the first try [s], doubled after the next, and number of tries in a direction. After
 # the last try the robot waits until it is moved, or the path leads elsewhere.
 REST_S = 2.0
@@ -84,7 +84,7 @@ class Grip:
     def __init__(self) -> None:
         self._tries = Tries(MOVED_M, REST_S, math.inf, TRIES)
         self._rest = Rest()
-        self._look = _Look()
+        self._interval = _Interval()
         self._toward = 0.0
         self._rests = False
         self._pose, self._turned = Pose2D(0.0, 0.0), 0.0
@@ -102,7 +102,7 @@ class Grip:
 
         Args:
             estimate: the estimate, with the newest pose, and the motion commanded up to that pose.
-            toward: the direction in which the path leads [rad].
+            toward: the path's direction [rad].
             now: the time [s].
         """
         self._toward = toward
@@ -118,29 +118,29 @@ class Grip:
                 return True
             self._tries.forget()
         if self._rests:
-            self._rests, self._look = False, _Look()
-        look = self._look
-        if is_new or not look.count:
+            self._rests, self._interval = False, _Interval()
+        done = self._interval
+        if is_new or not done.count:
             x, y, turn = estimate.commanded
-            look.take(place, (x, y, WAY_M_RAD * turn))
-        if look.seconds < LOOK_S or look.way < LEAST_WAY_M or look.count < LEAST_POSES:
+            done.take(place, (x, y, WAY_M_RAD * turn))
+        if done.seconds < INTERVAL_S or done.way < LEAST_WAY_M or done.count < LEAST_POSES:
             return False
-        self._look = _Look()
-        if look.share() >= LEAST_SHARE:
-            self._tries.moved_to(look.middle())
+        self._interval = _Interval()
+        if done.share() >= LEAST_SHARE:
+            self._tries.moved_to(done.middle())
             return False
-        self._tries.failed(look.middle(), toward, now)
+        self._tries.failed(done.middle(), toward, now)
         return True
 
     def sent(self, command: Command, seconds: float) -> None:
         """Note a command and its duration."""
         if way := seconds * (abs(command.speed) + WAY_M_RAD * abs(command.turn_rate)):
-            self._look.way += way
-            self._look.seconds += seconds
+            self._interval.way += way
+            self._interval.seconds += seconds
 
 
-class _Look:
-    """Poses over commanded motion, by least squares.
+class _Interval:
+    """Poses of an interval, fitted to the commanded motion by least squares.
 
     Attributes:
         way, seconds: commanded distance [m], and its duration [s].

@@ -1,8 +1,8 @@
-"""A follower's inputs by cycle: poses, paths and heartbeats of the daemon, scans, maps, and time.
+"""Inputs of a follower by cycle: poses, paths and heartbeats of the daemon, scans, maps, and time.
 
 The time is the computer's, or a simulation's by the stamps of its poses. A simulation runs at a
-multiple of the real speed, and slower where the computer cannot keep up. By the computer's time, a
-follower would consider fresh poses old, and expect the robot further ahead than it is.
+multiple of real time, or slower if the computer cannot keep up. By the computer's time, a follower
+would then consider fresh poses old, and expect the robot too far ahead.
 """
 
 from __future__ import annotations
@@ -29,37 +29,38 @@ from fasaco_edge.wire.limits import MAX_SCAN_BEAMS
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import TF_MESSAGE
 
-# A simulation's time advances at most this far without a pose [s]: poses come ten times a second.
+# A simulation's time advances at most this far without a pose [s], as poses come ten times a
+# second.
 LEAD_S = 0.09
-# After this long without a pose the simulation has stopped, and time goes on [s, real].
+# After this real time without a pose [s], the simulation has stopped, and time goes on.
 SILENT_S = 2.0
 # Stamps that jump back, or forward by more than this, come from another simulation [s].
 JUMP_S = 5.0
 
 
 class Clock:
-    """The robot's time: the computer's, or a simulation's; it never goes back.
+    """The robot's time, which is the computer's or a simulation's, and never goes back.
 
     Args:
-        pace: simulated seconds in a second; 1 for the computer's time.
+        pace: simulated seconds per second; 1 for the computer's time.
     """
 
     def __init__(self, pace: float) -> None:
         self._pace = pace
         self._stamp_ns: int | None = None
         # The simulation's time at the newest pose, and the arrival of that pose.
-        self._time = self._heard_at = 0.0
+        self._time = self._received_at = 0.0
 
     def at(self, now: float) -> float:
         """Return the robot's time at a monotonic time of the computer."""
         if self._stamp_ns is None:
             return now * self._pace
-        since = max(now - self._heard_at, 0.0)
+        since = max(now - self._received_at, 0.0)
         lead = min(since * self._pace, LEAD_S)
         return self._time + lead + max(since - SILENT_S, 0.0) * self._pace
 
-    def hear(self, stamp_ns: int, now: float) -> float:
-        """Take in the stamp of a pose that arrived then; return the robot's time of its arrival."""
+    def take_stamp(self, stamp_ns: int, now: float) -> float:
+        """Take in the stamp of a pose that arrived at ``now``; return the robot's time of that."""
         if self._pace == 1.0:
             return now
         time = self.at(now)
@@ -67,17 +68,17 @@ class Clock:
             step = (stamp_ns - self._stamp_ns) * 1e-9
             if 0.0 <= step <= JUMP_S:
                 time = max(time, self._time + step)
-        self._stamp_ns, self._time, self._heard_at = stamp_ns, time, now
+        self._stamp_ns, self._time, self._received_at = stamp_ns, time, now
         return time
 
 
 LOG = logging.getLogger(__name__)
-# Limit on the poses that wait for the next cycle; beyond it the oldest are dropped.
+# Largest number of poses that wait for the next cycle; further ones displace the oldest.
 MOST_POSES = 256
 
 
 class WatchedPublisher(OnePublisher):
-    """The publisher of an input that counts; another one is logged."""
+    """The one publisher whose samples of an input count; a conflict with another one is logged."""
 
     _logged = ""
 
@@ -120,7 +121,7 @@ class Inputs:
         news = self.news = self._daemons.news()
         follower.take_planner(news.planner)
         if news.status_at is not None:
-            follower.heard_status(news.status_at)
+            follower.take_heartbeat(news.status_at)
         while self._poses:
             sample, source, came_at = self._poses.popleft()
             # Each link of a chain of transforms has a publisher of its own.
@@ -139,7 +140,7 @@ class Inputs:
                 follower.pose_fault = error
                 continue
             if pose is not None:
-                follower.take_pose(pose, self._clock.hear(pose.stamp_ns, came_at))
+                follower.take_pose(pose, self._clock.take_stamp(pose.stamp_ns, came_at))
             follower.link = self._decoder.oldest_link
         self._publisher.log()
         if news.path is not None:
@@ -157,11 +158,12 @@ class Inputs:
         self._daemons.take_status(sample.payload, self.now())
 
 
-# Only the newest scans count, and the newest map with its updates.
+# Largest numbers of waiting scans, and of waiting messages of maps; further ones displace the
+# oldest.
 MOST_SCANS, MOST_UPDATES = 2, 256
-# A scan has a range and an intensity for each beam, some numbers and a name.
+# Largest size of a scan: a range and an intensity for each beam, and the rest.
 MOST_SCAN_BYTES = 8 * MAX_SCAN_BEAMS + 1024
-# A map has a byte for each pixel, and this much more.
+# Largest size of a map, without its pixels of one byte each.
 HEADER_BYTES = 1024
 
 MAP, UPDATE, SCAN = topics.MAP.name, topics.MAP_UPDATE.name, topics.SCAN.name
@@ -191,7 +193,7 @@ class ScanInputs:
             bus.subscribe(key, takers[name], latched, depth, in_order=in_order)
 
     def feed(self, follower: Follower, time_of: Callable[[float], float]) -> None:
-        """Pass maps to the sight, scans to a follower; ``time_of``: as of ``Inputs``."""
+        """Pass maps to the sight, scans to a follower; ``time_of``: see ``Inputs.time_of``."""
         while self._maps:
             is_update, payload = self._maps.popleft()
             self.sight.take_map(payload, is_update=is_update)
@@ -209,6 +211,6 @@ class ScanInputs:
         if sample.size > self._most_map_bytes:
             return
         if not is_update:
-            # A new map replaces all before it.
+            # A new map replaces all earlier ones.
             self._maps.clear()
         self._maps.append((is_update, sample.payload))

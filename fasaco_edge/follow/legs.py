@@ -1,8 +1,8 @@
-"""Legs of a path: straight parts, and how fast a robot can turn from each to the next.
+"""Legs of a path: straight parts, and the speed at which a robot can turn from each to the next.
 
-It turns as on the spot, up to the limits of the base, and begins so early that half of the turn is
-done beside the corner. The turn takes the same time at any speed, so the distance from the corner
-is proportional to the speed: the allowed distance determines the speed.
+While driving, the robot turns as fast as on the spot, and begins early enough to have done half of
+the turn when it passes the corner. The turn takes the same time at any speed, so the distance from
+the corner is proportional to the speed: the allowed distance determines the speed.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from functools import lru_cache
 from fasaco_edge.follow.estimate import Limits
 from fasaco_edge.grid.geometry import Point, Pose2D
 
-# Shorter legs have no direction of their own [m].
+# Least length of a leg [m].
 LEAST_LEG_M = 1e-3
 # Cosine of the angle up to which two legs lead in the same direction.
 SAME_DIRECTION = math.cos(0.1)
-# A corner is passed within this distance [m]: less than a map resolves, and less than poses
-# scatter.
+# Largest distance from a rounded corner [m], below the map's resolution and the noise of poses.
 ROUNDED_M = 0.02
 # At sharper corners the robot turns on the spot [rad].
 SHARP_RAD = math.radians(135.0)
@@ -33,12 +32,12 @@ class Leg:
     """A straight part of the path.
 
     Attributes:
-        start, end: [m].
+        start, end: its ends (x, y) [m].
         ux, uy: its direction, of length 1.
-        length: [m].
-        most: greatest speed at its end [m/s]: 0 where the robot has to come to rest, infinity where
-            it just steers.
-        early_s: how long before its end the robot begins to turn there, if it rounds a corner [s].
+        length: its length [m].
+        most: greatest speed at its end [m/s]: 0 if the robot has to come to rest, infinity if it
+            only steers.
+        early_s: time before its end at which the robot begins to turn, if it rounds a corner [s].
         is_back: whether it is driven backward.
     """
 
@@ -58,7 +57,7 @@ class Leg:
 
     @property
     def bends(self) -> bool:
-        """Whether it just steers at its end."""
+        """Whether the robot only steers at its end."""
         return self.most == math.inf
 
     def placed(self, point: Point) -> tuple[float, float]:
@@ -82,7 +81,7 @@ class Leg:
 
 
 def apart(poses: Iterable[Pose2D], least: float) -> Iterator[Pose2D]:
-    """Yield the poses that are at least so far from the one yielded before [m]."""
+    """Yield the poses that are at least ``least`` [m] from the one yielded before."""
     last = None
     for pose in poses:
         if last is None or math.hypot(pose.x - last.x, pose.y - last.y) >= least:
@@ -98,11 +97,11 @@ def leg_between(start: Point, end: Point) -> Leg:
 
 @lru_cache(maxsize=1024)
 def times(turn: float, turn_rate: float, turn_acceleration: float) -> tuple[float, float]:
-    """Return how long before a corner its turn begins [s], and how far from the corner the robot
-    passes, as seconds of driving [s].
+    """Return how long before a corner the turn begins [s], and the distance at which the robot
+    passes the corner, divided by its speed [s].
 
     Args:
-        turn: in the corner, above 0 and below pi [rad].
+        turn: angle of the corner, above 0 and below pi [rad].
         turn_rate, turn_acceleration: limits of the base [rad/s, rad/s^2].
     """
     ramp_s = min(math.sqrt(turn / turn_acceleration), turn_rate / turn_acceleration)
@@ -115,7 +114,7 @@ def times(turn: float, turn_rate: float, turn_acceleration: float) -> tuple[floa
         turned += turn_acceleration * ramp_s * max(now - ramp_s, 0.0)
         along += step_s * math.cos(turned)
         aside += step_s * math.sin(turned)
-    # Half of the turn is done on the line that halves the corner.
+    # The robot has done half of the turn on the bisector of the corner.
     return along + aside * math.tan(0.5 * turn), aside / math.cos(0.5 * turn)
 
 
@@ -123,12 +122,12 @@ def rounding(turn: float, room: float, limits: Limits) -> tuple[float, float]:
     """Return the greatest speed in a corner [m/s], and how long before it the turn begins [s].
 
     Args:
-        turn: in the corner, 0 or more [rad].
-        room: way before and after the corner that the turn may take [m].
+        turn: angle of the corner, 0 or more [rad].
+        room: distance before and after the corner that the turn may take [m].
         limits: of the base.
 
     Returns:
-        a speed of 0 where the robot has to turn on the spot, and infinity where it steers.
+        a speed of 0 if the robot has to turn on the spot, infinity if it only steers.
     """
     if turn <= limits.steered:
         return math.inf, 0.0

@@ -1,11 +1,12 @@
 """Nav2's controller as follower: paths, poses, heartbeats and replies in, requests out.
 
-A goal is a piece of the path that begins at the robot. The next one is sent before the robot
-reaches the end: Nav2 switches to it without a stop. Where the path returns to itself, that piece
-begins only shortly before the end: a controller continues at the nearest part of a path, and would
-skip the rest of the last goal. The last pose of a goal has the heading in which the path leads on:
-the robot turns while the next goal is under way. A robot that cannot turn on the spot gets pieces
-of a curve, each driven forward or backward as a whole. No clock, no session.
+A goal is a piece of the path that begins at the robot. The next goal is sent before the robot
+reaches the end of the last one, so that Nav2 switches without a stop. Where the path returns to
+itself, the next piece begins only shortly before that end: a controller continues at the nearest
+part of a path, and would skip the rest of the last goal. The last pose of a goal has the heading of
+the path beyond it, so that the robot turns there until the next goal arrives. A robot that cannot
+turn on the spot gets pieces of a curve, each driven forward or backward as a whole. No clock, no
+session.
 """
 
 from __future__ import annotations
@@ -37,29 +38,30 @@ from fasaco_edge.wire.messages.follow_path import (
 )
 from fasaco_edge.wire.messages.path_points import PathPoints
 
-# The next goal is sent this far before the end of the last one [m], plus the distance driven in
-# this many seconds.
+# The next goal begins at most this far before the end of the last one [m], plus the distance driven
+# in this time [s].
 AHEAD_M, AHEAD_S = 0.5, 3.0
-# It is sent this far before the robot reaches the start of the new goal [m].
+# It is sent when the robot is this far from its start [m].
 EARLY_M = 0.05
-# A path is driven only if the robot is this near to its beginning, a part of this length [m].
+# Length of a path's beginning, and largest distance of the robot from it for the path to be driven
+# [m].
 BEGINNING_M = 1.0
-# An unanswered goal counts as driven once the robot has moved this far on it [m].
+# An unanswered goal counts as accepted once the robot has moved this far on it [m].
 DRIVES_M = 0.15
-# A goal that Nav2 reports as done is not done if the robot is this far from its end [m].
+# A goal that Nav2 reports as done is not done if the robot is farther than this from its end [m].
 DONE_M = 0.5
 # Pause after an error before the next goal [s], doubled each time up to the maximum until the robot
 # has moved this far [m] or the path leads elsewhere, by its direction this far ahead [m].
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
 PROGRESS_M, LEADS_M = 0.5, 0.5
-# A robot that has moved less than this in this time stands [m, s]; near the end of its goal it
-# counts as standing sooner. Then the result, whose message may have been lost, is queried again;
-# after a longer timeout the goal is given up [s].
+# A robot stands if it has moved less than MOVED_M [m] for STANDS_S, or near the end of its goal for
+# ARRIVED_S [s]. Then the result is queried again, as a reply may be lost; after GIVE_UP_S the goal
+# is given up.
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
 # A server that ends a query for a result sooner, without a reply, is gone [s].
 GONE_S = 290.0
-# Time constant of the filtered position that shows whether it stands [s]: poses scatter.
+# Time constant of the filter of the positions that show whether the robot stands [s].
 STEADY_S = 1.0
 
 # Nav2 gives no error code if another client's goal has replaced a goal; Humble has no error codes.
@@ -71,8 +73,8 @@ class SendPiece(SendGoal):
     """A request to follow points [m] in a frame.
 
     Attributes:
-        end_yaw: heading at the last point [rad]; None for that with which the robot arrives.
-        is_back: whether it is driven backward: headings are opposite to the way.
+        end_yaw: heading at the last point [rad]; None to keep the heading of arrival.
+        is_back: whether it is driven backward: headings are opposite to the motion.
     """
 
     points: list[Point]
@@ -85,11 +87,11 @@ class Nav2Follower(Supervision):
     """Sends the newest path to Nav2's controller, piece by piece, while all inputs are up to date.
 
     Args:
-        near: least distance of a piece to itself [m].
-        speed: of the robot [m/s].
+        near: least distance between separate stretches of a piece [m], see ``pieces``.
+        speed: largest speed of the robot [m/s].
         new_id: makes the id of a goal.
         patience: timeouts of pose and status.
-        radius: of the robot's disc [m]; 0 where that is not known.
+        radius: radius of the robot's disc [m]; 0 if unknown.
         is_curved: whether the robot cannot turn on the spot, so that paths are curves.
     """
 
@@ -107,14 +109,14 @@ class Nav2Follower(Supervision):
         self._near, self._ahead = near, AHEAD_M + AHEAD_S * speed
         self._new_id = new_id
         self._radius, self._is_curved = radius, is_curved
-        # The robot's position; and filtered against the scatter of single poses.
+        # The robot's position, and the filtered position.
         self._here: Point = (0.0, 0.0)
         self._steady: Point = (0.0, 0.0)
         self._moved_last: tuple[Point, float] | None = None
         self._path: PathDriven | None = None
         # The path that replaces the present one, once Nav2 has answered the pending request.
         self._next: Line | None = None
-        # The goal that Nav2 drives, and the one sent but not answered yet.
+        # The goal that Nav2 drives, and the goal sent but not answered yet.
         self._active: Goal | None = None
         self._pending: Goal | None = None
         self._asked_at = -math.inf
@@ -144,7 +146,7 @@ class Nav2Follower(Supervision):
             self._fail(State.NO_NAV2, why, now)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether Nav2 accepted a goal; None without an answer: then Nav2 must end it."""
+        """Take in whether Nav2 accepted a goal; None without an answer: it is cancelled."""
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
@@ -164,7 +166,7 @@ class Nav2Follower(Supervision):
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
-        """Take in how a goal ended; None if Nav2 will not answer: it may still drive the goal."""
+        """Take in how a goal ended; None if that is unknown: it is cancelled."""
         if self._active is None or self._active.id != goal_id:
             return
         goal, self._active = self._active, None
@@ -192,14 +194,14 @@ class Nav2Follower(Supervision):
             self._fail(State.NO_NAV2, "Nav2 does not know the goal: was it restarted?", now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
-        """Take in that a query for a result ended without one; if soon, the server is gone."""
+        """Take in that a query for a result ended without a reply: if soon, the server is gone."""
         if waited_s < GONE_S:
             self.take_ending(goal_id, None, "it went away", now)
         elif self._active is not None and self._active.id == goal_id:
             self._requests.append(AskResult(goal_id))
 
     def _drive(self, now: float) -> bool:
-        """Send what is due; return whether there is a path from here."""
+        """Send the goals that are due; return whether the path can be driven from here."""
         if self._path is not None:
             self._tries.moved_to(self._here)
             # The robot may also be on an unanswered goal, as answers may be lost.
@@ -254,9 +256,9 @@ class Nav2Follower(Supervision):
         self._requests.append(SendPiece(goal.id, points, self.path_frame, yaw, is_back))
 
     def _join(self, line: Line, now: float) -> bool:
-        """Switch to a new path, unless it begins elsewhere; return whether it does not.
+        """Switch to a new path if it begins near the robot; return whether it does.
 
-        If it is the same ahead, Nav2 keeps its goal.
+        If the path does not change up to the end of Nav2's goal, Nav2 keeps the goal.
         """
         way, far = line.nearest(self._here, 0.0, line.length(BEGINNING_M))
         if far > BEGINNING_M:
@@ -271,16 +273,16 @@ class Nav2Follower(Supervision):
         assert before is not None
         shift = before.shift_to(line, way, goal)
         if shift is None:
-            # Nav2 switches to it from its present goal.
+            # Nav2 switches from its present goal to this one.
             self._send(path, way)
         else:
             goal.start, goal.end = goal.start + shift, goal.end + shift
-            # The rest may be another line.
+            # The path may change beyond the goal.
             goal.next_start = None
         return True
 
     def _watch(self, path: PathDriven, goal: Goal, now: float) -> None:
-        """Query again, or give up, if the robot stands."""
+        """Query the result again, or give up the goal, if the robot stands."""
         if self._moved_last is None or math.dist(self._steady, self._moved_last[0]) > MOVED_M:
             self._moved_last = (self._steady, now)
         stands_s = now - self._moved_last[1]
@@ -303,7 +305,7 @@ class Nav2Follower(Supervision):
             self._tries.failed(self._here, self._toward(self._path), now, for_good=for_good)
 
     def _toward(self, path: PathDriven) -> float:
-        """Return the direction from the robot to where a path leads [rad]."""
+        """Return the direction from the robot to the path's point LEADS_M ahead [rad]."""
         x, y = path.line.at(path.way + LEADS_M)
         return math.atan2(y - self._here[1], x - self._here[0])
 

@@ -1,4 +1,4 @@
-"""Nav2's controller on the bus: the follower's requests as queries, their replies by cycle."""
+"""Nav2's controller on the bus: sends the follower's requests, and passes on replies by cycle."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Nav2Node(Node):
             bus.token(RosNode(ros["domain"], bus.id, ros["namespace"], ros["node"]).token)
 
     def end(self) -> None:
-        """Stop the robot, and wait for Nav2's word."""
+        """Stop the robot, and wait for Nav2's confirmation."""
         super().end()
         self._ask(self._follower.end())
         self._client.end()
@@ -70,7 +70,7 @@ class Nav2Node(Node):
         self._client.ask(piece, goal)
 
     def _release(self) -> tuple[Release | None, str]:
-        """Return the ROS release of the server's goals; or why none can be sent."""
+        """Return the ROS release of the server, or None and why no goal can be sent."""
         settings, keys = self._settings, self._client.keys()
         if not self._client.is_seen:
             return settings.nav2["release"], ""

@@ -1,4 +1,4 @@
-"""The follower on the bus: a loop of twenty cycles a second from samples to commands."""
+"""Follower on the bus: a loop of twenty cycles a second from samples to commands."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Node:
         self._due = -math.inf
 
     def turn(self) -> None:
-        """Run a cycle: take the inputs, step the follower, send what it wants, and report."""
+        """Run a cycle: take the inputs, step the follower, send its output, and report."""
         follower, inputs = self._follower, self._inputs
         inputs.feed(follower)
         now = inputs.now()
@@ -80,10 +80,10 @@ class Node:
 
     @abstractmethod
     def _step(self, now: float) -> None:
-        """Step the follower, and send what it wants."""
+        """Step the follower, and send its output."""
 
     def _is_due(self, now: float) -> bool:
-        """Return whether a cycle is due in simulated time: it may run slower than its pace."""
+        """Return whether a cycle is due in simulated time, which may run slower than ``pace``."""
         if self._settings.pace == 1.0:
             return True
         if now < self._due - LEAST_S:
@@ -146,8 +146,7 @@ class FollowerNode(Node):
 
 
 def _velocities(bus: Bus, settings: FollowSettings) -> Publisher | RosPublisher:
-    """Return the publisher of velocities; in ROS 2 under the key of their topic, by a node that
-    rmw_zenoh sees."""
+    """Return the publisher of velocities; for rmw_zenoh, also declare its node and topic."""
     out = bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
     ros, gid = settings.ros, b""
     if not ros:
@@ -185,7 +184,7 @@ def run_follower(
 ) -> None:
     """Drive the base along the path until ``stop`` is set; then stop the base.
 
-    ``report`` is called with what would be sent in a dry run.
+    In a dry run, ``report`` is called with the text of what would be sent.
     """
     bus = join(BusSettings("client", settings.connect, secured=settings.secured), stop)
     if bus is None:

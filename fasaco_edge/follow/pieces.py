@@ -1,8 +1,8 @@
 """Pieces of a path that neither cross nor approach themselves: the goals of Nav2's controller.
 
 A coverage path crosses and touches itself. A controller with the whole path would continue at the
-nearest part, and finish wherever the end is near. So it gets a simple piece at a time: two poses
-further apart along the piece than ``APART`` times ``near`` have a distance of at least ``near``.
+nearest part, and finish wherever the end is near. So it gets one simple piece at a time: two poses
+of a piece whose distance along it exceeds ``APART`` times ``near`` are at least ``near`` apart.
 """
 
 from __future__ import annotations
@@ -15,35 +15,37 @@ from dataclasses import dataclass
 from fasaco_edge.follow.legs import apart
 from fasaco_edge.grid.geometry import Point, Pose2D
 
-# Spacing of the poses of a piece [m]: controllers search the nearest one.
+# Largest spacing of the poses of a piece [m].
 STEP_M = 0.05
-# Poses that are up to this many times ``near`` apart along a piece may be near each other, as in a
-# bend of up to 120 degrees.
+# Distance along a piece up to which poses may be near each other, as in a bend of up to 120 degrees
+# [``near``].
 APART = 2.0
-# At a sharper bend the robot turns on the spot: a piece preferably ends there [rad].
+# Angle of a bend above which the robot turns on the spot, so that a piece preferably ends there
+# [rad].
 CORNER_RAD = math.radians(60.0)
 # Longest piece [m].
 MOST_M = 20.0
-# A robot that cannot turn on the spot changes between forward and backward at a sharper bend [rad].
+# Angle of a bend above which a robot that cannot turn on the spot changes between forward and
+# backward [rad].
 REVERSAL_RAD = math.radians(120.0)
 # Points nearer to each other than this count as one [m].
 LEAST_M = 1e-3
 
 
 class Line:
-    """A path parametrised by arc length, from 0 at its start; read as far as it is needed."""
+    """A path parametrised by arc length, from 0 at its start, and read lazily."""
 
     def __init__(self, poses: Iterable[Pose2D], *, is_curved: bool = False) -> None:
         self._coming = apart(poses, LEAST_M)
         # Whether the robot cannot turn on the spot, and may drive backward.
         self._is_curved = is_curved
-        # Robot's heading at its beginning [rad].
+        # Heading of the robot at the beginning [rad].
         self._yaw = 0.0
         self._points: list[Point] = []
         self._ways: list[float] = []
 
     def length(self, most: float) -> float:
-        """Return its length, at most ``most`` [m]."""
+        """Return its length, or ``most`` if it is longer [m]."""
         while not self._ways or self._ways[-1] < most:
             pose = next(self._coming, None)
             if pose is None:
@@ -58,7 +60,7 @@ class Line:
         return most
 
     def at(self, way: float) -> Point:
-        """Return the point at an arc length [m]; the end or begin for values beyond."""
+        """Return the point at an arc length [m]; for values beyond, the beginning or end."""
         self.length(way)
         index = bisect_right(self._ways, way)
         if not 0 < index < len(self._ways):
@@ -68,10 +70,8 @@ class Line:
         return x + share * (to_x - x), y + share * (to_y - y)
 
     def nearest(self, here: Point, start: float, stop: float) -> tuple[float, float]:
-        """Return the arc length between two limits nearest to a point, and the distance [m].
-
-        Of equally near ones the first counts.
-        """
+        """Return the arc length of the point nearest to ``here`` between two limits, and the
+        distance [m]; of equally near points, the first."""
         self.length(stop)
         best, best_m = start, math.dist(self.at(start), here)
         index = bisect_right(self._ways, start)
@@ -96,7 +96,7 @@ class Line:
         """Return the arc lengths between two limits where the robot turns back, in order [m].
 
         A piece ends there: the robot comes to rest, and a controller that may reverse would cut
-        the ends of lanes. One that turns on the spot always drives forward.
+        the ends of lanes. A robot that turns on the spot always drives forward.
         """
         return self.bends(start, stop, REVERSAL_RAD) if self._is_curved else []
 
@@ -123,7 +123,7 @@ class Line:
         return found
 
     def ways(self, start: float, stop: float) -> list[float]:
-        """Return arc lengths between two, ``STEP_M`` apart and at each corner [m]."""
+        """Return arc lengths between two, up to ``STEP_M`` apart, with each bend [m]."""
         first, last = bisect_right(self._ways, start), bisect_right(self._ways, stop)
         bends = [way for way in self._ways[first:last] if start < way < stop]
         ways = [start]
@@ -138,19 +138,19 @@ class Line:
 def end_of_piece(line: Line, start: float, near: float) -> float:
     """Return the end of a piece that begins at ``start``, as arc length [m].
 
-    If it must end before the line does, it ends at a corner of the last ``APART`` times
-    ``near``, if there is one: the robot stops there anyway.
+    A piece that must end before the line does ends at the last corner, if one is not far before:
+    the robot stops there anyway.
 
     Args:
         line: the path.
-        start: where the piece begins [m].
-        near: least distance of the piece to itself [m].
+        start: arc length where the piece begins [m].
+        near: least distance between separate stretches of the piece [m].
     """
     stop = line.length(start + MOST_M)
     stop = min([stop, *line.reversals(start + LEAST_M, stop)])
     ways = line.ways(start, stop)
     points = [line.at(way) for way in ways]
-    # By square, the poses that are far enough behind to count; they are added as the piece grows.
+    # The poses that are far enough behind along the piece to count, by square of the plane.
     seen: dict[tuple[int, int], list[int]] = {}
     filed = 0
     for index, (way, (x, y)) in enumerate(zip(ways, points, strict=True)):
@@ -174,17 +174,17 @@ GAIN_M = 0.3
 # Where the path returns to itself, the next goal begins this far before the end of the last one
 # [m]: the part skipped there is less than half of a tool.
 TIP_M = 0.1
-# If a part before that point returns to itself, the next goal begins earlier: one of these shares
-# of the usual distance before the end.
+# Distances before the end of the last goal at which the next goal may begin, in order of
+# preference, as shares of the largest.
 SHARES = (1.0, 0.6, 0.35, 0.2)
-# A goal that begins early extends beyond the last one by as much as it begins before that one's
-# end, up to this [m].
+# The earlier a goal begins before the end of the last one, the farther it must extend beyond that
+# end: by the same distance, up to this [m].
 AMPLE_M = 2.0
 # Two paths nearer than this to each other are the same [m].
 SAME_M = 0.03
-# The robot is searched this far ahead along a goal [m].
+# Largest progress of the robot along a goal from one pose to the next [m].
 LOOK_AHEAD_M = 2.0
-# After its goal has ended the robot rolls on by at most this [m].
+# After its goal has ended, the robot rolls on by at most this [m].
 COAST_M = 0.5
 
 
@@ -195,7 +195,7 @@ class Goal:
     id: bytes
     start: float
     end: float
-    # Where the next one may begin [m]: infinite if it must wait for the end of this one; None if
+    # Where the next goal may begin [m]: infinite if it must wait for the end of this one; None if
     # that is not computed yet.
     next_start: float | None = None
 
@@ -205,8 +205,7 @@ class PathDriven:
 
     def __init__(self, line: Line, way: float) -> None:
         self.line, self.way = line, way
-        # End of the last finished goal: the next one begins there, even if the robot stopped
-        # elsewhere.
+        # End of the last finished goal: the next goal begins there, wherever the robot stopped.
         self._done = -1.0
 
     def finish(self, goal: Goal) -> None:
@@ -230,21 +229,22 @@ class PathDriven:
 
         Args:
             goal: the last goal.
-            ahead: how far before its end the piece begins if possible [m].
-            near: least distance of a piece to itself [m].
+            ahead: distance before its end at which the piece begins if possible [m].
+            near: least distance between separate stretches of a piece [m].
         """
         if self.line.reversals(goal.end - LEAST_M, goal.end):
             return math.inf  # the robot has to come to rest there
         for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
             start = max(goal.end - before_m, goal.start)
-            # A goal that begins early ends sooner: it must last until the next one arrives.
+            # A goal that begins early also ends early: it must last until the next one arrives.
             gain_m = max(min(before_m, AMPLE_M), GAIN_M)
             if end_of_piece(self.line, start, near) >= goal.end + gain_m:
                 return start
         return math.inf
 
     def heading_after(self, goal: Goal) -> float | None:
-        """Return the heading in which the line leads on after a goal [rad]; None at its end."""
+        """Return the heading of the line beyond a goal [rad]; None at the line's end, or where the
+        robot turns back."""
         if self.line.length(goal.end + STEP_M) < goal.end + STEP_M:
             return None
         if self.line.reversals(goal.end - LEAST_M, goal.end):
@@ -256,13 +256,14 @@ class PathDriven:
     def is_near_end(self, here: Point, goal: Goal, within: float) -> bool:
         """Return whether the robot is within a distance of the end of its goal [m].
 
-        Nav2 ends a goal by this distance, also where the robot has cut a bend before the end.
+        Nav2 ends a goal by this distance, even if the robot has cut a bend before the end.
         """
         is_last_part = goal.end - self.way <= COAST_M
         return is_last_part and math.dist(here, self.line.at(goal.end)) <= within
 
     def shift_to(self, line: Line, way: float, goal: Goal) -> float | None:
-        """Return the offset of a goal's rest along another line [m]; None if that diverges before.
+        """Return what to add to arc lengths of a goal for another line [m]; None if the lines
+        differ before the goal ends.
 
         ``way``: the robot's distance along the other line [m].
         """

@@ -1,4 +1,4 @@
-"""Velocities along a route: regulated pure pursuit on its legs, turns at its corners.
+"""Velocity commands along a route: regulated pure pursuit on its legs, turns at its corners.
 
 Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01:
 the robot steers the arc through a point of the path some way ahead, of curvature 2 y / L^2. The
@@ -20,27 +20,27 @@ from fasaco_edge.grid.motion import limited, stopping_rate
 
 # Lookahead time [s], and least lookahead distance [m].
 LOOKAHEAD_S, LOOKAHEAD_M = 0.8, 0.2
-# A stop is reached within this [m].
+# Distance within which the robot has reached a stop [m].
 ARRIVED_M = 0.005
-# Heading error below which a run begins, and above which the robot turns on the spot [rad].
+# Heading error below which the robot starts to drive, and above which it turns on the spot [rad].
 ALIGNED_RAD, MISALIGNED_RAD = 0.03, 0.2
-# A cycle counts as at most this many periods long; decay of the expected delay from one cycle to
-# the next.
+# Largest duration of a cycle taken into account [periods]; factor by which the expected delay
+# decays with each cycle.
 MOST_PERIODS = 4.0
 FORGETTING = 0.98
 
 Ends = list[tuple[float, float]]
-"""Corners ahead: how far away each is [m], and the greatest speed there [m/s]."""
+"""Corners ahead: distance of each [m], and the greatest speed there [m/s]."""
 
 
 class Pursuit:
-    """Drives along routes, from one command to the next.
+    """Commands along routes, one per cycle.
 
     On a busy computer a command comes late, and the robot drives on with the last one. The next
     command then brakes by as much as was possible since the last one. The robot also brakes
     earlier, by the distance that it would drive on in such a delay.
 
-    ``period``: from one command to the next [s].
+    ``period``: time from one command to the next [s].
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
@@ -48,7 +48,7 @@ class Pursuit:
         self._period = period
         # Whether the robot turns on the spot; and whether it cannot steer to the route.
         self._is_turning, self.is_lost = True, False
-        # Time since the last command, and the delay to expect of the next one [s].
+        # Time since the last command, and the expected delay of the next one [s].
         self._seconds, self._late = period, 0.0
         self.last = STAND
 
@@ -67,7 +67,7 @@ class Pursuit:
         return self._is_turning
 
     def brake(self) -> Command:
-        """Return the next command of braking."""
+        """Return the next command on the way to rest."""
         self._is_turning, self.last = True, Command(self._braked(), self._toward(0.0))
         return self.last
 
@@ -75,7 +75,7 @@ class Pursuit:
         """Return the next command, up to ``most`` [m/s]; ``STAND`` once the route is driven."""
         limits, here, self.is_lost = self._limits, (pose.x, pose.y), False
         route.pass_bends(here)
-        # Half a cycle early, so that the robot turns in the middle of a cycle, not after it.
+        # Half a cycle early, as a turn can begin only with a cycle.
         early = 0.5 * self._period * self.last.speed
         early_x, early_y = early * math.cos(pose.yaw), early * math.sin(pose.yaw)
         route.round_corner((pose.x + early_x, pose.y + early_y), self.last.speed)
@@ -134,26 +134,26 @@ class Pursuit:
         """Return the greatest speed from which the corners ahead can be passed [m/s]."""
         limits, most = self._limits, self._limits.speed
         for left, speed in ends:
-            # As if the robot came to rest beyond the corner.
+            # The robot brakes as if to a stop this far beyond the corner.
             further = min(speed, limits.speed) ** 2 / (2.0 * limits.acceleration)
             way = max(left + further - self.last.speed * self._late, 0.0)
             most = min(most, max(stopping_rate(way, limits.acceleration, self._period), speed))
         return most
 
     def _turning(self, error: float) -> float:
-        """Return the rate at which to turn by an angle [rad/s]."""
+        """Return the turn rate for a remaining angle [rad/s]."""
         limits = self._limits
         left = max(abs(error) - abs(self.last.turn_rate) * self._late, 0.0)
         rate = min(stopping_rate(left, limits.turn_acceleration, self._period), limits.turn_rate)
         return math.copysign(rate, error)
 
     def _sped(self, goal: float) -> float:
-        """Return the next speed on the way to a wanted speed [m/s]."""
+        """Return the next speed towards a wanted speed [m/s]."""
         most = self.last.speed + self._limits.acceleration * self._period
         return min(max(goal, self._braked()), most)
 
     def _braked(self) -> float:
-        """Return the lowest speed that the base can have come to [m/s]."""
+        """Return the lowest speed that the base can reach with this command [m/s]."""
         return max(self.last.speed - self._limits.acceleration * self._seconds, 0.0)
 
     def _toward(self, turn_rate: float) -> float:
@@ -162,20 +162,19 @@ class Pursuit:
         return limited(last, turn_rate, self._limits.turn_acceleration * seconds)
 
 
-# With the point ahead further off the heading than this, the robot has lost the curve [rad]; on the
-# curve it is a third of this at most.
+# Angle between the heading and the point ahead above which the robot has lost the curve [rad]; on
+# the curve, the angle stays below a third of this.
 BESIDE_RAD = math.radians(60.0)
-# On a curve the point ahead is at most this far away [turning radii]: arcs are hardly cut.
+# Largest lookahead distance on a curve [turning radii], so that arcs are hardly cut.
 MOST_AHEAD = 0.7
 
 
 class CurvePursuit(Pursuit):
-    """Drives along curves: pure pursuit by a base that cannot turn on the spot.
+    """Commands along curves: pure pursuit for a base that cannot turn on the spot.
 
-    No arc is tighter than the base's turning radius, and legs may be driven backward: then the
-    point ahead on the path lies behind the robot, and it steers as if it faced that point;
-    ``last`` has the speed in the direction of driving. It comes to rest where the path changes
-    between forward and backward.
+    No arc is tighter than the base's turning radius. A leg may be driven backward: then the robot
+    steers as if it faced backward, and ``last`` has the speed in the direction of driving. It comes
+    to rest where the path changes between forward and backward.
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
@@ -184,11 +183,11 @@ class CurvePursuit(Pursuit):
 
     @property
     def is_turning(self) -> bool:
-        """Never: it cannot turn on the spot."""
+        """False: the base cannot turn on the spot."""
         return False
 
     def brake(self) -> Command:
-        """Return the next command of braking."""
+        """Return the next command on the way to rest."""
         return self._sent(self._braked(), 0.0)
 
     def _along(self, pose: Pose2D, route: Route, along: float, ends: Ends, most: float) -> Command:
@@ -209,7 +208,7 @@ class CurvePursuit(Pursuit):
         return self._sent(*self._arc(error, far, min(most, self._most(ends))))
 
     def _sent(self, speed: float, rate: float) -> Command:
-        """Return the next command, which turns no tighter than the base can."""
+        """Return the next command, limited to the base's turning radius."""
         rate, tightest = self._toward(rate), speed / self._limits.turn_radius
         self.last = Command(speed, min(max(rate, -tightest), tightest))
         return Command(-speed if self._is_back else speed, self.last.turn_rate)

@@ -1,8 +1,8 @@
-"""The route along a path: legs, the corners to round or to stop at, and the robot's progress.
+"""Route along a path: legs, the corners to round or to stop at, and the robot's progress.
 
 A coverage path crosses and touches itself, so the robot's position does not determine its progress.
-The robot is always on one leg; it reaches the next one by driving this one to its end, never by
-being near it.
+The robot is always on one leg. It changes to the next leg only at the end of its leg, even if
+another leg is nearer.
 """
 
 from __future__ import annotations
@@ -17,17 +17,16 @@ from fasaco_edge.follow.estimate import Limits
 from fasaco_edge.follow.legs import LEAST_LEG_M, Leg, apart, leg_between, rounding
 from fasaco_edge.grid.geometry import Point, Pose2D
 
-# A new path is joined where it passes the robot within this distance of its start [m]: the robot
-# drove that stretch while the path was under way.
+# Largest distance from a new path's start at which the robot joins it [m]: the robot drove that far
+# while the path was planned and sent.
 JOIN_WITHIN_M = 0.3
-# It passes the robot if it is within this distance [m] and this angle of its heading [rad]. If
-# further away, the robot comes to rest, and drives to the nearest point, or to the path's start, if
-# one of them is this near [m].
+# Largest distance from a path [m], and angle to it [rad], to join it while driving. Else the robot
+# comes to rest, and drives to the nearest point or to the path's start, if within these [m].
 BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
-# A path is a continuation if it begins on the last one, between these distances ahead [m].
+# A path continues the last one if it begins on it, between these distances ahead [m].
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
-# A corner, or the place where a turn begins, was overshot by more than this [m].
+# Distance beyond a corner, or beyond the place where a turn begins, at which it is missed [m].
 MISSED_M = 0.03
 # A corner of the new path is the same as one of the old path if they are this near [m].
 SAME_M = 1e-3
@@ -44,17 +43,17 @@ class Joining(enum.Enum):
 
 
 class Route:
-    """A path, read as far as it is needed, and the leg of it that the robot is on."""
+    """A path, read lazily, and the leg that the robot is on."""
 
     def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
-        # Greatest speed in the corner that leads to the robot's leg [m/s]; 0 if it rounds none.
+        # Greatest speed in the corner that the robot rounds to its leg [m/s]; 0 without a corner.
         self.rounds = 0.0
         self._limits = limits
-        # Legs read so far, the first is the one that the robot is on; and those still to be read.
+        # Legs read so far, from the one that the robot is on; legs still to be read.
         self._legs: list[Leg] = []
         self._coming = self._legs_along(poses)
-        # How far the robot was from the corner that it returns to; infinity if it does not return
-        # [m].
+        # Distance by which the robot missed the corner that it returns to [m]; infinity if it does
+        # not return.
         self._missed_by = math.inf
 
     @property
@@ -65,10 +64,10 @@ class Route:
     def next_leg(self, here: Point | None = None) -> None:
         """Go on to the next leg.
 
-        A robot ``here``, at rest, that has overshot the corner by more than ``MISSED_M`` returns to
-        it first: the straight line to the next leg may cross a wall. It tries again only if that
-        brought it nearer: a robot whose pose is late, or not of the point that it turns about,
-        would otherwise circle for ever about a corner that it cannot hit.
+        A robot at rest at ``here`` that has missed the corner returns to it first: the straight
+        line to the next leg may cross a wall. It returns again only if that brought it nearer.
+        Otherwise, a robot with late poses, or poses of another point than it turns about, would
+        circle about the corner endlessly.
         """
         self._leg(1)
         corner = self._legs[0].end if self._legs else None
@@ -87,9 +86,9 @@ class Route:
             self.next_leg()
 
     def round_corner(self, here: Point, speed: float) -> None:
-        """Go on to the next leg where a robot of this speed [m/s] begins to turn there.
+        """Go on to the next leg if the robot, at this speed [m/s], has to begin the turn to it.
 
-        One that has passed that place by more than ``MISSED_M`` comes to rest at the corner.
+        A robot that has missed that place comes to rest at the corner instead.
         """
         leg = self.leg
         if leg is None or leg.stops or leg.bends:
@@ -102,8 +101,8 @@ class Route:
             self.rounds = leg.most
 
     def ends(self, along: float, horizon: float) -> list[tuple[float, float]]:
-        """Return how far ahead of ``along`` the robot must be slow [m], and its greatest speed
-        there [m/s]; at least one place, up to the next stop or beyond ``horizon`` [m]."""
+        """Return the places ahead that limit the speed: distance from ``along`` [m], and greatest
+        speed there [m/s]. The last is the next stop, or the first place beyond ``horizon`` [m]."""
         found: list[tuple[float, float]] = []
         left = -along
         for leg in self._ahead():
@@ -115,12 +114,12 @@ class Route:
         return found
 
     def carrot(self, along: float, ahead: float) -> Point:
-        """Return the point ``ahead`` of ``along`` the leg [m]; past a corner, straight on."""
+        """Return the point at ``along`` plus ``ahead`` [m]; past a corner, straight on."""
         leg, _, to = self._leg_at(along + ahead)
         return leg.at(to)
 
     def line_ahead(self, here: Point, ahead: float) -> list[Point]:
-        """Return the corners of the route from ``here`` on, at most ``ahead`` further [m]."""
+        """Return the polyline of the route from ``here``, of length ``ahead`` [m] or less."""
         line = [here]
         for leg in self._ahead():
             (x0, y0), (x1, y1) = line[-1], leg.end
@@ -133,16 +132,16 @@ class Route:
         return line
 
     def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
-        """Find the leg that passes the robot, near the beginning of a new path.
+        """Join this new path at its beginning: find the robot's leg.
 
-        That is the leg to the corner that the robot was driving to, if the path has it: on the same
-        leg it just goes on. If the path begins further along the last one, that one is driven until
-        there.
+        If the path has the corner that the robot was driving to, this is the leg to that corner: on
+        the same leg the robot just goes on. If the path begins farther along the last one, the
+        robot drives along the last one up to there.
 
         Args:
             here: the robot's position.
             heading: its direction of driving [rad]; None at rest.
-            before: the last route; None for none.
+            before: the last route, if any.
         """
         index, is_kept = self._passing(here, before)
         leg = self._leg(index)
@@ -176,8 +175,8 @@ class Route:
         return Joining.JOINED
 
     def _passing(self, here: Point, before: Route | None) -> tuple[int, bool]:
-        """Return which leg passes ``here``, near the beginning; and whether it ends at the corner
-        that the robot was driving to."""
+        """Return the index of the leg beside ``here``, near the beginning, and whether it ends at
+        the corner that the robot was driving to."""
         target = before._legs[0].end if before is not None and before._legs else None
         way = 0.0
         for index, leg in enumerate(self._ahead()):
@@ -197,10 +196,7 @@ class Route:
         return index, False
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point that they pass soon; none if they do not.
-
-        A robot that is off its leg gets none, too: the leg does not lead it there.
-        """
+        """Return the legs up to a point soon ahead; none if it, or the robot, is off the legs."""
         way = 0.0
         for index, leg in enumerate(self._ahead()):
             if index == 0:
@@ -219,8 +215,8 @@ class Route:
         return []
 
     def _leg_at(self, to: float) -> tuple[Leg, Leg | None, float]:
-        """Return the leg where the robot is after some way from here [m], up to the next corner;
-        the leg before it, if it is not the first; and how far along it that is [m]."""
+        """Return the leg at a distance ``to`` from the first leg's start [m], but not past the next
+        corner; the leg before it, if any; and the distance along the leg [m]."""
         before = None
         for leg in self._ahead():
             if to <= leg.length or not leg.bends:
@@ -253,7 +249,7 @@ class Route:
         return leg_between((start.x, start.y), (end.x, end.y))
 
     def _ending(self, leg: Leg, after: Leg) -> Leg:
-        """Return a leg with the speed in the corner at its end, and where the robot turns."""
+        """Return a leg with ``most`` and ``early_s`` of the corner at its end."""
         turn = math.atan2(after.uy, after.ux) - math.atan2(leg.uy, leg.ux)
         room = 0.5 * min(leg.length, after.length)
         most, early_s = rounding(abs(math.remainder(turn, math.tau)), room, self._limits)
@@ -261,11 +257,11 @@ class Route:
 
 
 class CurveRoute(Route):
-    """A curve for a robot that cannot turn on the spot, and the leg of it that the robot is on.
+    """A curve for a robot that cannot turn on the spot, and the leg that the robot is on.
 
-    Its legs are chords of arcs, and lanes; the robot steers from each to the next. It comes to rest
+    The legs are chords of arcs, and lanes; the robot steers from each to the next. It comes to rest
     only where it changes between forward and backward: a leg is driven backward if the path's
-    heading is opposite to it.
+    heading is opposite to the leg's direction.
     """
 
     def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
@@ -280,7 +276,7 @@ class CurveRoute(Route):
         super().next_leg()
 
     def carrot(self, along: float, ahead: float) -> Point:
-        """Return the point ``ahead`` of ``along`` the leg [m]; past a stop, further on the arc."""
+        """Return the point at ``along`` plus ``ahead`` [m]; past a stop, farther on the arc."""
         leg, before, to = self._leg_at(along + ahead)
         before = before or self._behind
         beyond = to - leg.length
@@ -289,15 +285,15 @@ class CurveRoute(Route):
         heading = math.atan2(leg.uy, leg.ux)
         turn = math.remainder(heading - math.atan2(before.uy, before.ux), math.tau)
         curvature = 2.0 * turn / (before.length + leg.length)
-        # At its end, an arc has turned by half of a chord's angle more.
+        # At a chord's end, the arc has turned farther than the chord, by half of the chord's angle.
         heading += 0.5 * (curvature * leg.length + curvature * beyond)
         x, y = leg.end
         return x + beyond * math.cos(heading), y + beyond * math.sin(heading)
 
     def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
-        """Find the leg that passes the robot; see ``Route.join``.
+        """Join this new path; see ``Route.join``.
 
-        The robot steers to a leg beside it: it cannot turn towards the nearest point.
+        The robot steers to a leg beside it, as it cannot turn towards the nearest point.
         """
         leg = self.leg
         if leg is None:

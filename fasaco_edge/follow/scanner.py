@@ -1,6 +1,6 @@
-"""The lidar's view: beams as points, which of them the map shows, the free way between them.
+"""Lidar's view: beams as points, points that the map shows, and the free distance along a line.
 
-Points are in the robot's frame: x ahead, y to the left of its middle [m]. Without numpy.
+Points of a scan are in the robot's frame: x ahead, y to the left of its centre [m]. Without numpy.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from fasaco_edge.grid.motion import stopping_rate
 from fasaco_edge.wire.messages.grids import GridOctets
 from fasaco_edge.wire.messages.scans import LaserScan
 
-# Points further away from the sensor do not matter yet [m].
+# Largest distance of points from the sensor; others are ignored [m].
 REACH_M = 3.0
 # Number of sectors; in each only the shortest beam counts.
 SECTORS = 360
-# A sensor is covered or broken if less than this share of its beams is valid.
+# Least share of valid beams; with fewer the sensor is covered or broken.
 LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where the lidar is mounted on the robot.
+    """Pose of the lidar on the robot.
 
     Attributes:
-        x, y: ahead of the robot's middle, and to its left [m].
-        yaw: where its angle 0 points, from ahead to the left [rad].
+        x, y: ahead of the robot's centre, and to its left [m].
+        yaw: direction of the lidar's angle 0, counter-clockwise from ahead [rad].
         upside_down: whether its angles grow clockwise.
     """
 
@@ -43,13 +43,13 @@ class Mount:
 def points_of(scan: LaserScan, mount: Mount) -> list[Point] | None:
     """Return the points of a scan within ``REACH_M``, at most ``SECTORS``.
 
-    None for a sensor that sees nothing: less than ``LEAST_SHARE`` of its beams is valid.
+    None if less than ``LEAST_SHARE`` of its beams are valid.
     """
     shortest: dict[int, tuple[float, float]] = {}
     measured_beams = 0
     turn = -1.0 if mount.upside_down else 1.0
     for index, measured in enumerate(scan.ranges):
-        # NaN, and ranges beyond the sensor's limits, are invalid; minus infinity: too near to
+        # NaN, and ranges beyond the sensor's limits, are invalid; minus infinity means too near to
         # measure.
         length = scan.least_m if measured == -math.inf else measured
         if not length >= scan.least_m:
@@ -69,14 +69,14 @@ def points_of(scan: LaserScan, mount: Mount) -> list[Point] | None:
     ]
 
 
-# Distance kept from things [m]. If a thing is already nearer, the robot drives on as long as it
-# comes no nearer to any thing by more than the second value [m].
+# Distance kept from things [m]; if a thing is already nearer, the robot may come nearer to it by
+# the second value [m].
 MARGIN_M, ASIDE_M = 0.03, 0.005
 # The robot stops this far before the margin [m].
 STOP_M = 0.03
-# Moving things may approach at this speed [m/s], and the robot must stand before they arrive; it
-# reacts this long after it has seen them [s]. Things behind the robot do not count: those beyond
-# this angle of its heading [rad].
+# Largest speed of things that approach, which must not reach the robot before it stands [m/s]; time
+# in which the robot reacts [s]; angle to its heading beyond which things are behind it and do not
+# count [rad].
 WALK_M_S, LATE_S, AHEAD_RAD = 0.5, 0.25, math.radians(120.0)
 
 
@@ -88,7 +88,7 @@ class Thing(NamedTuple):
     moves: bool
 
 
-# A distance without an end, to nothing.
+# Result of a search that finds no thing.
 NOTHING: Final[tuple[float, Thing | None]] = (math.inf, None)
 
 
@@ -98,9 +98,9 @@ def first_met(
     """Return how far a disc can go along a line [m], and the first thing that it meets there.
 
     Args:
-        things: where the disc may not go.
-        line: from the disc's place on.
-        radius: of the disc [m]; it keeps ``MARGIN_M`` from things.
+        things: the things that the disc must not meet.
+        line: polyline from the disc's centre [m].
+        radius: radius of the disc [m]; it keeps ``MARGIN_M`` from things.
 
     Returns:
         infinity and None if it meets nothing.
@@ -113,7 +113,7 @@ def first_met(
 
 
 def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float:
-    """Return the way along a line to where a thing is within ``radius`` [m], or infinity."""
+    """Return the distance along a line to where a thing is within ``radius`` [m], or infinity."""
     before = 0.0
     for (x0, y0), (x1, y1) in pairwise(line):
         length = math.hypot(x1 - x0, y1 - y0)
@@ -131,19 +131,18 @@ def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float:
 
 
 def speed_before(way: float, acceleration: float, period: float) -> float:
-    """Return the highest speed [m/s] that allows a stop ``STOP_M`` before the end of a way."""
+    """Return the highest speed that allows a stop ``STOP_M`` before the end of ``way`` [m/s]."""
     return stopping_rate(max(way - STOP_M, 0.0), acceleration, period)
 
 
 def speed_beside(
     things: Iterable[Thing], pose: Pose2D, radius: float, acceleration: float
 ) -> tuple[float, Thing | None]:
-    """Return the highest speed from which the robot stands before a moving thing touches it [m/s].
+    """Return the highest speed from which the robot can stop before a moving thing touches it
+    [m/s], and that thing; infinity and None without such a thing.
 
-    And the thing that limits it; infinity and None without one.
-
-    The gap must be as long as the robot's way before it reacts and while it brakes, plus the
-    thing's way in that time: v late + v^2 / 2a + walk (late + v / a).
+    The gap must be at least the distance of the robot until it has reacted and braked, plus that of
+    the thing in the same time: v late + v^2 / 2a + walk (late + v / a).
     """
     nearest, decides = NOTHING
     for thing in things:
@@ -159,13 +158,13 @@ def speed_beside(
     return max(acceleration * (math.sqrt(max(left, 0.0)) - half), 0.0), decides
 
 
-# A point of a scan this near to an obstacle of the map belongs to that obstacle [m]: ranges
-# scatter, and the pose is off by some centimetres.
+# Distance within which a point of a scan belongs to an obstacle of the map [m]: ranges are noisy,
+# and the pose is off by some centimetres.
 KNOWN_M = 0.15
 
 
 def shows(grid: GridOctets, free: bytes, x: float, y: float) -> bool:
-    """Return whether an obstacle of a map is at most about ``KNOWN_M`` from a place [m].
+    """Return whether an obstacle of a map is within about ``KNOWN_M`` of a point [m].
 
     ``free``: the values of pixels that are no obstacle.
     """

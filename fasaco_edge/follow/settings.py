@@ -17,7 +17,7 @@ class PoseSource:
 
     Attributes:
         key: key expression to subscribe to.
-        schema: message type of samples that name none; "" if samples name their type.
+        schema: message type, for samples that do not name it; "" if they do.
         latched, depth: whether late joiners get the newest samples, and how many.
         is_static: whether these are static transforms.
     """
@@ -37,23 +37,23 @@ class FollowSettings:
         robot, base: name of the robot, and prefix of its keys.
         connect: endpoints of the bus.
         secured: credentials, a part of Zenoh's configuration.
-        limits: of the base.
-        pose_schema: message type of poses whose samples name none.
-        pose_age_s: timeout of the newest pose.
+        limits: limits of the base.
+        pose_schema: message type of poses, for samples that do not name it.
+        pose_age_s: timeout of the newest pose [s].
         poses: keys of poses.
-        frames: the map's and the robot's in ROS 2, for poses from transforms.
-        schema: type of the velocities, one of ``TWIST_SCHEMAS``.
-        frame: of a TwistStamped, the robot's own.
+        frames: names of the map's and the robot's frame in ROS 2, for poses from transforms.
+        schema: message type of the velocities, one of ``TWIST_SCHEMAS``.
+        frame: name of the robot's frame, for a TwistStamped.
         cmd_key: key of the velocities.
         ros: kind, domain, namespace, name of the node and topic, if ``cmd_key`` is ROS 2's.
         nav2: if Nav2's controller drives: name of its action, release, names of plugins, and the
             least distance between separate stretches of one goal's path [m].
-        dock: if Nav2's docking server docks: names of its actions, dock, its type, frame, pose x,
-            y [m], yaw [rad], and how far in front of it paths end [m].
-        scan: if scans are used: where the lidar is (``mount``),
-            ``lost_s``, ``free_at_most``, ``most_pixels`` of a map, and further topics of scans,
-            maps and updates: name, key, whether it is latched, depth.
-        radius_m: of the robot's disc; 0 if unknown.
+        dock: if Nav2's docking server docks: names of its actions, id, type, frame and pose (x, y
+            [m], yaw [rad]) of the dock, and the distance in front of it at which paths end [m].
+        scan: if scans are used: pose of the lidar (``mount``), ``lost_s``, ``free_at_most``,
+            ``most_pixels`` of a map, and further topics of scans, maps and updates: name, key,
+            whether it is latched, depth.
+        radius_m: radius of the robot's disc [m]; 0 if unknown.
         pace: simulated seconds per second.
         dry_run: report commands instead of sending them.
     """

@@ -1,9 +1,9 @@
 """Sight: obstacles that the lidar sees and the map does not show, and the speed that they allow.
 
-Walls of the map are ignored: the path keeps clear of them, by a centimetre where floor beside them
-is swept, which is less than ranges scatter. But people leave marks on a map where they walked:
-moving things count there, too. The robot keeps a margin from things that the map does not show. A
-thing that has stood in its place for a while counts as standing; any other may move.
+Standing things that the map shows are ignored: the path keeps clear of them, by as little as a
+centimetre along walls, which is less than the noise of ranges. Things that may move count even
+there, as people leave marks on a map where they walked. The robot keeps a margin from all things
+that count. A thing is standing once it has been in its place for a while; any other may move.
 """
 
 from __future__ import annotations
@@ -30,13 +30,12 @@ from fasaco_edge.wire.messages.scans import decode_scan
 
 # The path is checked this far ahead [m].
 AHEAD_M = 1.5
-# Edge of the squares in which things are followed [m]. A thing stands once it was seen in one
-# square, or one beside it, for this long [s]; it is forgotten once it was not seen for this long
-# [s].
+# Edge of the squares in which things are tracked [m]; time in a square, or in one beside it, after
+# which a thing is standing [s]; time out of sight after which a thing is forgotten [s].
 PLACE_M, STANDS_S, FORGET_S = 0.1, 1.5, 1.0
-# Points nearer to the robot's middle than this share of its radius are the robot itself.
+# Points nearer to the robot's centre than this share of its radius are the robot itself.
 OWN_SHARE = 0.7
-# The report of an obstacle has the points within this distance of it [m].
+# The report of an obstacle contains the points within this distance of it [m].
 AROUND_M = 0.5
 UNKNOWN = 255
 # A speed below this counts as 0 [m/s].
@@ -48,9 +47,9 @@ class Limit:
     """The speed that the sight allows.
 
     Attributes:
-        speed: the highest [m/s]; infinite without a limit.
-        why: what limits it, in words.
-        around: the points seen around what limits it [m], the nearest first.
+        speed: the highest speed [m/s]; infinite without a limit.
+        why: reason of the limit, in words.
+        around: the points seen around the limiting thing [m], the nearest first.
     """
 
     speed: float
@@ -65,13 +64,13 @@ class Sight:
     """Keeps the newest scan, without obstacles of the map.
 
     Args:
-        mount: where the lidar is.
-        radius: of the robot's disc [m].
-        lost_s: the robot stands after this time without a scan [s].
+        mount: pose of the lidar.
+        radius: radius of the robot's disc [m].
+        lost_s: time without a scan after which the robot must stand [s].
         free_at_most: occupancy up to which a pixel of the map is free [percent].
 
     Attributes:
-        things: what the scan shows, in the map frame.
+        things: the things that the scan shows and that count, in the map frame.
     """
 
     def __init__(
@@ -90,7 +89,7 @@ class Sight:
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
 
     def take_map(self, payload: bytes, *, is_update: bool = False) -> None:
-        """Take in a map, or an update of it; one that is malformed is ignored, as by the daemon."""
+        """Take in a map, or an update of it; malformed ones are ignored, as by the daemon."""
         with suppress(MalformedMessage):
             if not is_update:
                 self._grid = read_grid(payload)
@@ -98,7 +97,7 @@ class Sight:
                 self._grid = with_update(self._grid, payload)
 
     def take_scan(self, payload: bytes, pose: Pose2D, now: float) -> None:
-        """Take in a scan that was made at ``pose``; one with the previous stamp is not new."""
+        """Take in a scan made at ``pose``; a scan with the previous stamp is ignored."""
         try:
             scan = decode_scan(payload)
         except MalformedMessage as error:
@@ -131,13 +130,13 @@ class Sight:
     def limit(
         self, pose: Pose2D, line: Sequence[Point], acceleration: float, period: float
     ) -> Limit:
-        """Return what the scan allows along a line.
+        """Return the limit that the scan sets along a line.
 
         Args:
-            pose: the robot's.
-            line: the path from there, ``AHEAD_M`` long, or shorter where it ends.
-            acceleration: of the base [m/s^2].
-            period: from one command to the next [s].
+            pose: the robot's pose.
+            line: the path from there, ``AHEAD_M`` long, or shorter if it ends.
+            acceleration: largest acceleration of the base [m/s^2].
+            period: time from one command to the next [s].
         """
         radius, why = self._radius, "something moves"
         speed, thing = speed_beside(self.things, pose, radius, acceleration)
@@ -152,7 +151,7 @@ class Sight:
         return Limit(0.0, f"{why} {far:.2f} m away", around)
 
     def _look(self, points: list[Point], pose: Pose2D, now: float) -> None:
-        """Keep points that no map shows, and separate standing things from those that may move."""
+        """Keep the points that count, and separate standing things from those that may move."""
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
         own = OWN_SHARE * self._radius
         places: dict[tuple[int, int], list[Point]] = {}
@@ -163,7 +162,7 @@ class Sight:
             square = math.floor(there[0] / PLACE_M), math.floor(there[1] / PLACE_M)
             places.setdefault(square, []).append(there)
         known = {at: times for at, times in self._seen.items() if now - times[1] <= FORGET_S}
-        # Things seen from the beginning on count as standing.
+        # Things in the first scan count as standing.
         begun = -math.inf if self._is_first else now
         self._is_first = False
         self.things = []

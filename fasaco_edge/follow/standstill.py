@@ -1,12 +1,11 @@
-"""Standstill: how long something has kept the robot from driving, and the report of that.
+"""Standstill: how long something has kept the robot from driving, and its report to the daemon.
 
 It ends once the robot gets by, or another path leads it away. The daemon can plan around the
 obstacle, or make a new plan from the robot's position.
 
-Failed tries are counted by place and by the direction in which the path leads; only progress ends
-them. A new path in the same direction leads into the same obstacle: it changes nothing. A path in
-another direction has tries of its own. After each try there is a pause, twice as long as the one
-before.
+Failed tries to drive are counted for each place and direction of the path, until there is progress.
+A new path in the same direction does not reset the count, as it leads into the same obstacle. After
+each try there is a pause, twice as long as the one before.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS, MAX_STRING_BYTES
 
 Reason = Literal["obstacle", "stuck", "elsewhere"]
 
-# Reported reasons, and after how long [s]. A base that does not move rests for 2, then 4 s.
+# Reported reasons, and the time after which each is reported [s].
 REASONS: Final[dict[State, tuple[Reason, float]]] = {
     State.OBSTACLE: ("obstacle", 5.0),
     State.NOT_MOVING: ("stuck", 3.0),
@@ -32,11 +31,11 @@ REASONS: Final[dict[State, tuple[Reason, float]]] = {
     State.PATH_ELSEWHERE: ("elsewhere", 2.0),
     State.OFF_PATH: ("elsewhere", 2.0),
 }
-# A standstill is over once the robot has moved this far [m], or had no reason for this long [s].
+# A standstill ends once the robot has moved this far [m], or had no reason for this long [s].
 MOVED_M, GONE_S = 0.1, 2.0
 # Period of the reports [s].
 EVERY_S = 1.0
-# If a base does not move, the floor ahead is reported, at these angles to its direction.
+# Angles of the reported points to the direction of a base that does not move.
 ANGLES_RAD = tuple(math.radians(angle) for angle in (0, -20, 20, -40, 40))
 
 
@@ -53,7 +52,7 @@ class Standstill:
     ) -> bytes | None:
         """Return a report as JSON, see ``wire.documents.blocked``; None if none is due.
 
-        ``planner``, ``revision``: of the path.
+        ``planner``, ``revision``: the path's daemon and revision.
         """
         pose, state = follower.newest_pose, follower.state
         if state not in REASONS or pose is None:
@@ -84,9 +83,9 @@ class Standstill:
 
 
 def floor_ahead(here: Point, toward: float, radius: float) -> tuple[Point, ...]:
-    """Return the floor that a robot pushes against, places [m]; none for an unknown radius.
+    """Return points on the edge of the robot's disc, ahead [m]; none if the radius is unknown.
 
-    ``toward``: where it is to go [rad]; ``radius``: of its disc [m].
+    ``toward``: the path's direction [rad]; ``radius``: of the disc [m].
     """
     if not radius:
         return ()
@@ -101,7 +100,7 @@ ALIKE_RAD = math.pi / 4
 
 @dataclass(slots=True)
 class _Direction:
-    """Failed tries in a direction [rad], and the end of the pause [s]."""
+    """Number of failed tries in a direction [rad], and the end of the pause [s]."""
 
     toward: float
     tries: int = 0
@@ -129,19 +128,19 @@ class Tries:
             self.forget()
 
     def forget(self) -> None:
-        """Begin anew: there was progress."""
+        """Forget all tries."""
         self._place = None
         self._directions.clear()
 
     def failed(self, here: Point, toward: float, now: float, *, for_good: bool = False) -> None:
-        """Note a failed try; ``for_good``: nothing but progress ends its pause."""
+        """Note a failed try; ``for_good``: only progress ends its pause."""
         if self._place is None:
             self._place = here
         if (direction := self._like(toward)) is None:
             self._directions.append(direction := _Direction(toward))
         direction.tries += 1
         ends = for_good or direction.tries >= self._most
-        # Exponents stay small: more doublings are longer than any pause.
+        # The exponent is bounded, to avoid an overflow.
         pause = min(self._pause * 2.0 ** min(direction.tries - 1, 30), self._longest)
         direction.until = math.inf if ends else now + pause
 
@@ -156,7 +155,7 @@ class Tries:
         return direction is None or now >= direction.until
 
     def _like(self, toward: float) -> _Direction | None:
-        """Return the nearest similar direction with tries; None for none."""
+        """Return the nearest similar direction with tries, or None."""
         off = {abs(math.remainder(one.toward - toward, math.tau)): one for one in self._directions}
         nearest = min(off, default=math.inf)
         return off[nearest] if nearest < ALIKE_RAD else None

@@ -19,7 +19,7 @@ from fasaco_edge.wire.messages.poses import Link
 
 _Result = TypeVar("_Result")
 
-# Links of poses from transforms may be older than poses [s].
+# Timeout of the links of poses from transforms [s], which may be older than poses.
 LINK_S = 2.0
 
 
@@ -56,7 +56,7 @@ class State(enum.Enum):
 
 
 Reason = tuple[State, str]
-"""Why a robot stands: its state, and figures of that in words."""
+"""Why a robot stands: its state, and details in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +64,10 @@ class Patience:
     """Timeouts of a follower's inputs.
 
     Attributes:
-        pose_s: of the newest pose, by its arrival [s].
-        link_s: of each other transform between map and robot, by its arrival [s]: localisers
-            publish the origin of odometry less often than odometry itself is published.
-        status_s: of the daemon's heartbeat [s].
+        pose_s: timeout of the newest pose, by its arrival [s].
+        link_s: timeout of each other transform between map and robot, by its arrival [s]:
+            localisers publish the pose of the odometry frame less often than odometry comes.
+        status_s: timeout of the daemon's heartbeat [s].
     """
 
     pose_s: float = 0.5
@@ -79,16 +79,16 @@ class Supervision:
     """Decides whether path, pose and daemon let the robot drive; base class of followers.
 
     Attributes:
-        state: of the robot.
-        detail: figures of the state, in words.
-        ahead: places of what the robot stands before [m], the nearest first; () for none.
-        newest_pose: the newest pose; None before there is one.
-        link: the oldest transform between map and robot, by arrival; None for none.
-        pose_fault: what is wrong with the newest pose; None for nothing.
+        state: state of the robot.
+        detail: details of the state, in words.
+        ahead: points of the obstacle in front of the robot [m], the nearest first; else ().
+        newest_pose: the newest pose; None before the first one.
+        link: the oldest transform between map and robot, by arrival; None without transforms.
+        pose_fault: fault of the newest pose; None if it is valid.
         has_path: whether there is a path to follow.
         path_frame: name of the frame of the newest path.
-        held: why the docking server has the robot; "" lets it drive.
-        standby: why the robot is to be left alone, with figures; None for no reason.
+        held: why the docking server controls the robot; "" if it does not.
+        standby: why the follower must not command the robot, with details; None if it may.
     """
 
     def __init__(self, patience: Patience) -> None:
@@ -110,7 +110,7 @@ class Supervision:
         self._statuses, self._status_at = 0, -math.inf
 
     def take_pose(self, stamped: StampedPose, now: float) -> None:
-        """Take in a pose on arrival; one with the previous stamp is not new."""
+        """Take in a pose on arrival; a pose with the previous stamp is ignored."""
         self._repeats = stamped.stamp_ns != 0 and stamped.stamp_ns == self._stamp_ns
         if self._repeats and stamped.frame == self._frame:
             return
@@ -119,9 +119,9 @@ class Supervision:
         self.newest_pose, self._pose_at = stamped.pose, now
 
     def take_path(self, payload: bytes, most_m_s: float = math.inf) -> None:
-        """Follow another path of the planner; an empty or malformed one stops the robot.
+        """Follow another path of the planner; an empty or malformed path stops the robot.
 
-        ``most_m_s``: the speed to follow it at, if that is below the robot's [m/s].
+        ``most_m_s``: largest speed on this path [m/s].
         """
         self._path_of, self._path_most_m_s = self._planner, most_m_s
         try:
@@ -136,7 +136,7 @@ class Supervision:
         self._have(points)
 
     def take_unnamed_path(self, payload: bytes) -> None:
-        """Stop for a path of an unknown daemon: it may be the planner's, and is never driven."""
+        """Stop at a path of an unknown daemon: it may be the planner's, but is not driven."""
         self.take_path(payload)
         if self.has_path:
             self._have_none(
@@ -144,7 +144,7 @@ class Supervision:
             )
 
     def take_planner(self, planner: str) -> None:
-        """Note which daemon plans, "" for none; a path of the previous one is dropped."""
+        """Note which daemon plans, "" without one; a path of the previous one is dropped."""
         if planner == self._planner:
             return
         self._planner, self._statuses, self._status_at = planner, 0, -math.inf
@@ -152,8 +152,8 @@ class Supervision:
             self._have_none(State.NO_PATH)
             self._path_of = ""
 
-    def heard_status(self, now: float) -> None:
-        """Note a heartbeat of the planner: a status, except the first one, which may be cached."""
+    def take_heartbeat(self, now: float) -> None:
+        """Take in that a status of the planner arrived; the first one may be old and is ignored."""
         self._statuses += 1
         if self._statuses > 1:
             self._status_at = now
@@ -171,12 +171,12 @@ class Supervision:
         """Follow nothing."""
 
     def _have_none(self, state: State, detail: str = "") -> None:
-        """Drop the path; withdraw it from the follower, too."""
+        """Drop the path."""
         self.has_path, self._no_path = False, (state, detail)
         self._withdraw()
 
     def _supervised(self, drive: Callable[[float], _Result], now: float) -> _Result | None:
-        """Let the robot drive, unless it must stand; return what that gives, else None."""
+        """Return the result of ``drive`` if the robot may drive, else None."""
         self.ahead = ()
         self.state, self.detail = self._trouble(now) or (State.DRIVING, "")
         if self.state is not State.DRIVING:
@@ -190,7 +190,7 @@ class Supervision:
             return None
 
     def _trouble(self, now: float) -> Reason | None:
-        """Return why the robot must stand, with figures; None if it may drive."""
+        """Return why the robot must stand, with details; None if it may drive."""
         if self.standby is not None:
             return self.standby
         if not self._planner:

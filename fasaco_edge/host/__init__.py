@@ -1,1 +1,1 @@
-"""This computer: files and folders, processes and memory, data files of the package."""
+"""Host computer: files and folders, processes and memory, data files of the package."""

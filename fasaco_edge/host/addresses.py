@@ -1,4 +1,4 @@
-"""Addresses that servers of this package listen at."""
+"""Addresses of this package's servers."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fasaco_edge.errors import BadConfiguration
 
 _ADDRESS = re.compile(r"(?:\[(?P<six>[0-9a-fA-F:]+)\]|(?P<four>[\w.]+)):(?P<port>\d{1,5})")
 
-# Addresses for documentation (RFC 5737, RFC 3849), used by no host.
+# Addresses for documentation (RFC 5737, RFC 3849), which no host has.
 _ELSEWHERE = {socket.AF_INET: "192.0.2.1", socket.AF_INET6: "2001:db8::1"}
 
 
 class Address(NamedTuple):
-    """Where a server listens: host, an address as text, and port."""
+    """Address of a server: host, an address as text, and port."""
 
     host: str
     port: int
@@ -34,13 +34,13 @@ class Address(NamedTuple):
 
     @property
     def reached(self) -> str:
-        """The address as in a URL for other computers: for any address, one that this one has."""
+        """The address as in a URL for other computers; a wildcard becomes this computer's own."""
         if not ipaddress.ip_address(self.host).is_unspecified:
             return self.shown
         family = socket.AF_INET6 if ":" in self.host else socket.AF_INET
         with socket.socket(family, socket.SOCK_DGRAM) as probe:
             try:
-                # Nothing is sent: the system says from which address it would be.
+                # Sends nothing: the system only selects the address to send from.
                 probe.connect((_ELSEWHERE[family], 9))
                 host = probe.getsockname()[0]
             except OSError:  # no network
@@ -52,9 +52,9 @@ def read_address(name: str, text: str, example: int) -> Address:
     """Return the address in ``text``, the value of ``name``.
 
     Args:
-        name: of the key or option.
+        name: name of the key or option.
         text: address and port; localhost is 127.0.0.1.
-        example: a port for the message.
+        example: a port for the error's text.
 
     Raises:
         BadConfiguration: it is no address with a port.

@@ -53,7 +53,7 @@ def sync_folder(folder: Path) -> None:
     try:
         os.fsync(descriptor)
     except OSError as error:
-        # Some network disks do not support that.
+        # Some network disks do not support fsync of folders.
         if error.errno not in (errno.EINVAL, errno.ENOTSUP):
             raise
     finally:

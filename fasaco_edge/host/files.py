@@ -1,10 +1,10 @@
-"""Files and folders that no other user of this computer can have put in place.
+"""Files and folders that no other user of this computer can have written.
 
 Own files belong to this process's user or to root. Trusted files, whose content is run as code, are
 also in folders to which only root and one user may write, including all parent folders: a user who
 can write to a folder can replace its files. Two cases are safe: in a sticky folder (``/tmp``) only
-the owner can replace a file, and a link is trusted like its maker and its folder (systemd's
-``/var/cache/NAME`` of a DynamicUser= is a link of root's).
+the owner of a file can replace it; and a link is as safe as its owner and its folder (systemd's
+``/var/cache/NAME`` of a DynamicUser= is a link that belongs to root).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ def open_own(path: str | Path, flags: int, mode: int = 0o644) -> int:
     """Open a file for writing, created if it is missing; return its descriptor.
 
     A link is not followed, and a plain file of another user is refused: in a folder that others may
-    write to, either may be a trap.
+    write to, either may be an attack.
 
     Raises:
-        OSError: it failed, or the file is not ours.
+        OSError: it failed, or the file belongs to another user.
     """
     flags |= os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
-    # An existing file is only truncated once it is known to be ours.
+    # An existing file is truncated only after its owner has been checked.
     descriptor = os.open(path, flags & ~os.O_TRUNC, mode)
     try:
         status = os.fstat(descriptor)
@@ -51,7 +51,7 @@ class FileTooLongError(OSError):
 
 
 def read_own(path: str | Path, most: int) -> bytes:
-    """Return the whole content of a plain file of ours, or of root's, that is no link.
+    """Return the whole content of a plain file, not a link, of this process's user or of root.
 
     Raises:
         FileTooLongError: it has more than ``most`` bytes.
@@ -67,7 +67,7 @@ def read_own(path: str | Path, most: int) -> bytes:
 
 def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> BinaryIO:
     """Open a plain file, not a link, for reading; ``check`` inspects the opened file."""
-    # Opening anything but a plain file may block, or have an effect.
+    # Without O_NONBLOCK, opening a pipe or a device may block.
     descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         status = os.fstat(descriptor)
@@ -83,10 +83,10 @@ def _open_plain(path: str | Path, check: Callable[[os.stat_result], None]) -> Bi
 def check_plain(path: str | Path) -> None:
     """Check that a file named by a user is a plain file, or a link to one.
 
-    Opening a pipe waits until it has a writer, and a device may never end.
+    Opening a pipe waits until it has a writer, and reading a device may never end.
 
     Raises:
-        OSError: it is no such file, or is missing.
+        OSError: it is neither, or is missing.
     """
     mode = os.stat(path).st_mode
     if stat.S_ISDIR(mode):
@@ -97,7 +97,7 @@ def check_plain(path: str | Path) -> None:
 
 
 def make_own_folder(folder: Path) -> None:
-    """Make a folder, or accept an existing one that is ours and no link of another user's.
+    """Make a folder, or accept an existing one, or a link to one, of this process's user or root.
 
     Raises:
         OSError: it failed, or it belongs to another user.
@@ -112,12 +112,12 @@ def _check_owner(path: str | Path, status: os.stat_result) -> None:
 
 
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-# Limit on links: as many as Linux itself follows, see path_resolution(7).
+# Largest number of links followed, as by Linux, see path_resolution(7).
 _MOST_LINKS = 40
 
 
 class UntrustedFileError(Exception):
-    """Another user could have written this; the text names the file and the user."""
+    """Another user could have written a file; the text names the file and the user."""
 
 
 def why_not_trusted(folder: Path, user: int | None = None) -> str:
@@ -126,7 +126,7 @@ def why_not_trusted(folder: Path, user: int | None = None) -> str:
     Args:
         folder: an absolute path. If it is missing, its existing parents are checked: "" if a folder
             made now would be trusted.
-        user: the user who may own the folder, beside root; by default this process's.
+        user: the user who may own the folder, besides root; by default this process's user.
     """
     try:
         _walk(folder, _trusted(user))
@@ -159,12 +159,12 @@ def _trusted(user: int | None) -> frozenset[int]:
 
 
 def _walk(folder: Path, trusted: frozenset[int]) -> None:
-    """Go from the root to ``folder``, and check each step."""
+    """Check each folder and link from the root to ``folder``."""
     place, links = Path("/"), 0
     ahead = list(reversed(folder.parts[1:]))
     status = os.lstat(place)
     while True:
-        # In a sticky folder others cannot replace our entries; the next step checks the owner.
+        # In a sticky folder others cannot replace an entry whose owner the next step accepts.
         sticky = ahead and status.st_mode & stat.S_ISVTX
         _look_at(place, status, trusted, may_write=bool(sticky))
         if not ahead:
@@ -198,7 +198,7 @@ def _look_at(
 ) -> None:
     if status.st_uid not in trusted:
         raise UntrustedFileError(f"{place} belongs to {_user(status.st_uid)}")
-    # Entries of an access control list show in the bits of the group.
+    # The group's bits include the entries of an access control list.
     if status.st_mode & _OTHERS_WRITE and not may_write:
         who = "all users" if status.st_mode & stat.S_IWOTH else "its group"
         raise UntrustedFileError(f"{place} may be written by {who}")

@@ -1,4 +1,4 @@
-"""Output files, written atomically: a complete file replaces an older one."""
+"""Output files, written atomically: only a complete file replaces an older one."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from pathlib import Path
 def whole(file: Path) -> Iterator[Path]:
     """Yield a name to write to; once the block has succeeded, that file replaces ``file``.
 
-    If it fails, as on a full disk, the previous file stays unchanged. A link is followed; a device
-    or a pipe is written to directly, and so is a file in a read-only folder.
+    If the block fails, for instance on a full disk, the previous file stays unchanged. A link is
+    followed. Devices, pipes, and files in read-only folders are written to directly.
 
     Raises:
         OSError: the file cannot be written or replaced.
@@ -27,7 +27,7 @@ def whole(file: Path) -> Iterator[Path]:
     if mode is not None and not (stat.S_ISREG(mode) and os.access(target.parent, os.W_OK)):
         yield file
         return
-    # No other user can have made this file; the suffix is kept: some writers choose the format by
+    # The random name cannot exist already; the suffix is kept, as some writers choose the format by
     # it.
     new = target.with_name(f".{os.urandom(8).hex()}{target.suffix}")
     try:

@@ -1,6 +1,6 @@
 """Plain YAML: a document written by a user, of bounded size and depth.
 
-Aliases count with the size that they expand to: 500 bytes of aliases can be gigabytes. Tags, which
+Aliases count with their expanded size: 500 bytes of aliases can expand to gigabytes. Tags, which
 turn a text into other types, are refused.
 """
 
@@ -16,9 +16,9 @@ import yaml
 MOST_BYTES = 1_048_576
 MOST_VALUES = 50_000
 MOST_DEPTH = 32
-# Limit on the digits of an integer: Python refuses to show one of 4300 digits.
+# Largest number of digits of an integer: Python cannot print integers of 4300 digits.
 MOST_DIGITS = 100
-# Timeout of a pipe [s]: a daemon that reloads its configuration does nothing meanwhile.
+# Timeout of a pipe [s]: a daemon that reloads its configuration is blocked until then.
 PIPE_S = 5.0
 
 
@@ -34,7 +34,7 @@ def read_bounded(path: Path) -> str:
         PlainYamlError: it is longer than ``MOST_BYTES``, or no UTF-8.
     """
     content = b""
-    # Opening or reading a pipe without a writer would block for ever.
+    # Without O_NONBLOCK, opening or reading a pipe without a writer would block endlessly.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     try:
         until = time.monotonic() + PIPE_S
@@ -65,7 +65,7 @@ def load(text: str) -> object:
 
 
 def compose(text: str) -> tuple[yaml.Node | None, object]:
-    """Return a document as its nodes, which know their lines, and as plain values.
+    """Return a document as nodes, with their lines, and as plain values.
 
     Raises:
         PlainYamlError: it is no YAML, or not plain.
@@ -79,13 +79,13 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
     except RecursionError as error:
         raise PlainYamlError("nested too deeply") from error
     except yaml.MarkedYAMLError as error:
-        raise PlainYamlError(_said(error)) from error
-    # Invalid UTF-8, an impossible date, or a number in base 60 that no float holds.
+        raise PlainYamlError(_described(error)) from error
+    # Invalid UTF-8, an impossible date, or a number in base 60 beyond the range of floats.
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise PlainYamlError(str(error)) from error
 
 
-def _said(error: yaml.MarkedYAMLError) -> str:
+def _described(error: yaml.MarkedYAMLError) -> str:
     """Return where a document is no YAML, and why, in one line."""
     mark, began = error.problem_mark or error.context_mark, error.context_mark
     where = "" if mark is None else f"line {mark.line + 1}, column {mark.column + 1}: "
@@ -101,7 +101,7 @@ class _Loader(yaml.SafeLoader):
     def __init__(self, text: str) -> None:
         super().__init__(text)
         self._values = self._depth = self._deepest = 0
-        # For each alias the number of values and of levels that it stands for.
+        # Number of values, and of levels, of each anchor.
         self._sizes: dict[str, tuple[int, int]] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:

@@ -1,7 +1,4 @@
-"""Processes: starting this interpreter again, signals, memory and threads by proc(5).
-
-A signal requests an orderly exit.
-"""
+"""Processes: starting this interpreter again, signals, memory and threads by proc(5)."""
 
 from __future__ import annotations
 
@@ -23,15 +20,16 @@ from types import FrameType
 def python_program(module: str, *words: str) -> list[str]:
     """Return the command line that runs a module with this interpreter.
 
-    ``-m`` alone would search the working folder first, which others may write to. An isolated
-    interpreter starts an isolated one: environment and home do not affect its imports.
+    ``-m`` alone would first search the working folder, which others may write to. An isolated
+    interpreter starts another isolated one, whose imports ignore environment and home.
     """
     shut = "-I" if sys.flags.isolated else "-P"
     return [sys.executable, shut, "-m", module, *words]
 
 
-# Options of mallopt(3), and the values set. A block that the system maps anew costs a page
-# fault each 4 KB: with thresholds of 256 KB replans of 100,000 cells took 60 ms in place of 38.
+# Options of mallopt(3), and the values set. Lower thresholds would return more memory, but each
+# page of 4 KB mapped again costs a page fault: with 256 KB, replans of 100,000 cells take 60 ms,
+# not 38.
 _TRIM_THRESHOLD = (-1, 2 << 20)
 _MMAP_THRESHOLD = (-3, 1 << 20)
 _ARENA_MAX = (-8, 2)
@@ -45,7 +43,7 @@ def resident_mb(pid: int | str = "self") -> float:
 def own_mb(pid: int | str = "self") -> float:
     """Return a process's resident memory without pages of files [MB].
 
-    The system decides how much of its libraries is in memory, shares that and reclaims it.
+    Pages of files, as of libraries, are shared, and the system reclaims them at any time.
     """
     return _field_mb(pid, "RssAnon")
 
@@ -56,9 +54,9 @@ def peak_mb(pid: int | str = "self") -> float:
 
 
 def memory_limit(root: Path = Path("/")) -> int | None:
-    """Return this process's memory limit by control groups [bytes]; None for none or unknown.
+    """Return this process's memory limit by control groups [bytes]; None if none is known.
 
-    It is the lowest limit of its group and the groups above, as far as visible from inside.
+    It is the lowest limit of its group and the groups above that are visible from inside.
     """
     try:
         groups = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()
@@ -82,13 +80,13 @@ def memory_limit(root: Path = Path("/")) -> int | None:
                 continue
             if text.isdecimal():
                 found.append(int(text))
-    # Version 1 says "none" as a number near 2^63.
+    # In version 1 of control groups, a number near 2^63 means no limit.
     limits = [limit for limit in found if limit < 1 << 60]
     return min(limits, default=None)
 
 
 def available_memory(root: Path = Path("/")) -> int:
-    """Return the memory that this process could still have without swapping [bytes]."""
+    """Return the memory that this process can still get without swapping [bytes]."""
     text = (root / "proc/meminfo").read_text(encoding="ascii")
     free = next(line for line in text.splitlines() if line.startswith("MemAvailable:"))
     available = int(free.split()[1]) * 1024
@@ -96,28 +94,28 @@ def available_memory(root: Path = Path("/")) -> int:
 
 
 def thread_count() -> int:
-    """Return how many threads this process has."""
+    """Return the number of threads of this process."""
     return int(_fields("self")["Threads"])
 
 
 def cpu_seconds(pid: int) -> float:
-    """Return how long a process and its threads have run [s], those that ended included.
+    """Return the processor time of a process and its threads, including ended threads [s].
 
     Raises:
         OSError: there is no such process any more.
     """
-    # clock_getcpuclockid(3): the clock of a process is made of its id.
+    # As clock_getcpuclockid(3) derives the clock of a process from its id.
     return time.clock_gettime((~pid << 3) | 2)
 
 
 def _field_mb(pid: int | str, name: str) -> float:
-    # A process that has ended and not been waited for has no memory.
+    # A process that has ended, but whose parent has not waited for it, has no memory.
     kilobytes = _fields(pid).get(name, "0").split()[0]
     return round(int(kilobytes) * 1024 / 1e6, 1)
 
 
 def _fields(pid: int | str) -> dict[str, str]:
-    """Return the fields of proc(5) for a process; for this one even without free descriptors."""
+    """Return a process's fields of proc(5); of this process even without a free descriptor."""
     if pid == "self":
         text = os.pread(_own_status(), 1 << 16, 0).decode("ascii", errors="replace")
     else:
@@ -131,20 +129,17 @@ def _own_status() -> int:
 
 
 def release_unused() -> None:
-    """Return unused memory of the startup, or of loading kernels, to the system.
-
-    This returns freed memory of the calling thread's arena, if the C library can (glibc).
-    """
+    """Return freed memory of the calling thread's arena to the system, if the C library can."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
 
 
 def return_soon() -> None:
-    """Let freed memory return to the system soon, if the C library can (glibc).
+    """Let the C library return freed memory to the system soon, if it can (glibc).
 
-    By default glibc keeps freed large blocks, in an arena for each thread: a recorder of large maps
-    took 15 MB more. Call this before there are threads.
+    By default glibc keeps freed large blocks, in an arena for each thread: 15 MB in a recorder of
+    large maps. Call this before the process has threads.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
@@ -158,9 +153,9 @@ PARENT_PERIOD_S = 0.5
 def call_on(*numbers: int, call: Callable[[], None]) -> Callable[[], None]:
     """Call ``call`` on each of these signals; return a function that restores the old handlers.
 
-    It is called on a thread of its own: a handler runs between any two instructions of the main
-    thread, which may hold a lock that ``call`` needs, such as that of the event it waits for.
-    Only the main thread may handle signals: in any other this changes nothing.
+    ``call`` runs on a thread of its own. A handler would interrupt the main thread, which may hold
+    a lock that ``call`` needs, such as that of an event. Only the main thread may handle signals:
+    on any other thread this function does nothing.
     """
     return _handle(numbers, lambda: _call_apart(call))
 
@@ -168,7 +163,7 @@ def call_on(*numbers: int, call: Callable[[], None]) -> Callable[[], None]:
 def end_within(seconds: float) -> None:
     """End this process if it still exists after a timeout [s]: code 1, its stacks on stderr.
 
-    A thread of C does that: it needs no lock of the interpreter.
+    This works even if the interpreter is blocked, as a C thread does it.
     """
     with suppress(AttributeError, OSError, RuntimeError, ValueError):  # no stderr, or no file
         faulthandler.dump_traceback_later(seconds, exit=True)
@@ -176,7 +171,7 @@ def end_within(seconds: float) -> None:
 
 def _call_apart(call: Callable[[], None]) -> None:
     try:
-        # Below the level of ``threading``, whose locks the main thread may hold as well.
+        # Not by ``threading``, whose locks the main thread may hold.
         _thread.start_new_thread(call, ())
     except RuntimeError:  # there can be no more threads
         call()
@@ -211,9 +206,9 @@ def stop_event(*numbers: int) -> Iterator[threading.Event]:
 
 @contextmanager
 def first_signal_calls(number: int, call: Callable[[], None]) -> Iterator[None]:
-    """Call ``call`` on the first of these signals; a second one has its usual effect.
+    """Call ``call`` on the first such signal, on a thread of its own, see ``call_on``.
 
-    It is called on a thread of its own, see ``call_on``.
+    A second signal has its usual effect.
     """
 
     def once() -> None:
@@ -229,9 +224,9 @@ def first_signal_calls(number: int, call: Callable[[], None]) -> Iterator[None]:
 
 @contextmanager
 def ctrl_c_waits() -> Iterator[None]:
-    """Raise a KeyboardInterrupt that comes during the block only after it.
+    """Delay a KeyboardInterrupt during the block until its end.
 
-    In a callback from C the interrupt would be lost, and the callback's result with it.
+    In a callback from C, the interrupt and the callback's result would be lost.
     """
     if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
@@ -247,7 +242,7 @@ def ctrl_c_waits() -> Iterator[None]:
 
 
 def end_with_parent(parent: int) -> None:
-    """Send this process SIGTERM once its parent, process ``parent``, is gone."""
+    """Send this process SIGTERM once its parent, process ``parent``, has ended."""
 
     def watch() -> None:
         while os.getppid() == parent:

@@ -1,7 +1,6 @@
-"""Where the files that come with the package lie: the maps and the protocol.
+"""Folders of files that come with the package: the maps and the protocol.
 
-In a source checkout they are beside the package; a wheel carries them inside
-it, in ``_share``.
+In a source checkout they are beside the package; in a wheel inside it, in ``_share``.
 """
 
 from pathlib import Path
@@ -10,17 +9,17 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def folder(name: str, package: Path = PACKAGE) -> Path:
-    """Return the folder ``name`` ("maps" or "protocol") that came with the package.
+    """Return a folder that came with the package.
 
     Args:
-        name: name of the folder at the top of the source tree.
+        name: "maps" or "protocol".
         package: folder of the installed package.
 
     Raises:
         FileNotFoundError: this installation has no such folder.
     """
-    # Beside an installed package lie other packages: a site-packages/maps would belong to another
-    # package. Only a checkout has the project file there.
+    # Only a checkout has the project file beside the package. Beside an installed package are other
+    # packages, which may be named alike.
     is_checkout = (package.parent / "pyproject.toml").is_file()
     beside, inside = package.parent / name, package / "_share" / name
     for found in [beside, inside] if is_checkout else [inside]:

@@ -1,9 +1,9 @@
-"""A driven line: its pieces on a raster, the pixels that it sweeps, and its drive time.
+"""Driven line: its pieces on a raster, the pixels that it sweeps, and its driving time.
 
-The robot comes to rest wherever it turns on the spot. Between two such places it speeds up, drives
-and brakes (a trapezoid of speed over time, or a triangle on short ways); a turn is a trapezoid of
-its rate. A robot with a turning radius comes to rest where it changes between forward and backward.
-Independent of the planners' assumptions.
+The robot comes to rest wherever it turns on the spot. Between two such places its speed over time
+is a trapezoid, or a triangle on short ways; in a turn, so is its turn rate. A robot with a turning
+radius comes to rest where it changes between forward and backward. Nothing here uses the planners'
+assumptions.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from fasaco_edge.judge.pixels import Mask
 
 # Tolerance of distances [pixels]: rounding must not exclude a pixel at exactly the distance.
 TOUCH_TOLERANCE_PX = 1e-3
-# Number of rows of pixels that are evaluated at a time.
+# Number of rows of pixels evaluated at a time.
 SWEPT_ROWS = 30_000
 Points = NDArray[np.float64]
-# Bends of an arc are judged with points up to this far apart [m], and this tolerance; bends up to
-# this are steered between points as near to each other as a millimetre [deg].
+# Longest chord of an arc [m], factor of tolerance for its bends, and bend up to which even the
+# shortest chords are steered [deg].
 ARC_STEP_M, ARC_TOLERANCE, STEERED_DEG = 0.06, 1.05, 1.2
 
 
 @dataclass(frozen=True, slots=True)
 class DriveLimits:
-    """Limits of a robot's motion, beside its speed.
+    """Limits of a robot's motion, besides its speed.
 
     Attributes:
-        acceleration_m_s2: acceleration and deceleration of driving.
-        turn_deg_s, turn_deg_s2: rate of turning on the spot, and its acceleration.
-        steered_deg: a bend up to this is steered without a stop.
+        acceleration_m_s2: acceleration and deceleration of driving [m/s^2].
+        turn_deg_s, turn_deg_s2: turn rate on the spot [deg/s], and its acceleration [deg/s^2].
+        steered_deg: bend up to which the robot steers without a stop [deg].
     """
 
     acceleration_m_s2: float
@@ -49,8 +49,9 @@ class ArcBends:
     """The bends of a line for a robot with a turning radius, both bool (n - 1,).
 
     Attributes:
-        reverses: it changes between forward and backward there: the line turns back.
-        spots: no arc of that radius has such a bend: the robot would turn on the spot.
+        reverses: whether the robot changes between forward and backward, as the line turns back.
+        spots: whether the bend is too sharp for an arc of that radius: the robot would have to turn
+            on the spot.
     """
 
     reverses: Mask
@@ -62,7 +63,7 @@ class ArcBends:
     ) -> ArcBends:
         """Judge the bends of a line; ``ways_m`` and ``bends_deg`` as for ``drive_seconds``.
 
-        Between two chords of a circle the line bends by half of the angles that both span.
+        The bend between two chords of a circle is half of the sum of their central angles.
         """
         spans_deg = np.degrees(np.minimum(ways_m, ARC_STEP_M) / radius_m)
         most_deg = 0.5 * ARC_TOLERANCE * (spans_deg[:-1] + spans_deg[1:])
@@ -81,12 +82,12 @@ def drive_seconds(
     """Return the driving time of a line [s].
 
     Args:
-        ways_m: float64 (n,), lengths between its points [m].
-        bends_deg: float64 (n - 1,), turns at the points between, in [0, 180].
-        speed_m_s: the robot's speed.
-        by: its limits.
-        arcs: how it takes the bends if it has a turning radius: on arcs it is as slow as its rate
-            of turning requires.
+        ways_m: lengths of its segments, float64 (n,) [m].
+        bends_deg: bends between its segments, float64 (n - 1,), in [0, 180] [deg].
+        speed_m_s: the robot's speed [m/s].
+        by: the robot's other limits.
+        arcs: the bends of a robot with a turning radius, whose turn rate limits its speed on arcs;
+            else None.
     """
     if not len(ways_m):
         return 0.0
@@ -111,7 +112,7 @@ def _seconds_of_arcs(
     runs_m = np.add.reduceat(ways_m, begins)
     runs_s = _from_rest_to_rest(runs_m, speed_m_s, by.acceleration_m_s2)
     turns_s = _from_rest_to_rest(bends_deg[arcs.spots], by.turn_deg_s, by.turn_deg_s2)
-    # Half of the ways beside a bend is the way on which it is steered.
+    # A bend is steered on half of both segments beside it.
     beside_s = (ways_m[:-1] + ways_m[1:])[~is_stop] / (2.0 * speed_m_s)
     late_s = np.maximum(bends_deg[~is_stop] / by.turn_deg_s - beside_s, 0.0)
     return float(runs_s.sum() + turns_s.sum() + late_s.sum())
@@ -120,7 +121,7 @@ def _seconds_of_arcs(
 def _from_rest_to_rest(
     ways: NDArray[np.float64], most_speed: float, acceleration: float
 ) -> NDArray[np.float64]:
-    """Return the least seconds for ways, angles or lengths, from standstill to standstill."""
+    """Return the least times from rest to rest [s], for lengths or angles."""
     ramp = most_speed / acceleration
     return np.where(
         ways < most_speed * ramp, 2.0 * np.sqrt(ways / acceleration), ways / most_speed + ramp
@@ -132,7 +133,7 @@ class DrivenLine:
     """A driven line on the raster of a floor.
 
     Attributes:
-        starts, ends: where each way begins and ends, (column, row) [pixels], both (n, 2), n >= 1.
+        starts, ends: ends of each segment, (column, row) [pixels], both (n, 2), n >= 1.
     """
 
     starts: Points
@@ -152,7 +153,7 @@ class DrivenLine:
 
     @property
     def ways_and_bends(self) -> tuple[Points, Points]:
-        """Lengths [pixels], (m,), and the turns between them [deg], (m - 1,)."""
+        """Lengths of the segments [pixels], (m,), and the bends between them [deg], (m - 1,)."""
         way = self.ends - self.starts
         lengths = np.hypot(*way.T)
         way = way[lengths > 0]
@@ -160,7 +161,10 @@ class DrivenLine:
         return lengths[lengths > 0], np.abs((turned + 180.0) % 360.0 - 180.0)
 
     def pieces(self, most_px: float, together: int) -> Iterator[tuple[Points, Points]]:
-        """Yield start and end, (k, 2), of pieces of at most ``most_px``, some at a time."""
+        """Yield starts and ends of pieces of length ``most_px`` or less, both (k, 2) [pixels].
+
+        ``together``: largest number of pieces yielded at a time.
+        """
         way = self.ends - self.starts
         counts = np.maximum(np.ceil(np.hypot(*way.T) / most_px), 1).astype(np.int64)
         stops = np.cumsum(counts)
@@ -174,9 +178,9 @@ class DrivenLine:
             yield start + share[0] * along, start + share[1] * along
 
     def swept(self, half_px: float, shape: tuple[int, int]) -> Mask:
-        """Return the pixels whose centre lies within ``half_px`` of the line, bool ``shape``.
+        """Return the pixels whose centre is within ``half_px`` of the line, bool ``shape``.
 
-        The pixels of one row near one piece are a run: a counter goes up where a run begins, and
+        In each row, the pixels near a piece are a run. A counter goes up where a run begins and
         down behind its end.
         """
         rows, cols = shape
@@ -201,20 +205,19 @@ class DrivenLine:
 
 
 def _run_beside(starts: Points, ends: Points, y: Points, reach: float) -> tuple[Points, Points]:
-    """Return where lines across segments enter and leave all that lies within ``reach`` of them.
+    """Return the least and largest x of horizontal lines within ``reach`` of segments.
 
-    A disc at the share ``t`` of a segment spans ``x(t) +- sqrt(reach^2 - (y - y(t))^2)`` on a
-    line: its right end is furthest where the line meets the tangent of all discs, or else at the
-    nearer end of the segment; so is its left end.
+    A disc at the share ``t`` of a segment spans ``x(t) +- sqrt(reach^2 - (y - y(t))^2)`` on a line.
+    Its right end is at a maximum where the line meets the common tangent of all discs, or else at
+    the nearer end of the segment; likewise its left end.
 
     Args:
-        starts, ends: of the segments, float64 (n, 2).
-        y: of the lines, parallel to the x axis, float64 (n, m).
+        starts, ends: ends of the segments, float64 (n, 2).
+        y: y of the lines, float64 (n, m).
         reach: radius of the discs.
 
     Returns:
-        x of entering and x of leaving, both float64 (n, m); the first is NaN where a line comes
-        near no point of a segment.
+        both float64 (n, m); NaN where a line is farther than ``reach`` from a segment.
     """
     way = ends - starts
     dx, dy = way[:, :1], np.where(way[:, 1:] == 0.0, 1e-12, way[:, 1:])

@@ -1,21 +1,21 @@
-"""A judge of swept floor: the area swept by a driven line, and the time it took.
+"""Judge of swept floor: the area swept by a driven line, and the time it took.
 
 Its inputs are a map and a line of points, no cells, walks or planners.
 
 Reachable floor
-    All that the tool's disc touches at the places that the robot's disc can come to from the
-    beginning of the line. The robot fits where all that its disc touches is known free. A tool that
-    sticks out of the robot's disc touches only free pixels that are connected with that disc by
-    free pixels, about inside the tool's disc: none behind a wall.
+    All pixels that the tool's disc touches at positions that the robot's disc can reach from the
+    beginning of the line. The robot fits where its disc touches only known free pixels. A tool that
+    sticks out of the robot's disc touches no floor behind a wall: only pixels that are connected
+    with the robot's disc by free pixels, about inside the tool's disc.
 Swept floor
     The reachable floor that the tool's disc passed over along the line, by the same rules.
 Illegal share
-    The part of the line on which the robot's disc would touch what is not known free.
+    The share of the line on which the robot's disc would touch pixels that are not known free.
 Patch
     Pixels of reachable floor that were not swept, and are connected by their edges.
 
-A map is judged on its own pixels, divided until they are ``FINE_M`` or finer; so a wall lies where
-its pixels do, and a robot fits a corridor that is a finer pixel or two wider than itself.
+A map is judged on its own pixels, divided until they are ``FINE_M`` or finer. So walls are exact,
+and a robot fits into a corridor that is one or two of the finer pixels wider than itself.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from fasaco_edge.judge.driven_line import (
     drive_seconds,
 )
 from fasaco_edge.judge.pixels import Mask, Patches, through, within
+from fasaco_edge.text import percent
 
-# Largest pixel [m], and limit on the number of pixels: pixels are larger where it is reached.
+# Largest pixel [m], except on maps that would have more pixels than this.
 FINE_M = 0.025
 MOST_PIXELS = 24_000_000
 SQRT2 = math.sqrt(2.0)
-# A patch larger than this counts [m2]: 4 dm2.
+# Least area of a patch that counts [m2]: 4 dm2.
 PATCH_M2 = 0.04
-# Pixels of the robot's disc that a line may lose to the raster before it counts as touching.
+# Depth to which the robot's disc may overlap blocked pixels, to allow for the raster [pixels].
 TOUCH_SLACK_PX = 1.5
-# Length of the pieces of a line that are checked for walls [pixels], and how many are checked at a
-# time.
+# Length of the pieces of a line that are checked for walls [pixels], and number checked at a time.
 STEP_PX = 0.7
 PIECES = 4096
 
@@ -58,14 +58,14 @@ class SweepingRobot:
     """The robot that drives along a line.
 
     Attributes:
-        tool_m: width of its tool, a disc [m].
+        tool_m: diameter of its tool, a disc [m].
         radius_m: radius of its own disc [m].
-        speed_m_s: how fast it drives [m/s].
+        speed_m_s: driving speed [m/s].
         turn_s: time of a quarter-turn [s], if ``limits`` are not known.
         free_at_most: occupancy values up to this are known free [percent].
         limits: its other limits; None to count turns by their angle alone.
-        turn_radius_m: of its tightest arc [m]; 0 if it turns on the spot. Without ``limits``,
-            ``turn_s`` is then also what a change between forward and backward takes.
+        turn_radius_m: radius of its tightest arc [m]; 0 if it turns on the spot. Without
+            ``limits``, a change between forward and backward takes ``turn_s``, too.
     """
 
     tool_m: float
@@ -83,21 +83,21 @@ class FloorFigures:
 
     Attributes:
         reachable_m2: reachable floor [m2].
-        swept_m2: area of it that was swept [m2].
+        swept_m2: reachable floor that was swept [m2].
         swept_share: swept area as a share of the reachable; None if no floor is reachable.
-        illegal_share: part of the line on which the robot touches floor not known to be free.
+        illegal_share: share of the line on which the robot touches floor not known to be free.
         length_m: length of the line [m].
         quarter_turns: angle turned on the line, in quarter-turns.
-        seconds: driving and turning [s].
-        least_s: lower bound on the seconds of any line that sweeps as much [s]: a tool of width w
-            sweeps at most w l + pi w^2 / 4 along a line of length l, and turns are not counted. As
-            exact as the area swept, which a raster misstates by a pixel at its rim.
+        seconds: time of driving and turning [s].
+        least_s: lower bound on ``seconds`` for any line that sweeps as much [s]: a tool of width w
+            sweeps at most w l + pi w^2 / 4 along a line of length l, and turns are not counted. Its
+            error is that of the swept area, of up to a pixel along the rim.
         seconds_per_m2: driving time per square metre swept [s/m2]; None if nothing was swept.
         patches_over_4_dm2: patches left that are larger than ``PATCH_M2``.
         largest_patch_m2: the largest patch left [m2].
-        pixel_m: edge of the pixels it was judged on [m].
-        reversals: changes between forward and backward, of a robot with a turning radius.
-        spot_turns: its bends that are tighter than that radius.
+        pixel_m: edge of the pixels that it was judged on [m].
+        reversals: number of changes between forward and backward of a robot with a turning radius.
+        spot_turns: number of bends that are too sharp for that radius.
     """
 
     reachable_m2: float
@@ -117,20 +117,14 @@ class FloorFigures:
 
     @property
     def gap(self) -> float | None:
-        """How far the line is above the lower bound, as a share of it; None if that is 0."""
+        """Relative excess of ``seconds`` over the lower bound; None if the bound is 0."""
         return max(self.seconds / self.least_s - 1.0, 0.0) if self.least_s else None
 
 
 def swept_words(swept_m2: float, reachable_m2: float) -> str:
-    """Return swept and reachable floor [m2] in words; never 100 % before all is swept."""
+    """Return swept and reachable floor [m2] in words; 100 % only if all is swept."""
     areas = f"{swept_m2:,.1f} of {reachable_m2:,.1f} m2"
-    return f"{areas} ({share_words(swept_m2 / reachable_m2)})" if reachable_m2 else areas
-
-
-def share_words(share: float) -> str:
-    """Return a share in percent; never 100.0 % before it is the whole."""
-    percent = min(100.0 * share, 99.9) if share < 1.0 else 100.0
-    return f"{percent:.1f} %"
+    return f"{areas} ({percent(swept_m2 / reachable_m2)})" if reachable_m2 else areas
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,8 +133,8 @@ class JudgedFloor:
 
     Attributes:
         figures: quality of the line.
-        geometry: the raster it was judged on.
-        reachable, swept: bool (rows, cols) on it; swept floor is reachable.
+        geometry: the raster that it was judged on.
+        reachable, swept: pixels of that raster, bool (rows, cols); swept floor is reachable.
     """
 
     figures: FloorFigures
@@ -154,7 +148,7 @@ class JudgedFloor:
         return self.reachable & ~self.swept
 
     def only(self, asked: Mask) -> JudgedFloor:
-        """Return the floor of these pixels alone, bool (rows, cols); figures of the drive stay."""
+        """Return the floor within ``asked``, bool (rows, cols); figures of the drive stay."""
         reachable, swept = self.reachable & asked, self.swept & asked
         areas = _areas(reachable, swept, self.geometry.resolution)
         return JudgedFloor(replace(self.figures, **areas), self.geometry, reachable, swept)
@@ -172,16 +166,17 @@ def judge_floor(
 
     Args:
         grid: the map; it may be rotated in its frame.
-        line_xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, driven straight from
-            one to the next.
-        robot: the driving robot.
-        driven: bool (n - 1,), which of the ways from point to point it drove; on the others it
-            swept nothing, as when a pose jumped. None for all.
-        stands_at: a place (x, y) [m] from which all reachable floor is found; None for the
+        line_xy: points (x, y) [m] in the map frame, joined by straight segments, float64 (n, 2),
+            n >= 1.
+        robot: the robot.
+        driven: which segments it drove, bool (n - 1,); on the others, as where a pose jumped, it
+            swept nothing. None for all.
+        stands_at: a point (x, y) [m] from which all reachable floor is found; None for the
             beginning of the line.
 
     Raises:
-        ValueError: the line has no point, or one that is not finite, or ``driven`` is not of it.
+        ValueError: the line has no points, or points that are not finite, or ``driven`` has another
+            length.
     """
     if line_xy.ndim != 2 or line_xy.shape[1] != 2 or not len(line_xy):
         raise ValueError(f"a line must be points (n, 2), n >= 1, got {line_xy.shape}")
@@ -199,7 +194,7 @@ def judge_floor(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Floor:
-    """The known free floor of a map, on fine pixels, with a margin of blocked pixels around it."""
+    """Known free floor of a map, on fine pixels, with a margin of blocked pixels around it."""
 
     geometry: GridGeometry
     free: Mask
@@ -232,22 +227,22 @@ class _Floor:
 
     def reachable_from(self, point: tuple[float, float]) -> Mask:
         """Return the pixels that the tool touches from places reachable from a point (x, y) [m]."""
-        # The edge of a blocked pixel lies half a pixel before its centre.
+        # A blocked pixel reaches half a pixel beyond its centre.
         fits = ~within(~self.free, self.radius_px + 0.5 - TOUCH_TOLERANCE_PX)
         stands = Patches.of(fits).nearest_to(*self.geometry.to_pixels(*point))
         return self.under_tool(lambda radius_px: within(stands, radius_px + TOUCH_TOLERANCE_PX))
 
     def under_tool(self, near: Callable[[float], Mask]) -> Mask:
-        """Return the floor that the tool touches, none of it through walls.
+        """Return the floor that the tool touches, without floor behind walls.
 
         Args:
-            near: returns the pixels within a radius [pixels] of where the robot is.
+            near: returns the pixels within a radius [pixels] of the robot's positions.
         """
         tool_px = self.robot.tool_m / self.geometry.resolution / 2
         under, beyond_px = near(tool_px), tool_px - self.radius_px
         if beyond_px <= 0:
             return under
-        # Diagonal distances take more steps over edges: allow for that.
+        # Steps lead over edges: a diagonal distance takes more of them.
         return under & through(self.free, near(self.radius_px), math.ceil(SQRT2 * beyond_px))
 
     def illegal_share(self, line: DrivenLine) -> float:

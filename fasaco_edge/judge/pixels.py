@@ -19,14 +19,14 @@ FAR = 2**30
 
 
 def within(mask: Mask, distance: float) -> Mask:
-    """Return which pixels lie at most ``distance`` [pixels] from a marked one.
+    """Return which pixels are within ``distance`` [pixels] of a marked one, bool (rows, cols).
 
-    A disc is a stack of rows: a pixel is near a marked one ``d`` rows away if their distance along
-    the row is at most half of the disc's width at that height.
+    A pixel is near a marked one ``d`` rows away if their distance along the row is at most half of
+    the width that a disc has at the height ``d``.
 
     Args:
         mask: bool (rows, cols).
-        distance: from centre to centre; below 0 none is near.
+        distance: from centre to centre; below 0, no pixel is near.
     """
     near = np.zeros_like(mask)
     if distance < 0 or not mask.any():
@@ -46,11 +46,11 @@ def within(mask: Mask, distance: float) -> Mask:
 
 
 def through(free: Mask, mask: Mask, steps: int) -> Mask:
-    """Return the free pixels within some steps over edges, through free ones, from marked ones.
+    """Return the free pixels that are reached from marked ones by steps through free pixels.
 
     Args:
-        free, mask: bool (rows, cols).
-        steps: their number.
+        free, mask: free and marked pixels, bool (rows, cols).
+        steps: largest number of steps over edges.
     """
     found = mask & free
     for _ in range(steps):
@@ -65,7 +65,7 @@ def through(free: Mask, mask: Mask, steps: int) -> Mask:
 
 
 def _along_rows(mask: Mask) -> NDArray[np.int32]:
-    """Return how far the next marked pixel of the same row is; ``FAR`` or more without any."""
+    """Return the distance of the nearest marked pixel in the same row; ``FAR`` or more if none."""
     index = np.arange(mask.shape[1], dtype=np.int32)
     left = np.maximum.accumulate(np.where(mask, index, np.int32(-FAR)), axis=1)
     right = np.minimum.accumulate(np.where(mask, index, np.int32(FAR))[:, ::-1], axis=1)[:, ::-1]
@@ -78,10 +78,10 @@ class Patches:
     """The patches of a mask: pixels connected by their edges.
 
     Attributes:
-        shape: of the mask.
-        starts, ends: int64 (n,): where each run of marked pixels in a row begins and ends
-            (exclusive), counted along the rows, each one pixel longer than the mask's.
-        of_run: int64 (n,): which patch each run belongs to, 0 .. count - 1.
+        shape: shape of the mask.
+        starts, ends: begin and end (exclusive) of each run of marked pixels in a row, int64 (n,);
+            flat indices into rows one pixel longer than the mask's.
+        of_run: index of the patch of each run, int64 (n,), 0 .. count - 1.
         count: number of patches.
     """
 
@@ -95,7 +95,7 @@ class Patches:
     def of(cls, mask: Mask) -> Patches:
         """Return the patches of ``mask``, bool (rows, cols)."""
         rows, cols = mask.shape
-        # One pixel more, never marked: no run continues in the next row.
+        # An unmarked pixel at the end of each row separates it from the next.
         flat = np.zeros(rows * (cols + 1) + 1, np.int8)
         flat[1:].reshape(rows, cols + 1)[:, :cols] = mask
         change = np.diff(flat)
@@ -106,13 +106,13 @@ class Patches:
 
     @property
     def pixels(self) -> NDArray[np.int64]:
-        """How many pixels each patch has, int64 (count,)."""
+        """Number of pixels of each patch, int64 (count,)."""
         counts: NDArray[np.int64] = np.zeros(self.count, np.int64)
         np.add.at(counts, self.of_run, self.ends - self.starts)
         return counts
 
     def nearest_to(self, col: float, row: float) -> Mask:
-        """Return the patch nearest to a place [pixels], bool (rows, cols); empty without any."""
+        """Return the patch nearest to a point [pixels], bool (rows, cols), or an empty mask."""
         rows, cols = self.shape
         change = np.zeros(rows * (cols + 1), np.int8)
         if self.count:
@@ -130,7 +130,7 @@ class Patches:
 def _touching(
     starts: NDArray[np.int64], ends: NDArray[np.int64], row: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return pairs of runs that touch: of a row of ``row`` pixels, and of the next one."""
+    """Return pairs of runs that touch, in successive rows of ``row`` pixels."""
     first = np.searchsorted(ends, starts + row, side="right")
     stop = np.searchsorted(starts, ends + row, side="left")
     counts = np.maximum(stop - first, 0)
@@ -141,7 +141,7 @@ def _touching(
 
 
 def _joined(count: int, one: NDArray[np.int64], other: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return for each of ``count`` nodes the smallest one that pairs of them lead to."""
+    """Return for each of ``count`` nodes the smallest node that pairs connect it with."""
     root = np.arange(count)
     while True:
         a, b = root[one], root[other]

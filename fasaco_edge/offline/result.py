@@ -17,7 +17,7 @@ from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.drawing.trail import draw_trail
 from fasaco_edge.host.outputs import whole
-from fasaco_edge.judge.floor import FloorFigures, JudgedFloor, share_words
+from fasaco_edge.judge.floor import FloorFigures, JudgedFloor
 from fasaco_edge.offline.figures import (
     above_bound,
     curve_document,
@@ -36,7 +36,7 @@ from fasaco_edge.planners.living_trail import Tau, branching
 from fasaco_edge.planners.own.problem import GridProblem, posed
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.problem import CoverageProblem
-from fasaco_edge.text import duration
+from fasaco_edge.text import duration, percent
 
 # Members of ``RobotConfig``: the limits for timing bends of the line.
 LIMITS = ("turn_deg_s", "turn_deg_s2", "acceleration_m_s2", "steered_deg")
@@ -102,7 +102,7 @@ class Plan:
         words = [f"{self.problem.cells} cells", drive.time, f"{drive.metres:,.1f} m"]
         floor = self.floor
         if floor is not None and floor.swept_share is not None:
-            words[0] = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
+            words[0] = f"{percent(floor.swept_share)} of {floor.reachable_m2:,.1f} m2 swept"
         words.append(f"{drive.turns:,.0f} quarter-turns")
         if drive.gap is not None:
             words.append(f"at most {100 * drive.gap:.0f} % above the shortest time")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fasaco_edge.judge.floor import FloorFigures, share_words
+from fasaco_edge.judge.floor import FloorFigures
 from fasaco_edge.offline.figures import above_bound, patches_left
 from fasaco_edge.offline.settings import CELLS
+from fasaco_edge.text import percent
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.passes import PassPlans
@@ -71,5 +72,5 @@ def _swept(floor: FloorFigures) -> str:
     if floor.swept_share is None:
         return "no floor is reachable"
     pace = "" if floor.seconds_per_m2 is None else f", {floor.seconds_per_m2:.1f} s a square metre"
-    share = f"{share_words(floor.swept_share)} of {floor.reachable_m2:,.1f} m2"
+    share = f"{percent(floor.swept_share)} of {floor.reachable_m2:,.1f} m2"
     return f"{share}{pace}; {patches_left(floor)}"

@@ -1,1 +1,1 @@
-"""Recorded missions run again through the daemon's inbox and mission."""
+"""Replay of recorded missions through the daemon's inbox and mission."""

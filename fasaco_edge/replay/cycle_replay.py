@@ -1,7 +1,7 @@
-"""Replay by cycles of the recorded daemon's loop: the same decisions bit for bit.
+"""Replay by cycles of the recorded daemon's loop: the same decisions, bit for bit.
 
-The turn log has the inputs of each cycle of the daemon's loop, with times; plans are stopped at the
-same stop checks as in the recording. The replay ends at the first cycle with a different decision.
+The turn log has the inputs of each cycle of the daemon's loop, with times. Plans stop at the same
+stop checks as in the recording. The replay ends at the first cycle with a different decision.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from fasaco_edge.wire.documents.turns import (
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 from fasaco_edge.wire.topics import TURNS
 
-# A sample that waits longer than this was taken in no cycle [ns].
+# Longest time from a sample to the cycle that takes it [ns].
 KEPT_NS = 60_000_000_000
-# The log comes twice a second: no sample should come later than this after its end [ns].
+# Longest time that a recording may go on after the end of its log, which comes twice a second [ns].
 SILENT_NS = 5_000_000_000
 
 
@@ -54,11 +54,11 @@ class CycleRecord:
 
     Attributes:
         beginning: initial state of the daemon.
-        kernels: name of its compiled kernels; "" if the mission did not begin.
-        turns: number of cycles without a gap, from the first.
-        gap: what is missing after them; "" for nothing.
-        taken: topic and checksum of every sample it took.
-        began_ns: when its first cycle was, by the recorder's clock [ns].
+        kernels: name of the daemon's compiled kernels; "" if the mission did not begin.
+        turns: number of cycles up to the first gap.
+        gap: what is missing after them, or "".
+        taken: topic and checksum of every sample that the daemon took.
+        began_ns: time of the first cycle, by the recorder's clock [ns].
     """
 
     beginning: LogStart
@@ -70,7 +70,7 @@ class CycleRecord:
 
 
 def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
-    """Return the content of the turn log; None if it is missing, or its beginning is."""
+    """Return the content of the turn log; None if the log, or its beginning, is missing."""
     beginning: LogStart | None = None
     kernels, turns, gap = "", 0, ""
     taken: set[tuple[str, int]] = set()
@@ -96,7 +96,7 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
             gap = f"turns {turns + 1} to {batch.first - 1} are not in the recording"
             break
         if batch.times:
-            # A batch comes just after its last cycle: the least delay counts.
+            # Each batch comes just after its last cycle: the one with the least delay counts.
             first_ns = first_ns or round(1e9 * batch.times[0])
             since_ns = log_ns - round(1e9 * batch.times[-1]) + first_ns
             began_ns = min(began_ns or since_ns, since_ns)
@@ -111,20 +111,20 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
 
 
 class UntakenSamples:
-    """Recorded samples until the cycle that took them."""
+    """Recorded samples that no cycle has taken yet."""
 
     def __init__(self, taken: frozenset[tuple[str, int]]) -> None:
         self._taken = taken
         self._samples: dict[tuple[str, int], Arrival] = {}
 
     def add(self, arrival: Arrival) -> None:
-        """Keep a sample, if a cycle took it."""
+        """Keep a sample if a cycle of the recorded daemon took it."""
         key = arrival.topic, zlib.crc32(arrival.sample.payload)
         if key not in self._taken:
             return
         self._samples.pop(key, None)
         self._samples[key] = arrival
-        # The oldest come first.
+        # The oldest samples are first.
         while (oldest := next(iter(self._samples))) != key:
             if arrival.wall_ns - self._samples[oldest].wall_ns < KEPT_NS:
                 break
@@ -137,7 +137,7 @@ class UntakenSamples:
 
 
 def inflated_sample(told: EarlySample) -> Sample:
-    """Return a sample that is in the turn log itself.
+    """Return a sample that the turn log itself contains.
 
     Raises:
         MalformedMessage: it cannot be inflated, or is longer than any message.
@@ -176,16 +176,16 @@ class CycleReplay:
     """Feeds the cycles of a recording to a mission.
 
     Args:
-        config: of the recorded daemon.
+        config: configuration of the recorded daemon.
         record: the content of its turn log.
 
     Attributes:
         mission: the mission, for inspection between steps.
-        turns: how many cycles were played and ended as recorded.
-        plans: how many plans were made, including those in spare time.
-        difference: the first decision or sample that differs; None without one.
+        turns: number of cycles played that ended as recorded.
+        plans: number of plans made, including those in spare time.
+        difference: the first decision or sample that differs; None without a difference.
         kernels: name of the compiled kernels in use.
-        began_ns: when its first cycle was, by the recorder's clock [ns].
+        began_ns: time of the first cycle, by the recorder's clock [ns].
     """
 
     def __init__(self, config: DaemonConfig, record: CycleRecord) -> None:
@@ -206,7 +206,7 @@ class CycleReplay:
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
         """Yield each cycle, up to the first that differs from the recording."""
-        # A batch is played when the next one has come: by then all its samples are there.
+        # A batch is played once the next one has come: all its samples have come by then.
         batch: TurnBatch | None = None
         for arrival in samples:
             if arrival.topic in EMBEDDED and len(arrival.sample.payload) <= POSE_BYTES:
@@ -270,7 +270,7 @@ class CycleReplay:
         return sample
 
     def _plans(self, turn: Cycle) -> list[PlanReady]:
-        """Return the plan that was finished in this cycle, made again."""
+        """Make the plan again that was finished in this cycle; return it, or none."""
         taken, request = turn.plan, self._request
         if taken is None:
             return []

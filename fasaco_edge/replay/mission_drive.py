@@ -26,14 +26,14 @@ LOAD_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ReplayStep:
-    """A cycle of the daemon's loop, repeated.
+    """A replayed cycle of the daemon's loop.
 
     Attributes:
-        at_s: when, since the first one [s].
-        state, reason: of the mission after it; "loading" before there is one.
+        at_s: time since the first cycle [s].
+        state, reason: of the mission after the cycle; "loading" before there is a mission.
         changed: whether the state has changed.
-        decision: what was decided.
-        refused: errors of its malformed samples.
+        decision: the mission's decision.
+        refused: errors of malformed samples.
         as_recorded: whether its path has exactly the points of the recorded path of the same
             revision; None if there is no such path.
     """
@@ -58,14 +58,14 @@ class MissionDrive:
     """Feeds samples, commands and plans to a mission as the daemon's loop does.
 
     Args:
-        config: of the daemon.
-        ledger: the ledger that the mission begins with; None for nothing covered.
-        rooms: the rooms that it begins with; None for none.
+        config: configuration of the daemon.
+        ledger: the ledger that the mission begins with; None if nothing was covered.
+        rooms: the rooms that it begins with; None without rooms.
 
     Attributes:
         mission: the mission, for inspection between cycles.
         planner: the planner that the daemon would use.
-        mailbox: where samples wait, without rate limits.
+        mailbox: the daemon's mailbox, without rate limits.
         began: time of the first cycle [s].
         state: state of the mission after the last cycle; "" before it has begun.
     """

@@ -1,9 +1,9 @@
 """Replay by time: the samples of a recording through the daemon's inbox and mission.
 
 Time is that of the samples, and planning is counted in work, so that the same samples give the
-same decisions, bit for bit, on any machine. A recording without a turn log does not show in which
-cycle the daemon took a sample, nor how much work each plan had time for. So each sample gets its
-own cycle, with cycles of the daemon's clock in between, and each plan the same work.
+same decisions, bit for bit, on any machine. A recording without a turn log shows neither in which
+cycle the daemon took a sample, nor how much work a plan did. So each sample gets its own cycle,
+with cycles of the daemon's clock in between, and all plans do the same work.
 """
 
 from __future__ import annotations
@@ -37,14 +37,12 @@ from fasaco_edge.wire.documents.settings import Settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.topics import COMMAND, RECORDED_INPUTS, TURNS
 
-# How long the mission runs after the last sample [s], of an input or not: plans finish, timeouts
-# expire.
+# Time that the mission runs on after the last sample, to finish plans and timeouts [s].
 TAIL_S = 3.0
-# Samples this close together are taken in one cycle: the daemon's loop needs about as long to
-# wake up.
+# Samples within this time are taken in one cycle [ns]: the daemon's loop takes as long to wake up.
 TOGETHER_NS = 1_000_000
 INPUTS = frozenset(RECORDED_INPUTS) - {TURNS.name}
-# Proposals of a plan: about what a small computer makes in 0.1 s.
+# Number of proposals of a plan, about as many as a small computer makes in 0.1 s.
 PROPOSALS = 200_000
 
 
@@ -55,13 +53,12 @@ class RecordedRun:
     Attributes:
         config: its configuration, from its first status.
         version: its release.
-        ready_ns: when its mission had begun, with a map, see ``Arrival``; None if no status shows
-            that.
-        restored_cells: number of covered cells that it took over from an earlier run; the recording
-            does not have them.
-        starts: how often a daemon was started after the first.
+        ready_ns: arrival of the first status of its mission with a map, as ``Arrival.at_ns``; None
+            without such a status.
+        restored_cells: number of covered cells from an earlier run, which the recording lacks.
+        starts: number of starts of a daemon after the first.
         paths: reasons of its published paths by revision, without those of a second daemon.
-        path_ns: when each of them came, by the recorder's clock [ns].
+        path_ns: arrival of each of these paths, by the recorder's clock [ns].
     """
 
     config: Settings = field(default_factory=dict)
@@ -76,11 +73,10 @@ class RecordedRun:
         """Return the configuration in the keys and names of this release.
 
         Raises:
-            BadConfiguration: it is of a release whose settings this one does not know.
+            BadConfiguration: this release does not know its settings.
         """
-        # Releases without lines drove through cells; those without lattice rotation, along the
-        # axes.
-        # They took no price for steps into other rooms, either.
+        # The defaults are what releases did before these keys existed: they drove through cells,
+        # along the axes of the map, and without a price for steps into other rooms.
         config = without_removed(renamed(self.config))
         mission = config.get("mission", {})
         if isinstance(mission, Mapping):
@@ -114,7 +110,7 @@ def read_run(samples: Iterable[Arrival]) -> RecordedRun:
     if not statuses:
         return RecordedRun(paths=paths, path_ns=path_ns)
     first = statuses[0][1]
-    # The mission begins with a map, and keeps it as long as it lives.
+    # A mission begins with a map, and has one until its end.
     ready = [arrival.at_ns for arrival, status in statuses if status.map is not None]
     begun = [status.map is not None for _, status in statuses]
     return RecordedRun(
@@ -133,12 +129,13 @@ class Replay:
 
     Args:
         config: configuration of the replayed daemon.
-        ready_ns: when its mission may begin, see ``RecordedRun``; None for with its first map.
-        work: proposals of each plan.
+        ready_ns: earliest begin of its mission, see ``RecordedRun``; None to begin with the first
+            map.
+        work: number of proposals of each plan.
 
     Attributes:
         mission: the mission, for inspection between steps.
-        began_ns: when its first sample came, by the recorder's clock [ns].
+        began_ns: arrival of the first sample, by the recorder's clock [ns].
     """
 
     def __init__(
@@ -148,15 +145,17 @@ class Replay:
         self._drive = MissionDrive(config)
         self.mission = self._drive.mission
         self._budget_s, self._work = config.planner.budget_s, work
-        # The plan under way, and when it is finished [s].
+        # When the present plan is finished [s], and that plan.
         self._due: tuple[float, PlanReady] | None = None
         self._commands = 0
         self._now = 0.0
         self._base_ns = self.began_ns = 0
 
     def steps(self, samples: Iterable[Arrival]) -> Iterator[ReplayStep]:
-        """Yield each cycle; samples that are no input of the mission only advance the time. If a
-        daemon loads slowly, its mission begins, and its path comes, after its last input.
+        """Yield each cycle.
+
+        Samples that are no input of the mission advance the time, too: the mission of a daemon that
+        loads slowly may begin after its last input.
         """
         together: list[Arrival] = []
         last = 0.0
@@ -177,7 +176,7 @@ class Replay:
         yield from self._wait(max(last, self._now) + TAIL_S)
 
     def _at(self, arrival: Arrival) -> float:
-        """Return when a sample came [s]: by the wall clock, which runs on over a restart."""
+        """Return a sample's time [s] by the wall clock, which a restart does not reset."""
         return 1e-9 * (arrival.wall_ns + self._base_ns)
 
     def _take(self, arrivals: list[Arrival]) -> Iterator[ReplayStep]:
@@ -187,7 +186,7 @@ class Replay:
         yield self._cycle(now, arrivals)
 
     def _wait(self, until: float) -> Iterator[ReplayStep]:
-        """Make the cycles that come without a sample."""
+        """Make the cycles without samples up to ``until`` [s]."""
         while True:
             now = self._now + TICK_S
             if self._due is not None:
@@ -214,7 +213,7 @@ class Replay:
         return replace(step, refused=(*step.refused, *refused))
 
     def _plan(self, request: PlanRequest, now: float) -> None:
-        """Make a plan, which takes as long as its budget."""
+        """Make a plan; it is finished after its time budget."""
         problem = request.problem
         took_s = most_s(problem) if problem.only_better else self._budget_s
         limit = AnyOf(WorkLimit(SearchWork(proposals=self._work)))
@@ -235,6 +234,6 @@ class Replay:
                 refused.append(error)
                 continue
             self._commands += 1
-            # The daemon accepted it, so it was allowed to forget what was covered.
+            # The daemon accepted it, so it was allowed to forget covered cells.
             commands.append(CommandReceived(self._commands, *asked._replace(discard=True)))
         return commands, refused

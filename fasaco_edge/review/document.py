@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.client.phrases import percent
+from fasaco_edge.text import percent
 
 if TYPE_CHECKING:
     from fasaco_edge.review.moments import Stand

@@ -1,1 +1,1 @@
-"""A simulated robot in a building: its ``world``, drive, ``mapper`` and ``node`` on the bus."""
+"""Simulated robot in a building: its ``world``, drive, ``mapper`` and ``node`` on the bus."""

@@ -1,4 +1,4 @@
-"""The simulated robot's scanner, and the map that it makes of the building while it drives."""
+"""Scanner of the simulated robot, and the map that it makes of the building while it drives."""
 
 from __future__ import annotations
 
@@ -12,28 +12,27 @@ from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
 from fasaco_edge.simulation.robot import SimulationConfig
 
-# Spacing of the checks whether the hull has room along a straight line [m]: between two checks a
-# corner may reach less than a millimetre into the hull.
+# Spacing of the checks whether the hull fits along a straight line [m]: between two checks, a
+# corner reaches less than a millimetre into the hull.
 SPACING_M = 0.025
 
 
 def rays_for(reach_px: float) -> int:
-    """Return how many rays a scan needs so that it misses no pixel in sight.
+    """Return the number of rays of a scan that misses no visible pixel, for a reach [pixels].
 
-    Neighbouring rays are at most a pixel apart where they end: 440 rays for 3.5 m at
-    5 cm, where the LDS-01's 360 would not do. A pixel whose centre is d <= reach away
-    holds a disc of diameter 1, which is 2 asin(1 / 2d) >= 1 / reach wide in angle, so
-    at least one ray crosses it.
+    A pixel at a distance d <= reach contains a disc of diameter 1, whose angular width is
+    2 asin(1 / 2d) >= 1 / reach: at least one ray crosses it. For 3.5 m at 5 cm this takes 440 rays,
+    more than the LDS-01's 360.
     """
     return max(math.ceil(math.tau * reach_px), 4)
 
 
 class Mapper:
-    """A scanner in a ground-truth map, and the robot's own map beside it.
+    """A scanner in a ground-truth map, and the robot's own map.
 
-    Localisation is perfect: both maps share the frame and the pixel raster. The robot's own map is
-    published as SLAM would: only as large as what is known, so its origin and its size change while
-    the robot explores.
+    Localisation is perfect: both maps share the frame and the pixel raster. As from SLAM, the
+    published map is only as large as its known part: its origin and size change while the robot
+    explores.
     """
 
     def __init__(self, truth: OccupancyGrid, config: SimulationConfig) -> None:
@@ -51,11 +50,11 @@ class Mapper:
         self._angles = np.arange(rays) * (math.tau / rays)
 
     def believed(self, pose: Pose2D) -> Pose2D:
-        """Return the estimated pose of a robot at ``pose``: the same, without any error."""
+        """Return the estimated pose of a robot at ``pose``: the same pose, as there is no error."""
         return pose
 
     def true_place(self, x: float, y: float) -> Point:
-        """Return the true position of a place on its map [m]: equal to it."""
+        """Return the true position of a point of its map [m]: the same point."""
         return x, y
 
     def scan(self, pose: Pose2D) -> Window | None:
@@ -63,7 +62,7 @@ class Mapper:
         that may have changed, or None."""
         geometry = self._truth.geometry
         x, y = geometry.to_pixels(pose.x, pose.y)
-        # The scanner turns with the robot, so that turning on the spot sees a little more.
+        # The rays turn with the robot.
         angles = self._angles + (pose.yaw - geometry.origin.yaw)
         directions = np.column_stack((np.cos(angles), np.sin(angles)))
         truth, known = self._truth.cells, self._known
@@ -77,9 +76,9 @@ class Mapper:
     def is_clear(self, start: Point, end: Point, margin_m: float = 0.0) -> bool:
         """Return whether the hull can move straight between two points [m], by the own map.
 
-        Unknown is not clear. Checked every half pixel, and every SPACING_M: an obstacle that fits
-        between two discs is thinner than the padding, but can stop the robot. A margin [m] around
-        the hull excludes such obstacles.
+        Unknown pixels are not clear. Checks are half a pixel, or SPACING_M, apart: an obstacle
+        thinner than the padding may fit between two checks, and stop the robot. A margin around the
+        hull [m] excludes such obstacles.
         """
         x0, y0 = self._geometry.to_pixels(*start)
         x1, y1 = self._geometry.to_pixels(*end)
@@ -97,14 +96,14 @@ class Mapper:
         )
 
     def is_clear_at(self, point: Point) -> bool:
-        """Return whether the hull has room at a point [m], by the own map; unknown is no room."""
+        """Return whether the hull fits at a point [m], by the own map; not on unknown pixels."""
         x, y = self._geometry.to_pixels(*point)
         return bool(disc_is_free(self._known, x, y, self._hull_px, self._free_at_most))
 
     def snapshot(self, stamp_ns: int) -> OccupancyGrid | None:
         """Return the own map, cropped to its known part; None before anything is known.
 
-        The crop is rounded outward to whole chunks, and ends where its raster ends.
+        The crop is rounded outward to whole chunks, within the raster.
         """
         if self._extent is None:
             return None

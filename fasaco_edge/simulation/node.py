@@ -1,4 +1,4 @@
-"""The simulated robot on the bus: map and pose go out, paths or velocities come in."""
+"""Simulated robot on the bus: map and pose out, paths or velocities in."""
 
 from __future__ import annotations
 
@@ -28,25 +28,25 @@ log = logging.getLogger(__name__)
 
 Driver = Literal["ideal", "follow"]
 
-# A cycle of the loop runs ticks for this long at most, before it looks for a new path [s].
+# Longest time that the loop runs ticks before it looks for a new path [s].
 CYCLE_S = 0.02
-# Waits are no shorter than this, or a fast simulation would do nothing but wake up [s].
+# Shortest wait, to bound the wake-ups of a fast simulation [s].
 WAIT_S = 0.004
-# A simulation is never further behind than this [s].
+# Largest delay of a simulation that cannot keep up [s].
 DEBT_S = 0.1
-# A robot without a new pose for this long is no longer an obstacle [s, real time].
+# A robot without a new pose for this real time is no longer an obstacle [s].
 CARRIED_AWAY_S = 10.0
 REPORT_EVERY_S = 0.5
-# A robot that is simulated faster than real time waits for a new velocity after this long
-# [simulated s], but at most this long [s]: so its follower has as much time as on a real robot.
+# A simulation faster than real time waits for the next velocity once the last one is this old
+# [simulated s], for up to this real time [s].
 ANSWER_S, PATIENCE_S = 0.1, 0.5
 
 
 class Pace:
     """Schedules ticks, so that ``speed`` simulated seconds pass in a second.
 
-    A machine that cannot keep up falls behind by ``DEBT_S`` at most; a larger debt is dropped, so
-    that the simulation slows down instead of racing later.
+    A computer that cannot keep up falls behind by ``DEBT_S`` at most: the simulation slows down
+    instead of catching up later.
 
     Args:
         speed: simulated seconds per second, above 0.
@@ -58,7 +58,7 @@ class Pace:
         self._interval_s, self._due_s = tick_s / speed, now_s
 
     def behind_s(self, now_s: float) -> float:
-        """Return how long the next tick has been due [s]; below 0 the time until it is due."""
+        """Return how long the next tick has been due [s]; negative before it is due."""
         return now_s - self._due_s
 
     def ticked(self, now_s: float) -> None:
@@ -67,10 +67,10 @@ class Pace:
 
 
 class Progress(NamedTuple):
-    """Progress of a simulation, beside that of its world.
+    """Progress of a simulation, besides the state of its world.
 
     Attributes:
-        refused: paths or velocities that were malformed, or in another frame.
+        refused: number of paths or velocities that were malformed, or in another frame.
         speed: simulated seconds per second, since the last report.
     """
 
@@ -93,17 +93,18 @@ def run_simulation(
     """Run the robot of ``world`` on the bus until it has to stop.
 
     It publishes its map (latched) and its pose with simulated time as the stamp, and drives along
-    the newest path, or by velocities. In the main thread, SIGINT and SIGTERM end it too. Its last
-    map and pose are published before it returns its last progress; None if it was stopped before it
-    had joined the bus.
+    the newest path, or by velocities. In the main thread, SIGINT and SIGTERM end it, too. At the
+    end it publishes its last map and pose, and returns its last progress; None if it was stopped
+    before it had joined the bus.
 
     Args:
-        world, keys, settings: the building and the robot, its keys, and how to join the bus.
-        speed: simulated seconds per second, above 0; a machine that cannot keep up
-            runs slower.
-        driver: ideal: it follows paths itself; follow: velocities drive it.
+        world: the building and the robot.
+        keys: keys of the robot.
+        settings: settings of the session.
+        speed: simulated seconds per second, above 0; a computer that cannot keep up runs slower.
+        driver: "ideal": it follows paths itself; "follow": velocities drive it.
         meets_others: whether other robots on the bus are obstacles.
-        waits: whether it waits until a program listens at its endpoint.
+        waits: whether it waits until a process listens at its endpoint.
         should_stop: called some fifty times a second.
         report: called about twice a second, and at the end.
 
@@ -129,8 +130,8 @@ def run_simulation(
 
 
 class RobotOnBus:
-    """The robot of a world on a bus: publishes what it emits, and follows the newest path, or
-    the newest velocity."""
+    """The robot of a world on a bus: publishes its messages, and follows the newest path, or the
+    newest velocity."""
 
     def __init__(self, world: World, keys: Keys, bus: Bus, driver: Driver = "ideal") -> None:
         self._world = world
@@ -173,7 +174,7 @@ class RobotOnBus:
                 report(self.progress(now_s))
 
     def publish(self, emission: Emission) -> None:
-        """Publish map, pose and battery, where there are any."""
+        """Publish map, pose and battery, if present."""
         # The map comes first, so that it shows the place of the pose.
         if emission.map is not None:
             self._map.put(encode_occupancy_grid(emission.map))
@@ -185,7 +186,7 @@ class RobotOnBus:
             self._battery.put(encode_battery(state))
 
     def meet(self, sample: Sample) -> None:
-        """Take another robot's pose as its position; on a Zenoh thread."""
+        """Take in another robot's pose; on a Zenoh thread."""
         name = self._keys.robot_of(sample.key)
         if name in ("", self._keys.robot):
             return
@@ -209,7 +210,7 @@ class RobotOnBus:
         return is_late and now_s - self._took_at < patience_s
 
     def _take_newest(self, timeout_s: float) -> None:
-        """Wait for paths or velocities; a malformed one affects nothing else."""
+        """Wait for a path or a velocity; a malformed one is counted and dropped."""
         sample = self._newest.take(timeout_s)
         if sample is None:
             return

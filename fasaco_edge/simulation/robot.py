@@ -1,12 +1,12 @@
-"""The simulated robot: a differential drive that follows a polyline, and changes to new ones.
+"""Simulated robot: a differential drive that follows a polyline, and changes to new ones.
 
 It drives straight and turns on the spot. The drive is ideal (no slip, no delay), so that a run
 shows effects of the path alone. It comes to rest at every corner: that is the cost of turns.
 
-A path begins at the centre of the cell the robot was in when it was planned. Since then the robot
-has moved on: through the first waypoints, if the new path begins like the old one, or off to a
-side. Only waypoints that it has driven through may be skipped. The robot's position alone does not
-determine them: a path into a dead end and back passes the same point twice.
+A path begins at the centre of the cell that the robot was in when it was planned. Since then the
+robot has moved on: through the first waypoints, if the new path begins like the old one, or to one
+side. It may skip only waypoints that it has driven through. Its position alone does not determine
+them: a path into a dead end and back passes the same point twice.
 """
 
 from __future__ import annotations
@@ -24,23 +24,24 @@ from fasaco_edge.grid.motion import limited, stopping_rate
 
 MAY_BE_ZERO = ("padding_m", "free_at_most", "turn_radius_m", "battery_min")
 
-# Closer than this the robot is at a corner [m].
+# Distance within which the robot has reached a corner [m].
 ARRIVED_M = 1e-3
-# A run begins at a heading error below this [rad], so that it ends within ARRIVED_M of its corner
-# after 10 m. While driving, larger errors are corrected by steering; those above MISALIGNED_RAD by
-# a turn at rest.
+# Heading error below which the robot starts to drive [rad]: after 10 m it is then within ARRIVED_M
+# of its corner.
 ALIGNED_RAD = 1e-4
+# Heading error up to which the robot steers while driving; above, it comes to rest and turns [rad].
 MISALIGNED_RAD = 0.05
-# A bend below this need not be a corner: the robot steers through it and does not stop [rad].
+# Bend up to which the robot steers and does not stop [rad].
 STRAIGHT_RAD = 0.02
-# Such a bend is a corner all the same if the robot would miss it by more than this [m].
+# A smaller bend is a corner, too, if the robot would miss it by more than this [m].
 CUT_M = 0.002
-# A waypoint is driven through if a point of the track is this near [m]: at least half of the
+# Distance from the track within which a waypoint has been driven through [m], at least half of the
 # track's spacing.
 PASSED_WITHIN_M = 0.02
-# As a last resort the path is joined anywhere within this distance of its start [m].
+# As a last resort, the path is joined anywhere within this distance of its start [m].
 JOIN_WITHIN_M = 2.0
-# A way back may leave the track at each of this many last points, and at every n-th before them.
+# A way back may leave the track at each of its last BACK_POINTS points, and at every BACK_STRIDE-th
+# point before.
 BACK_POINTS, BACK_STRIDE = 100, 10
 
 
@@ -56,16 +57,16 @@ class SimulationConfig:
         acceleration_m_s2: acceleration and deceleration of driving [m/s^2].
         turn_acceleration_rad_s2: acceleration and deceleration of turning [rad/s^2].
         robot_radius_m: radius that the planner uses [m].
-        padding_m: by how much that radius exceeds the hull's [m]. Only the hull collides: a robot
-            as wide as its corridor would touch at the first rounding error.
+        padding_m: difference of that radius and the hull's [m]. Only the hull collides: a robot as
+            wide as its corridor would touch at the first rounding error.
         range_m: range of the scanner [m].
         free_at_most: occupancy values up to this are free [percent].
         map_chunk_m: the published map grows by blocks of about this size [m].
         tick_s: the simulation's time step [s].
         scan_hz, map_hz, pose_hz: rates [Hz]; their periods are rounded to whole ticks.
-        turn_radius_m: of the tightest arc that the base drives by velocities, forward or backward
-            [m]; 0 for a base that turns on the spot, and drives only forward.
-        battery_min: how long its battery lasts [min]; 0 for unlimited. It charges where the robot
+        turn_radius_m: radius of the tightest arc that the base drives by velocities, forward or
+            backward [m]; 0 for a base that turns on the spot, and drives only forward.
+        battery_min: driving time of its battery [min]; 0 for unlimited. It charges where the robot
             began.
     """
 
@@ -117,8 +118,8 @@ class DriveState:
     """Pose and velocity of the robot.
 
     Attributes:
-        pose: in the map frame.
-        speed: forward [m/s]; negative only with a turning radius.
+        pose: pose in the map frame.
+        speed: forward speed [m/s]; negative only with a turning radius.
         turn_rate: counter-clockwise [rad/s].
     """
 
@@ -128,7 +129,7 @@ class DriveState:
 
     @property
     def moving(self) -> bool:
-        """Return whether any wheel turns."""
+        """Whether any wheel turns."""
         return self.speed != 0.0 or self.turn_rate != 0.0
 
 
@@ -179,7 +180,7 @@ def moved_by(
 
 
 def stopping_point(state: DriveState, config: SimulationConfig) -> Point:
-    """Return where (x, y) [m] the robot would come to rest if it braked now."""
+    """Return the point (x, y) [m] where the robot would come to rest if it braked now."""
     # (v - a dt) dt, (v - 2 a dt) dt, ... add up to v^2 / 2a - v dt / 2.
     reach = max(
         state.speed**2 / (2.0 * config.acceleration_m_s2) - 0.5 * state.speed * config.tick_s, 0.0
@@ -227,14 +228,14 @@ def joined(
 ) -> NDArray[np.float64] | None:
     """Return the corners to drive through from the track's last point to the path's end.
 
-    Straight to the first waypoint not yet driven through, or to the one before it. If
-    neither way is clear, and the robot ``goes_back``, back along the track until one is; if none
-    ever is, to the nearest waypoint of the first metres that can be reached.
+    The way leads straight to the first waypoint not yet driven through, or to the one before it. If
+    neither is clear, a robot that ``goes_back`` first drives back along its track until one of them
+    is. If none ever is, it drives straight to the nearest clear waypoint of the first metres.
 
     Args:
         path: waypoints [m], float64 (n, 2).
-        track: points [m] the robot came through lately, float64 (m, 2), m >= 1; the last
-            is where it is, or can come to rest.
+        track: last points of the robot's track [m], float64 (m, 2), m >= 1; the last of them is
+            where the robot is, or can come to rest.
         is_clear: returns whether the robot can move straight between two points.
 
     Returns:
@@ -262,8 +263,7 @@ def joined(
 def passed_waypoints(path: NDArray[np.float64], track: NDArray[np.float64]) -> int:
     """Return how many of the first waypoints the robot drove through, in order; see ``joined``.
 
-    Counted from its latest visit to the first one: visits before that belong to paths before this
-    one.
+    It counts from the latest visit to the first waypoint: earlier visits belong to earlier paths.
     """
     since = 0
     for index, waypoint in enumerate(path):
@@ -287,7 +287,7 @@ class Battery:
         level: its charge, from 0 to 1.
         is_charging: whether it was in its dock, standing, at the last tick.
         lowest: the least charge so far.
-        charges: how often charging began.
+        charges: number of times that it was charged from below half.
     """
 
     minutes: float
@@ -304,7 +304,7 @@ class Battery:
             drain *= 1.0 if moves else STANDING
         else:
             drain *= -CHARGING
-            # In passing, or before it sets out, charging is negligible.
+            # Charging in passing, or before it starts to drive, does not count.
             self.charges += not was_charging and self.level < 0.5
         self.level = min(max(self.level - drain, 0.0), 1.0)
         self.lowest = min(self.lowest, self.level)

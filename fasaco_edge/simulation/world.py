@@ -1,7 +1,7 @@
-"""The simulated world: a ground truth, a robot that maps it, and a clock of equal ticks.
+"""Simulated world: a ground truth, a robot that maps it, and a clock of equal ticks.
 
-No bus, no file, no wall clock: ``tick`` returns the messages to publish. The
-same calls give the same values, bit for bit.
+No bus, no file, no wall clock: ``tick`` returns the messages to publish. The same calls give the
+same values, bit for bit.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from fasaco_edge.simulation.robot import (
 
 # Spacing of the recorded track on straight runs [m]; corners are recorded as they are.
 TRACK_SPACING_M = 0.02
-# The last metres of the track that show which part of a new path is driven already [m]: at twenty
-# times the real speed, a path that took a second begins five metres behind the robot.
+# Number of the track's last points that show which part of a new path is driven already: at twenty
+# times real time, a path planned in a second begins five metres behind the robot.
 RECENT_TRACK_POINTS = 500
 # Timeout of the velocity, after which a base stops by itself [s].
-DEAF_S = 0.5
+VELOCITY_TIMEOUT_S = 0.5
 # Directions, relative to its heading, in which a base slides along a wall that it hits [deg].
 SLIDES_DEG = (15, -15, 30, -30, 45, -45, 60, -60, 75, -75)
-# Clearance to other robots, all of one size, on stopping [m].
+# Distance to another robot's hull at which the robot stops [m]; all robots have one size.
 MEETING_M = 0.05
-# Clearance of the robot's own line to its path, where possible [m].
+# Clearance of the robot's own way to its path, where possible [m].
 MARGIN_M = 0.005
 
 
@@ -53,15 +53,15 @@ class Activity(enum.Enum):
     DRIVING = "driving"
     """The robot is on a path, or on its way to one."""
     NO_WAY = "no_way"
-    """The robot sees no clear way to the path's beginning, and looks again after every scan."""
+    """The robot's map shows no clear way to the path's beginning; it searches after every scan."""
     STOPPED = "stopped"
-    """The robot's way leads into an obstacle of its own map; it stopped before that, looked once
-    for another way to its path, and waits for another path."""
+    """The robot stopped before an obstacle of its own map, searched once for another way to its
+    path, and waits for another path."""
     COLLIDED = "collided"
-    """The path led into an obstacle; it stops there and waits for another path."""
+    """The robot drove into an obstacle, stands there, and waits for another path."""
 
 
-# The robot is in its dock if it is this near to its start [m].
+# Distance from its start within which the robot is in its dock [m].
 DOCK_M = 0.3
 BATTERY_HZ = 1.0
 
@@ -76,13 +76,13 @@ class Emission:
 
 
 class World:
-    """A robot that knows only what it scanned, in a building that does not move.
+    """A robot that knows only what it has scanned, in a static building.
 
     Args:
-        truth: the building. What is not free there (unknown too) is an obstacle.
+        truth: the building. All pixels that are not free, even unknown ones, are obstacles.
         start: the robot's first pose, in the frame of ``truth``.
         config: the robot.
-        mapper: the robot's; None for one that makes no error.
+        mapper: the robot's mapper; None for a mapper without errors.
 
     Raises:
         StartOutsideMap: ``start`` is not on ``truth``.
@@ -97,7 +97,7 @@ class World:
         mapper: Mapper | None = None,
     ) -> None:
         self._truth, self.config = truth, config
-        # Name of the frame of everything the robot publishes.
+        # Name of the frame of all messages of the robot.
         self.frame = truth.frame
         col, row = truth.geometry.to_pixels(start.x, start.y)
         if not (0 <= row < truth.geometry.rows and 0 <= col < truth.geometry.cols):
@@ -111,8 +111,9 @@ class World:
         self.mapper = mapper or Mapper(truth, config)
         self._path: NDArray[np.float64] | None = None
         self._corners: list[Point] = []
-        # The newest velocity, if one drives it: speed [m/s], turn rate [rad/s], and its tick.
-        self._told: tuple[float, float, int] | None = None
+        # The newest velocity, if the robot is driven by velocities: speed [m/s], turn rate [rad/s],
+        # and its tick.
+        self._commanded: tuple[float, float, int] | None = None
         self._dock = start.x, start.y
         self.battery = Battery(config.battery_min) if config.battery_min else None
         self._track = [(start.x, start.y)]
@@ -121,13 +122,13 @@ class World:
         self.distance_m = 0.0
         self.collisions = 0
         self.stops = 0
-        # Other robots in the building, by name; how often it touched one, or stopped before one.
+        # Positions of other robots [m], by name; numbers of touches, and of stops before one.
         self.others: dict[str, Point] = {}
         self.touches = self.meetings = 0
         self._is_held = False
-        # Number of the robot's stops when its path came.
+        # Number of the robot's stops when its path arrived.
         self._stopped_at = 0
-        # For how many ticks the robot stands, once it has moved; and the longest such time [s].
+        # Number of ticks that the robot has stood since it moved; longest time that it stood [s].
         self._stands, self.longest_stand_s = 0, 0.0
 
     @property
@@ -137,7 +138,7 @@ class World:
 
     @property
     def believed(self) -> Pose2D:
-        """Its mapper's estimate of the pose; without noise the true one."""
+        """Its mapper's estimate of the pose."""
         return self.mapper.believed(self.drive.pose)
 
     @property
@@ -147,7 +148,7 @@ class World:
 
     @property
     def track(self) -> NDArray[np.float64]:
-        """Where the robot has been: points (x, y) [m], float64 (n, 2), the start first."""
+        """The points (x, y) [m] that the robot drove through, float64 (n, 2), the start first."""
         pose = self.drive.pose
         return np.array([*self._track, (pose.x, pose.y)], np.float64)
 
@@ -157,25 +158,24 @@ class World:
         return Emission(self.mapper.snapshot(self.stamp_ns), pose, self.battery)
 
     def follow(self, path: NDArray[np.float64]) -> None:
-        """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); an empty one halts.
+        """Drive along ``path``, waypoints (x, y) [m], float64 (n, 2); stop if it is empty.
 
-        It replaces the path before it. From the first tick on: the robot must have
-        scanned to see a way.
+        It replaces the last path. The robot must have scanned, in its first tick, to find a way.
         """
         self._path, self._stopped_at = path, self.stops
         self._join()
 
     def move(self, speed_m_s: float, turn_rad_s: float) -> None:
-        """Move with a velocity from the next tick on, for ``DEAF_S`` at most, ignoring paths."""
-        self._told = speed_m_s, turn_rad_s, self._ticks
+        """Move with a velocity for up to VELOCITY_TIMEOUT_S from the next tick; drop the path."""
+        self._commanded = speed_m_s, turn_rad_s, self._ticks
         self._path, self._corners = None, []
 
     @property
     def unanswered_s(self) -> float:
         """Time since the newest velocity while the robot moves, or is commanded to [s]."""
-        if self._told is None or not (self.drive.moving or any(self._told[:2])):
+        if self._commanded is None or not (self.drive.moving or any(self._commanded[:2])):
             return 0.0
-        return (self._ticks - self._told[2]) * self.config.tick_s
+        return (self._ticks - self._commanded[2]) * self.config.tick_s
 
     def tick(self) -> Emission:
         """Let one time step pass; return the messages published after it."""
@@ -195,7 +195,7 @@ class World:
         )
 
     def _is_due(self, rate_hz: float) -> bool:
-        """Return whether this tick is one at a rate, from the first tick on."""
+        """Return whether a tick at a rate is due now, as it is in the first tick."""
         return (self._ticks - 1) % self.config.period_ticks(rate_hz) == 0
 
     def _drain(self) -> None:
@@ -212,7 +212,7 @@ class World:
         if self._path is None:
             return
         track, is_clear = self._recent_track(), self.mapper.is_clear
-        # Going straight on, even within the margin, has priority over going back.
+        # Driving straight on, even within the margin, has priority over driving back.
         for goes_back, margin_m in ((False, MARGIN_M), (False, 0.0), (True, MARGIN_M), (True, 0.0)):
             has_room = partial(is_clear, margin_m=margin_m)
             route = joined(self._path, track, has_room, goes_back=goes_back)
@@ -223,12 +223,12 @@ class World:
         self._corners, self.activity = [], Activity.NO_WAY
 
     def _may_try_again(self) -> bool:
-        """Return whether the robot, stopped for the first time on its path, has come to rest."""
+        """Return whether the robot has come to rest after its first stop on its path."""
         is_first = self.stops == self._stopped_at + 1
         return self.activity is Activity.STOPPED and is_first and not self.drive.moving
 
     def _recent_track(self) -> NDArray[np.float64]:
-        """Return the track's last metres, to where the robot can come to rest, on its map."""
+        """Return the last points of the track, and the way to rest, on the own map, (n, 2) [m]."""
         here = (self.pose.x, self.pose.y)
         rest = stopping_point(self.drive, self.config)
         points = 2 + int(math.dist(here, rest) / TRACK_SPACING_M)
@@ -237,13 +237,13 @@ class World:
         return np.array([self._on_map((x, y)) for x, y in track], np.float64)
 
     def _on_map(self, place: Point) -> Point:
-        """Return the position of a place on the robot's map."""
+        """Return the position of a true point on the robot's map [m]."""
         pose = self.mapper.believed(Pose2D(*place))
         return pose.x, pose.y
 
     def _move(self) -> None:
-        if self._told is not None:
-            self._move_as_told(*self._told)
+        if self._commanded is not None:
+            self._move_as_commanded(*self._commanded)
             return
         here = (self.pose.x, self.pose.y)
         while self._corners and math.dist(here, self._goal()) < ARRIVED_M:
@@ -253,7 +253,7 @@ class World:
                 self.activity = Activity.IDLE
             if not self.drive.moving:
                 return
-        goal = self._goal() if self._corners and self._looks_ahead() else None
+        goal = self._goal() if self._corners and self._may_drive_on() else None
         if goal is not None or self.drive.moving:
             self._go_on(driven(self.drive, goal, self.config))
 
@@ -261,11 +261,8 @@ class World:
         """Return the true position of the next corner."""
         return self.mapper.true_place(*self._corners[-1])
 
-    def _looks_ahead(self) -> bool:
-        """Return whether the robot may drive on: it stops before obstacles on its own map.
-
-        Before other robots it stops until they are gone.
-        """
+    def _may_drive_on(self) -> bool:
+        """Return whether no obstacle of the own map, and no other robot, stops the robot."""
         if self.activity is Activity.STOPPED:
             return False
         ahead = driven(self.drive, self._goal(), self.config)
@@ -280,8 +277,8 @@ class World:
         self.stops += 1
         return False
 
-    def _move_as_told(self, speed_m_s: float, turn_rad_s: float, tick: int) -> None:
-        if (self._ticks - tick) * self.config.tick_s > DEAF_S:
+    def _move_as_commanded(self, speed_m_s: float, turn_rad_s: float, tick: int) -> None:
+        if (self._ticks - tick) * self.config.tick_s > VELOCITY_TIMEOUT_S:
             speed_m_s = turn_rad_s = 0.0
         ahead = moved_by(self.drive, speed_m_s, turn_rad_s, self.config)
         was_touching = self.activity is Activity.COLLIDED
@@ -307,7 +304,7 @@ class World:
         return None
 
     def _meets(self, place: Point, margin_m: float = MEETING_M) -> bool:
-        """Return whether a place is too near to another robot, and nearer than this robot is."""
+        """Return whether a point is too near to another robot, and nearer than this robot is."""
         here, least_m = (self.pose.x, self.pose.y), 2 * self.config.hull_radius_m + margin_m
         return any(
             math.dist(place, other) < min(least_m, math.dist(here, other) - 1e-9)
@@ -315,17 +312,17 @@ class World:
         )
 
     def _go_on(self, ahead: DriveState) -> None:
-        """Take over a state that may be in a wall, or in another robot: there it stands."""
+        """Take over a state; stand still instead if it is in a wall, or in another robot."""
         if self._meets((ahead.pose.x, ahead.pose.y), 0.0):
             self.touches += self.drive.moving
             self.drive = DriveState(self.pose)
         elif not _fits(self._truth, ahead.pose, self.config):
-            # A robot that is commanded to push on stands at the wall; this counts as one collision.
-            self.collisions += self._told is None or self.drive.moving
+            # Commands that keep pushing the robot against a wall count as one collision.
+            self.collisions += self._commanded is None or self.drive.moving
             self.drive = DriveState(self.pose)
             self._path, self._corners, self.activity = None, [], Activity.COLLIDED
         else:
-            # The track gets the point the robot is about to leave, at times and at corners.
+            # The track gets the point that the robot leaves, at intervals and at corners.
             here = (self.pose.x, self.pose.y)
             gone = math.dist(self._track[-1], here)
             turns_off = ahead.speed != 0.0 and self.drive.speed == 0.0

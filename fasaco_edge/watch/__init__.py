@@ -1,1 +1,1 @@
-"""The live view of a mission in a terminal: samples from the bus in, lines of text out."""
+"""Live view of a mission in a terminal: samples from the bus in, lines of text out."""

@@ -1,4 +1,4 @@
-"""Blocks of a page: renderables of rich as lines of a given width, kept while they are the same."""
+"""Blocks of a page: rich's renderables as lines of a given width, cached while unchanged."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Blocks:
     """Draws blocks of lines for a terminal.
 
     Attributes:
-        glyphs: what it can show.
+        glyphs: glyphs of the terminal.
     """
 
     def __init__(self, console: Console) -> None:
@@ -28,9 +28,9 @@ class Blocks:
         self._kept: dict[str, tuple[object, list[str]]] = {}
 
     def block(self, shown: RenderableType, width: int, height: int) -> list[str]:
-        """Return a renderable of rich as lines and columns of a given number.
+        """Return a renderable as ``height`` lines of ``width`` characters.
 
-        The last line says how many there is no room for.
+        If there are more lines, the last one says how many are left out.
         """
         options = self._console.options.update(width=width, height=None)
         lines = self._console.render_lines(shown, options, pad=True)
@@ -42,14 +42,14 @@ class Blocks:
         return drawn + [" " * width] * (height - len(drawn))
 
     def keep(self, name: str, key: object, draw: Callable[[], list[str]]) -> list[str]:
-        """Return the block of a name; it is drawn again if the key has changed."""
+        """Return the block of a name, drawn again only if the key has changed."""
         kept = self._kept.get(name)
         if kept is None or kept[0] != key:
             kept = self._kept[name] = key, draw()
         return kept[1]
 
     def legend(self, entries: Iterable[tuple[int, str]]) -> Text:
-        """Return kinds and their names on a line."""
+        """Return a line with a sample of each kind and its name."""
         legend = Text()
         for kind, name in entries:
             legend.append_text(self.glyphs.sample(kind)).append(f" {name} ", FAINT)
@@ -62,9 +62,9 @@ class Blocks:
 
         Args:
             events: all events.
-            width: of the lines.
-            entries: how many events are shown at most.
-            scale: edge of a pixel [m] and length of the longest scale bar; None for no scale.
+            width: width of the lines [characters].
+            entries: largest number of events shown.
+            scale: edge of a pixel [m], and length of the longest scale bar; None for no scale.
         """
         bar = f" {self.glyphs.scale(*scale)} " if scale is not None else ""
         lines = self.block(on_a_line(Text(f"{bar} lately {'─' * width}", FAINT)), width, 1)
@@ -74,7 +74,7 @@ class Blocks:
 
 
 def with_keys(line: Text, width: int, *keys: str) -> Text:
-    """Return a headline with the keys there are, and with what else of these has room."""
+    """Return a headline with as many of ``keys``, texts at its end, as fit into ``width``."""
     for key in keys:
         if line.cell_len + len(key) + 3 <= width:
             line.append(f"   {key}", FAINT)

@@ -1,6 +1,6 @@
-"""The glyphs of a terminal: half blocks in the colours it has, or plain characters.
+"""Glyphs of a terminal: coloured half blocks, or plain characters.
 
-Python writes UTF-8 to a terminal of any usual locale, C and POSIX too (PEP 538, 540).
+Python writes UTF-8 to a terminal of any usual locale, also C and POSIX (PEP 538, 540).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _LOOKS: dict[int, tuple[Colour, str]] = {
     picture.ROBOT: ((222, 36, 56), "@"),
 }
 
-# Sixteen colours are too few: three kinds would be one grey.
+# Sixteen colours are too few: three kinds would have the same grey.
 _SYSTEMS = {"256": ColorSystem.EIGHT_BIT, "truecolor": ColorSystem.TRUECOLOR}
 
 
@@ -46,14 +46,14 @@ class GlyphSet:
     """Capabilities of a terminal.
 
     Attributes:
-        colours: None for no colours, or too few.
+        colours: the terminal's colours; None without colours, or with too few.
     """
 
     colours: ColorSystem | None
 
     @classmethod
     def of(cls, console: Console) -> GlyphSet:
-        """Return the glyphs of a console, which knows NO_COLOR, TERM and COLORTERM."""
+        """Return the glyphs of a console, which evaluates NO_COLOR, TERM and COLORTERM."""
         colours = None if console.no_color else _SYSTEMS.get(console.color_system or "")
         return cls(colours)
 
@@ -68,7 +68,7 @@ class GlyphSet:
         return Text(text, _style(self.colours, above, below) if self.colours else "")
 
     def bar(self, fraction: float, width: int) -> Text:
-        """Return a bar, ``width`` characters wide, that is filled to a share of it."""
+        """Return a bar of ``width`` characters, filled up to ``fraction``."""
         filled = round(min(max(fraction, 0.0), 1.0) * width)
         return Text("█" * filled, "green").append("░" * (width - filled), "bright_black")
 
@@ -81,7 +81,7 @@ class GlyphSet:
         return f"├{'─' * inner}┤ {length_m:g} m"
 
     def drawn(self, segments: Iterable[Segment]) -> str:
-        """Return segments of rich as text for this terminal."""
+        """Return rich's segments as text for this terminal."""
         if self.colours is None:
             return "".join(segment.text for segment in segments)
         return "".join(
@@ -92,7 +92,7 @@ class GlyphSet:
         )
 
 
-# The cache of drawn lines: most lines of a picture equal lines of the previous one.
+# Cached, as most lines of a picture equal lines of the previous one.
 @lru_cache(maxsize=512)
 def _line(glyphs: GlyphSet, upper: bytes, lower: bytes) -> str:
     runs: list[str] = []
@@ -127,6 +127,6 @@ def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
 
 @lru_cache(maxsize=2 * len(_LOOKS) ** 2)
 def _style(_: ColorSystem, above: int, below: int) -> Style:
-    """Return the style of a character; each keeps what it was first rendered as."""
+    """Return the style of a character, one per colour system: a style caches its rendering."""
     front, back = _LOOKS[above][0], _LOOKS[below][0]
     return Style(color=Color.from_rgb(*front), bgcolor=Color.from_rgb(*back))

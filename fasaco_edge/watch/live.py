@@ -1,4 +1,4 @@
-"""The loop of a live view on a terminal's alternate screen, in plain lines, or as JSON."""
+"""Loop of a live view: on a terminal's alternate screen, in plain lines, or as JSON."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from fasaco_edge.host.processes import stop_event
 from fasaco_edge.text import json_line
 
 END_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-# At most ten pages a second, and only if the content or the clock changed [s].
+# Least time between two pages, and between two lines [s].
 FRAME_S = 0.1
 LINE_EVERY_S = 1.0
-# The largest page. A terminal may claim 65,535 x 65,535, and a page would take gigabytes.
+# Largest page: some terminals report sizes for which a page would take gigabytes.
 MOST_COLUMNS, MOST_LINES = 800, 400
 
 
 class Watched(Protocol):
-    """What is watched: one robot, or a fleet.
+    """Object of a watch: one robot, or a fleet.
 
     Attributes:
-        rest_s: how long to wait for the rest once something is known [s].
+        rest_s: longest wait for complete data once something is known [s].
     """
 
     rest_s: float
 
     @property
     def events(self) -> EventLog:
-        """What happened."""
+        """The latest events."""
 
     @property
     def trouble(self) -> str:
         """Why the bus cannot be reached; "" if it can."""
 
     def take(self, timeout_s: float) -> bool:
-        """Take in arrivals of ``timeout_s`` [s]; return whether there were any."""
+        """Take in arrivals; wait up to ``timeout_s`` [s] for one; return whether one came."""
 
     def documents(self) -> list[dict[str, object]]:
-        """Return the JSON objects that are due since the last ``take``."""
+        """Return the JSON objects that are due after the last ``take``."""
 
     def document(self) -> dict[str, object]:
         """Return the present state as a JSON object."""
@@ -69,9 +69,9 @@ class Watched(Protocol):
 def watch_on_screen(
     watched: Watched, terminal: TextIO, go_on: Callable[[], bool] = lambda: True
 ) -> bool:
-    """Show pages until q is typed, a signal arrives, or ``go_on``, called for each, returns False.
+    """Show pages until q is typed, a signal arrives, or ``go_on`` returns False.
 
-    Return whether q was typed.
+    ``go_on`` is called before each page. Return whether q was typed.
 
     Raises:
         OSError: the terminal is gone.
@@ -92,7 +92,7 @@ def watch_on_screen(
 
 def watch_in_lines(watched: Watched) -> None:
     """Print events, and once a second the state, until a signal arrives."""
-    # State from before the start arrives within the first second.
+    # The present state arrives within the first second.
     printed, last_line, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
@@ -148,7 +148,7 @@ BEGIN_PAGE, END_PAGE = "\x1b[?2026h", "\x1b[?2026l"
 
 
 class Screen:
-    """Shows pages of lines; sends only lines that changed."""
+    """Alternate screen of a terminal; sends only lines that have changed."""
 
     def __init__(self, terminal: TextIO) -> None:
         self._terminal = terminal
@@ -169,7 +169,7 @@ class Screen:
         self._end()
 
     def size(self) -> tuple[int, int]:
-        """Return columns and lines that are shown, as they are now."""
+        """Return the present numbers of columns and lines."""
         try:
             size = os.get_terminal_size(self._terminal.fileno())
         except OSError:
@@ -213,7 +213,7 @@ class Screen:
     def _begin(self) -> None:
         if self._keyboard is not None:
             self._before = termios.tcgetattr(self._keyboard)
-            # Keys come at once and are not shown; Ctrl-C and Ctrl-Z stay what they are.
+            # Keys arrive at once and are not echoed; Ctrl-C and Ctrl-Z still send their signals.
             tty.setcbreak(self._keyboard)
         self._shown = []
         self._write(ENTER)
@@ -226,13 +226,13 @@ class Screen:
                 termios.tcsetattr(self._keyboard, termios.TCSADRAIN, self._before)
 
     def _suspend(self, _number: int, _frame: FrameType | None) -> None:
-        """Stop as Ctrl-Z asks, with the terminal restored; continue after ``fg``."""
+        """Restore the terminal and stop, on Ctrl-Z; continue after ``fg``."""
         self._end()
         os.kill(os.getpid(), signal.SIGSTOP)
         self._begin()
 
     def _write(self, text: str) -> None:
-        # Without the stream's buffer: after the terminal is gone, data must not stay in it.
+        # Unbuffered: data left in the stream's buffer would fail later if the terminal is gone.
         left = text.encode(self._terminal.encoding, errors="replace")
         while left:
             left = left[os.write(self._terminal.fileno(), left) :]

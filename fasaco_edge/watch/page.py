@@ -1,4 +1,4 @@
-"""The whole screen: picture, figures beside it, legend and the latest events."""
+"""Screen of a watched robot: picture, figures beside it, legend and the latest events."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from rich.text import Text
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import TROUBLED
-from fasaco_edge.client.phrases import age, clock, percent
-from fasaco_edge.text import one_line
+from fasaco_edge.client.phrases import age, clock
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
 from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.picture import MissionPicture
@@ -34,9 +34,9 @@ class Layout:
     """Layout of a screen [characters]; figures of width 0 are left out.
 
     Attributes:
-        columns, lines: of the picture.
+        columns, lines: size of the picture.
         figures: width of the column beside it.
-        entries: lines of events.
+        entries: number of lines of events.
     """
 
     columns: int
@@ -46,16 +46,16 @@ class Layout:
 
     @classmethod
     def of(cls, width: int, height: int) -> Layout:
-        """Return how to divide a screen."""
+        """Return the layout of a screen of this size."""
         figures = 0 if width < 64 else min(max(width * 2 // 5, 34), 50)
         entries = 0 if height < 14 else min(max(height // 5, 4), 14)
-        # Above the picture the headline, below it the legend and a rule.
+        # The headline is above the picture, the legend and a rule are below it.
         lines = max(height - 2 - (entries + 1 if entries else 0), 0)
         return cls(width - figures - (1 if figures else 0), lines, figures, entries)
 
 
 class Page:
-    """Draws a robot view as lines of text; caches unchanged parts."""
+    """Drawing of a robot's view as lines of text, with a cache for unchanged parts."""
 
     def __init__(self, console: Console) -> None:
         self._blocks = Blocks(console)
@@ -94,7 +94,7 @@ class Page:
             left = self._blocks.glyphs.lines(drawn)
         if not layout.figures:
             return left
-        # A status never changes: a new one is another object.
+        # Statuses are immutable: a new status is another object.
         key = (view.status, view.rooms, to_go, layout)
         right = self._blocks.keep("figures", key, lambda: self._figures(view, to_go, layout))
         return [f"{a} {b}" for a, b in zip(left, right, strict=True)]
@@ -120,13 +120,13 @@ class Page:
 
 
 def time_to_go(view: RobotView, now: float) -> str:
-    """Return how long the rest of the path takes, or will take at least; "" if not known."""
+    """Return the time that the rest of the path takes, in words; "" if not known."""
     words = "" if view.status is None else phrases.time_to_go(view.status)
     return f"at least {words}" if words and view.grows(now) else words
 
 
 def headline(view: RobotView, now: float, width: int) -> Text:
-    """Return the line that sums up the state, for a width."""
+    """Return a line that sums up the state, for a width [characters]."""
     line = Text().append(f" {view.robot} ", "bold reverse").append("  ")
     status, silent = view.status, view.silent_s(now)
     if view.trouble:

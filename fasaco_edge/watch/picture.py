@@ -1,4 +1,4 @@
-"""The picture of a mission in half blocks: map, coverage, path and robot, pixel by pixel."""
+"""Picture of a mission in half blocks: map, coverage, path and robot, pixel by pixel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.messages.maps import CoverageValue
 
 LEAST_PIXEL_M = 0.01
-# Pictures grow in steps of this size [m]: with every row of a growing map they would jump.
+# Step in which the area shown grows [m], so that the picture does not jump with each row of a map.
 ROUNDED_TO_M = 0.5
 
 
@@ -45,7 +45,7 @@ class Frame:
 
         Args:
             bounds: x0, y0, x1, y1 [m].
-            columns, lines: the space there is, each at least 1.
+            columns, lines: the space for the frame, each at least 1.
         """
         x0, y0 = (math.floor(low / ROUNDED_TO_M) * ROUNDED_TO_M for low in bounds[:2])
         x1, y1 = (math.ceil(high / ROUNDED_TO_M) * ROUNDED_TO_M for high in bounds[2:])
@@ -60,7 +60,7 @@ class Frame:
         return 2 * self.lines, self.columns
 
     def pixels(self, xy: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the pixels (row, col), (n, 2), that points (x, y) [m], (n, 2), lie in."""
+        """Return the pixels (row, col), int64 (n, 2), that contain points (x, y) [m], (n, 2)."""
         cols = np.floor((xy[:, 0] - self.left) / self.pixel_m)
         rows = np.floor((self.top - xy[:, 1]) / self.pixel_m)
         beyond = 2.0**31
@@ -93,7 +93,7 @@ class Frame:
         return sampled
 
 
-# If several kinds share a character without colours, the larger number is shown.
+# If several kinds share a character of a terminal without colours, the largest number is shown.
 UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED, WALL, AHEAD, NEXT, ROBOT = range(9)
 HEADING = ROBOT + 1
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
@@ -102,13 +102,14 @@ LETTER = HEADING + EIGHTHS
 """A letter of a room's name: this plus its place in ``LETTERS``."""
 LETTERS = bytes((*range(0x20, 0x7F), *range(0xA1, 0xAD), *range(0xAE, 0x100))).decode("latin1")
 
-# Thresholds from the defaults of the daemon's configuration; only the picture depends on them.
+# Thresholds of occupancy: the defaults of the daemon's configuration.
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
-# A thin wall must not vanish between samples; maps larger than this resolves are rare.
+# Largest number of samples per pixel and axis: enough for thin walls, except on very large maps.
 MOST_SAMPLES = 12
-# The next part of the path is highlighted over this length [m].
+# Length of the next part of the path, which is highlighted [m].
 NEXT_M = 3.0
-# If lanes are closer than this many pixels, the path beyond this [m] would hide the ground.
+# If lanes are closer than this [pixels], only this length of the path is drawn [m], to show the
+# ground.
 RESOLVED_PIXELS, NEAR_M = 2.0, 15.0
 
 Kinds = NDArray[np.uint8]
@@ -117,7 +118,7 @@ Kinds = NDArray[np.uint8]
 def ground(frame: Frame, grid: OccupancyGrid | None, coverage: OccupancyGrid | None) -> Kinds:
     """Return the kinds of all pixels, uint8 (2 * lines, columns), without path and robot.
 
-    A pixel with anything occupied in it is wall. Without a map, blocked cells are.
+    A pixel that contains an occupied pixel of the map is wall; without a map, a blocked cell is.
     """
     cells = None if coverage is None else _coverage(frame, coverage, blocked=grid is None)
     if grid is None:
@@ -136,7 +137,7 @@ def ground(frame: Frame, grid: OccupancyGrid | None, coverage: OccupancyGrid | N
 def draw_path(kinds: Kinds, frame: Frame, xy: NDArray[np.float64]) -> bool:
     """Draw the path ahead, float64 (n, 2) [m], into ``kinds``; its next part is highlighted.
 
-    If its lanes would merge, only the first ``NEAR_M``; returns whether it is complete.
+    If its lanes would merge, only the first ``NEAR_M`` are drawn. Return whether all is drawn.
     """
     if len(xy) < 2:
         return True
@@ -153,7 +154,7 @@ def draw_path(kinds: Kinds, frame: Frame, xy: NDArray[np.float64]) -> bool:
 
 
 def draw_robot(kinds: Kinds, frame: Frame, pose: Pose2D, radius_m: float) -> None:
-    """Draw the robot's disc, and its heading as the character its centre lies in."""
+    """Draw the robot's disc, and its heading as the character at its centre."""
     rows, cols = frame.shape
     across = frame.left + (np.arange(cols) + 0.5) * frame.pixel_m - pose.x
     down = frame.top - (np.arange(rows) + 0.5) * frame.pixel_m - pose.y
@@ -165,7 +166,7 @@ def draw_robot(kinds: Kinds, frame: Frame, pose: Pose2D, radius_m: float) -> Non
 
 
 def draw_names(kinds: Kinds, frame: Frame, rooms: Rooms) -> None:
-    """Write the rooms' names with swept shares, or names, or numbers, as they are wide."""
+    """Write each room's name and swept share, or its name, or its number: the first that fits."""
     for room in rooms.outlined:
         place = label_place(room.outline)
         if place is None:
@@ -209,10 +210,10 @@ _COVERAGE_AND_BLOCKED_KINDS[CoverageValue.BLOCKED] = WALL
 
 
 class MissionPicture:
-    """Draws the robot's view; map and coverage are redrawn only where they changed.
+    """Drawing of a robot's view; map and coverage are drawn again only if they have changed.
 
     Attributes:
-        pixel_m: edge of a pixel of that picture [m]; None before the first.
+        pixel_m: edge of a pixel of the last picture [m]; None before the first.
         path_is_whole: whether all of the path was drawn.
     """
 
@@ -228,7 +229,7 @@ class MissionPicture:
 
     def kinds(self, view: RobotView, columns: int, lines: int) -> Kinds | None:
         """Return a picture, uint8 (2 * lines, columns); None while there is nothing to show."""
-        # Grids are values: a new one is another object.
+        # Grids are immutable: a new grid is another object.
         grids = view.map, view.coverage
         if grids != self._grids:
             self._grids, self._frame = grids, None

@@ -1,4 +1,4 @@
-"""The view of a robot by its newest samples, map and path as arrays."""
+"""View of a robot by its newest samples, with map and path as arrays."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class RobotView(RobotState):
 
     def _read_map_update(self, sample: Sample, _: float) -> None:
         patch = decode_map_update(sample.payload)
-        # Updates of a map sent before this process started are of no use.
+        # Updates of a map that this process has not received are ignored.
         if self.map is not None:
             self.map = self.map.patched(patch)
 

@@ -1,4 +1,4 @@
-"""One robot that is watched: its feed, its view, and the page that shows it."""
+"""Watch of one robot: its feed, its view, and the page that shows it."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.text import one_line
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.robot_view import RobotView
 from fasaco_edge.wire.documents.json_text import decode_json
 
-# Time to wait for the rest after a status [s].
+# Longest wait for map, coverage and path after a status [s].
 REST_S = 1.0
 
 
@@ -32,7 +32,7 @@ class RobotWatch:
 
     @property
     def events(self) -> EventLog:
-        """What happened."""
+        """The latest events."""
         return self._view.events
 
     @property
@@ -53,10 +53,10 @@ class RobotWatch:
         return bool(items)
 
     def documents(self) -> list[dict[str, object]]:
-        """Return the statuses that came with the last ``take``."""
+        """Return the statuses that the last ``take`` received."""
         found = []
         for payload in self._statuses:
-            # The view has noted that it cannot be read.
+            # The view reports unreadable statuses.
             with suppress(MalformedMessage):
                 found.append(decode_json(payload))
         return found
@@ -79,7 +79,7 @@ class RobotWatch:
         if view.silent_s(now):
             return "the daemon is silent"
         fraction = status.coverage.fraction if status.coverage else 0.0
-        return f"{phrases.percent(fraction)} of cells  {phrases.figures(status)}"
+        return f"{percent(fraction)} of cells  {phrases.figures(status)}"
 
     def page(self, now: float, width: int, height: int) -> list[str]:
         """Return a page of lines."""

@@ -1,4 +1,4 @@
-"""The figures of a status as a table, beside the picture."""
+"""Table of a status's figures, beside the picture."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fasaco_edge.client import phrases
-from fasaco_edge.text import duration, one_line
+from fasaco_edge.text import duration, one_line, percent
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
@@ -28,7 +28,7 @@ STATE_COLOURS = {
 }
 LONGEST_BAR = 40
 LABEL_WIDTH = 9
-# Limit on the rooms shown.
+# Largest number of rooms shown.
 MOST_ROOMS = 12
 # Width from which optional parts are shown [characters].
 WIDE = 30
@@ -37,7 +37,7 @@ WIDE = 30
 def figures(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet) -> Table:
     """Return all figures of a status, and of rooms, as a table ``width`` characters wide.
 
-    ``to_go``: how long the rest of the path takes.
+    ``to_go``: the time that the rest of the path takes, in words.
     """
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(width=LABEL_WIDTH, style="cyan", no_wrap=True)
@@ -81,7 +81,7 @@ def state_colour(state: str) -> str:
 
 
 def _coverage(coverage: CoverageReport, bar: Text, of_all: str) -> list[Row]:
-    share = Text(phrases.percent(coverage.fraction), "bold")
+    share = Text(percent(coverage.fraction), "bold")
     share.append(f", {coverage.covered} of {coverage.coverable} cells{of_all}", "not bold")
     return [("covered", share), ("", bar)]
 
@@ -142,11 +142,11 @@ def _mission(mission: MissionReport) -> list[Row]:
 
 
 def _rooms(found: Rooms) -> list[Row]:
-    """Return the swept share of each room; of many, those that are not done, and some others."""
+    """Return the swept share of each room; of more than MOST_ROOMS, unfinished rooms first."""
     known = sorted(found.rooms, key=lambda room: (room.swept == 1.0, room.swept is None))
     shown = sorted(known[:MOST_ROOMS], key=lambda room: room.id)
     parts = [
-        room.title if room.swept is None else f"{room.title} {phrases.percent(room.swept)}"
+        room.title if room.swept is None else f"{room.title} {percent(room.swept)}"
         for room in shown
     ]
     more = len(known) - len(shown)
@@ -191,11 +191,11 @@ def _running(status: Status) -> list[Row]:
 
 
 def _battery(battery: BatteryReport) -> Text:
-    level = "not known" if battery.level is None else phrases.percent(battery.level)
+    level = "not known" if battery.level is None else percent(battery.level)
     is_low = None not in (battery.level, battery.turns_back_at) and (
         (battery.level or 0.0) <= (battery.turns_back_at or 0.0)
     )
-    until = f", goes on at {phrases.percent(battery.goes_on_at)}" if battery.goes_on_at else ""
+    until = f", goes on at {percent(battery.goes_on_at)}" if battery.goes_on_at else ""
     return _text(f"{level}, {battery.power}{until}", "yellow" if is_low else "")
 
 

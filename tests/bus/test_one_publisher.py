@@ -16,7 +16,7 @@ class Sessions:
     def is_linked(self, session):
         return session in self.linked
 
-    def only_passes_on(self, session):
+    def is_relay(self, session):
         return session in self.passing
 
 

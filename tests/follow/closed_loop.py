@@ -47,7 +47,7 @@ class ClosedLoop:
         self.world = World(truth, start, replace(CONFIG, turn_radius_m=turn_m))
         self.follower = Follower(replace(limits, turn_radius=turn_m))
         self.follower.take_planner("a1")
-        self.follower.heard_status(0.0)
+        self.follower.take_heartbeat(0.0)
         self.now = 0.0
         self.states: Counter[State] = Counter()
         self.truth_at: list[Pose2D] = []
@@ -108,7 +108,7 @@ class ClosedLoop:
             if self._late_s:
                 # As of the node: cycles that were missed are not made up for.
                 self._due = self.now + PERIOD_S + self._rng.uniform(0.0, self._late_s)
-            self.follower.heard_status(self.now)
+            self.follower.take_heartbeat(self.now)
             command = self.follower.step(self.now)
             self.states[self.follower.state] += 1
             if command is not None:

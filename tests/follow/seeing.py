@@ -84,7 +84,7 @@ class Seeing:
         self._sight.take_map(plain_map(self.wall_y))
         self.follower = Follower(LIMITS, sight=self._sight)
         self.follower.take_planner("a1")
-        self.follower.heard_status(self.now)
+        self.follower.take_heartbeat(self.now)
 
     def send(self, *xy):
         self.follower.take_path(path_message(xy))
@@ -96,7 +96,7 @@ class Seeing:
     def step(self):
         self.now += PERIOD_S
         follower = self.follower
-        follower.heard_status(self.now)
+        follower.take_heartbeat(self.now)
         follower.take_pose(StampedPose(self.pose, "map", 0), self.now)
         if self.scans and round(self.now / PERIOD_S) % 2 == 0:
             payload = scan_at(self.pose, self.discs, self.wall_y, self.noise, self._rng, self.mount)

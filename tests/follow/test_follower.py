@@ -31,7 +31,7 @@ class Told:
         self.x = 0.0
         self.follower = Follower(limits)
         self.follower.take_planner("a1")
-        self.follower.heard_status(self.now)
+        self.follower.take_heartbeat(self.now)
         self.follower.take_path(path_message(xy))
         self.pose()
 
@@ -54,7 +54,7 @@ class Told:
     def step(self, *, status=True):
         self.now += PERIOD_S
         if status:
-            self.follower.heard_status(self.now)
+            self.follower.take_heartbeat(self.now)
         return self.follower.step(self.now)
 
     def speed_after(self, seconds):
@@ -319,10 +319,10 @@ def test_it_stands_before_anything_has_come():
     assert follower.step(0.0) is None
     assert follower.state is State.NO_DAEMON
     follower.take_planner("a1")
-    follower.heard_status(0.1)
+    follower.take_heartbeat(0.1)
     assert follower.step(0.1) is None
     assert (follower.state, follower.detail) == (State.SILENT_DAEMON, "no status yet")
-    follower.heard_status(0.1)
+    follower.take_heartbeat(0.1)
     assert follower.step(0.1) is None
     assert follower.state is State.NO_PATH
     follower.take_path(path_message(AHEAD))

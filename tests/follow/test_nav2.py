@@ -52,7 +52,7 @@ class Drive:
         self.now = 0.0
         self.follower.take_planner("a1")
         for _ in range(2):
-            self.follower.heard_status(0.0)
+            self.follower.take_heartbeat(0.0)
         if points:
             self.path(*points)
 

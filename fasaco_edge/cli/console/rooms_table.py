@@ -5,9 +5,8 @@ from __future__ import annotations
 from rich.table import Table
 
 from fasaco_edge.cli.console.terminal import out
-from fasaco_edge.client.phrases import percent
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
-from fasaco_edge.text import duration
+from fasaco_edge.text import duration, percent
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 
 

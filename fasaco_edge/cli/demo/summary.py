@@ -28,9 +28,9 @@ from fasaco_edge.judge.floor import (
     JudgedFloor,
     SweepingRobot,
     judge_floor,
-    share_words,
     swept_words,
 )
+from fasaco_edge.text import percent
 from fasaco_edge.wire.documents.replies import CoverageReport
 
 
@@ -172,7 +172,7 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
         for robot in summary.robots
     ]
     share = summary.swept_twice_m2 / max(summary.swept_m2, 1e-9)
-    fleet.append(("swept by two robots", f"{summary.swept_twice_m2:.1f} m2 ({share_words(share)})"))
+    fleet.append(("swept by two robots", f"{summary.swept_twice_m2:.1f} m2 ({percent(share)})"))
     return [
         ("covered", f"{covered} of {cells} cells"),
         ("floor swept", _swept(summary)),

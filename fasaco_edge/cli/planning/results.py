@@ -17,6 +17,7 @@ from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.geojson import SUFFIX, lines_collection
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.text import percent
 from fasaco_edge.wire.documents.json_text import encode_json
 
 if TYPE_CHECKING:
@@ -142,13 +143,11 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
 
 def _table(under: RoomsUnderLine) -> Table:
     """Return a table of the rooms."""
-    from fasaco_edge.judge.floor import share_words
-
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in ("room", "floor", "swept", "entered"):
         table.add_column(name, justify="right", style="cyan" if name == "room" else "")
     for room in under.rooms:
-        swept = "-" if room.swept_share is None else share_words(room.swept_share)
+        swept = "-" if room.swept_share is None else percent(room.swept_share)
         often = {0: "never", 1: "once"}.get(room.entered, f"{room.entered} times")
         table.add_row(str(room.room), f"{room.area_m2:,.1f} m2", swept, often)
     return table

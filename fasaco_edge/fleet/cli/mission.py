@@ -1,4 +1,4 @@
-"""``fasaco-edge mission ... --fleet``: one command to every robot of a fleet, and its answers."""
+"""``fasaco-edge mission ... --fleet``: one command to all robots of a fleet, and their answers."""
 
 from __future__ import annotations
 
@@ -29,20 +29,15 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.session import Bus
 
 
-# Robots that others received messages from within this time get the command, too [s].
+# A silent robot gets the command, too, if others received a message from it within this time [s].
 RECENT_S = 600.0
-# Number of robots asked at a time: one that does not answer delays none of the others.
+# Number of robots asked in parallel, so that a robot that does not answer delays no other.
 AT_ONCE = 64
 
 
 @dataclass(frozen=True, slots=True)
 class _Member:
-    """A robot of the fleet, and the document of its answer, if it is a valid one.
-
-    Attributes:
-        refused: why it refused the command; "" if it accepted it.
-        would_forget: whether it refused because it would forget covered cells.
-    """
+    """A robot's answer, None if it is not valid, and why it refused the command, or ""."""
 
     robot: str
     document: dict[str, object] | None
@@ -56,12 +51,12 @@ Shown = Callable[[replies.Reply], str]
 def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Shown | None) -> int:
     """Send a command to each robot of the fleet, and show the answers; 0 if all accept it.
 
-    On a terminal, one question asks for consent for all robots that would forget covered cells.
+    On a terminal, it asks once for consent for all robots that would forget covered cells.
 
     Args:
         args: of the command line.
         asked: the command as a document.
-        shown: what to show of an answer; None for the reason of the robot's state.
+        shown: returns the text to show of an answer; None to show the reason of the robot's state.
 
     Raises:
         NobodyAnswersError: no robot of this fleet answers.
@@ -101,8 +96,8 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
 def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
     """Return the names of the robots of a fleet, in order.
 
-    These are the robots that answer and those that they list as recently received: a robot that is
-    frozen, or has lost its network, may still drive.
+    These are the robots that answer, and the robots that their statuses list as received recently:
+    a robot that is frozen, or has lost its network, may still drive.
     """
     statuses = []
     for reply in bus.get(f"{keys.base}/{VERSION}/*/@rpc/status", timeout_s):

@@ -16,7 +16,8 @@ from fasaco_edge.fleet.review.report import FleetFigures, review_fleet
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.text import one_line
 
-ONE_ROBOT = ("long", "at", "point", "against", "export")
+# Options for the recording of one robot only.
+ONE_ROBOT_OPTIONS = ("long", "at", "point", "against", "export")
 HEADER = (
     "robot", "state", "busy", "waited", "swept", "through", "again", "driven m", "kB/s",
     "plan ms",
@@ -29,7 +30,7 @@ def print_fleet(args: argparse.Namespace) -> int:
     Raises:
         BadConfiguration: an option is for the recording of one robot.
     """
-    for name in ONE_ROBOT:
+    for name in ONE_ROBOT_OPTIONS:
         value = getattr(args, name)
         # Compared with None, as 0 is a time.
         if value is not None and value is not False:

@@ -1,4 +1,4 @@
-"""Fleet on the bus, for ``fasaco-edge watch --fleet``."""
+"""``fasaco-edge watch --fleet``: the connection of the watch to a fleet on the bus."""
 
 from __future__ import annotations
 
@@ -21,14 +21,13 @@ from fasaco_edge.wire.keys import VERSION, Keys
 def fleet_on_bus(
     fleet: str, keys: Keys, bus: BusSettings, console: Console
 ) -> Iterator[tuple[FleetWatch, Callable[[], FasacoError]]]:
-    """Yield the watch of a fleet, and a function that returns the error for no robots."""
+    """Yield the watch of a fleet, and a function that returns the error if no robot answers."""
     view = FleetView(fleet)
     with FleetFeed(bus, keys) as feed:
         yield FleetWatch(feed, view, console), lambda: _no_robot(keys, view)
 
 
 def _no_robot(keys: Keys, view: FleetView) -> NobodyAnswersError:
-    """Return the error that no robot of a fleet sends messages."""
     if not view.others:
         return nobody_answers(f"{keys.base}/{VERSION}/*", ())
     return NobodyAnswersError(

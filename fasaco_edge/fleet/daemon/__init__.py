@@ -1,1 +1,1 @@
-"""Messages of a fleet in the daemon: those of other robots, and those of this robot."""
+"""Messages of a fleet in the daemon: received from other robots, and sent to them."""

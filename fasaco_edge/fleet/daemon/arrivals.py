@@ -1,7 +1,7 @@
-"""Fleet arrivals: which messages on the fleets' keys the loop gets, and how often.
+"""Fleet arrivals: filter and rate limit for the messages of other robots to the loop.
 
-All fleets under one ``bus.base``, and any other publisher there, use such keys. The number of
-places is limited. Only robots of this robot's fleet keep one; other publishers never displace them.
+All fleets under one ``bus.base`` publish on the same keys, and any other publisher can. The number
+of publishers tracked is limited: a robot of another fleet never displaces one of this fleet.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from fasaco_edge.wire.documents.fleet import fleet_of
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
 
-# Rate limit of the messages of a robot [s].
+# Least time between two messages of a robot [s].
 LEAST_SPACING_S = 0.2
 # A robot silent for this long makes room for another [s].
 FORGOTTEN_S = 60.0
 
 
 class FleetArrivals:
-    """Rate limits of a fleet's robots, by key; on a Zenoh thread.
+    """Filter and rate limits by key; runs on a Zenoh thread.
 
     Args:
         keys: of this robot.
@@ -31,17 +31,17 @@ class FleetArrivals:
 
     def __init__(self, keys: Keys, fleet: str) -> None:
         self._keys, self._fleet = keys, fleet
-        # Times of the messages accepted from this fleet, by key, and of those decoded from other
-        # publishers [s]; the key with the oldest message is first.
+        # Time of the last message of each robot of this fleet, and of each other publisher, by key
+        # [s]; the oldest is first.
         self._received_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
-        # Time of the last passed-on message that names no fleet: only its fault is used.
+        # Time of the last message without a fleet's name that the loop got, to report its fault.
         self._unreadable_at = float("-inf")
         self._has_refused = False
         self._faults = deque[FasacoError](maxlen=1)
 
     def is_due(self, sample: Sample, now: float) -> bool:
-        """Return whether a message is for the loop now; ``now`` is monotonic time [s]."""
+        """Return whether the loop gets a message; ``now`` is monotonic time [s]."""
         key, spaced = sample.key, now - LEAST_SPACING_S
         if self._keys.robot_of(key) in ("", self._keys.robot):
             return False
@@ -69,14 +69,14 @@ class FleetArrivals:
     def _has_place(self, key: str, now: float) -> bool:
         """Give a free place to another robot of this fleet; return whether there was one."""
         if len(self._received_at) >= MOST_OTHERS:
-            longest = next(iter(self._received_at))
-            if now - self._received_at[longest] < FORGOTTEN_S:
+            oldest = next(iter(self._received_at))
+            if now - self._received_at[oldest] < FORGOTTEN_S:
                 if not self._has_refused:
                     self._has_refused = True
                     text = f"at most {MOST_OTHERS} others of fleet {self._fleet!r} are kept"
                     self._faults.append(FleetError(f"{self._keys.robot_of(key)}: {text}"))
                 return False
-            del self._received_at[longest]
+            del self._received_at[oldest]
         self._strange_at.pop(key, None)
         self._has_refused = False
         _note(self._received_at, key, now)

@@ -1,4 +1,4 @@
-"""Fleet messages: this robot's message to the others, their messages as events, the fleet's status.
+"""Fleet messages: sent to the other robots, received from them as events, and the fleet's status.
 
 Unused without a block ``fleet`` in the configuration.
 """
@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
-# Number of tiles of progress, and as many of ground, in a periodic message (once a second), and in
-# one on change: 20 kB/s in all, and up to 7 kB/s more for cells from before an epoch.
+# Number of tiles of progress, and also of tiles of ground, in a periodic message (once a second),
+# and in a message on a change. In all 20 kB/s, and up to 7 kB/s more after a change of the epoch.
 TILES, FEW_TILES = 10, 2
 
 
@@ -71,7 +71,7 @@ class FleetReceiver:
             origin = _origin(config.fleet)
             self._frames = FleetFrames(_pose(*origin), self._lattice_deg, self._cell_m)
         self._arrivals = FleetArrivals(self._keys, self._fleet)
-        # Faults of messages of which a part was dropped.
+        # Faults of messages that were accepted without their division.
         self._faults: list[FasacoError] = []
 
     def listen(self, bus: Bus, post: Callable[[Sample], None]) -> None:
@@ -140,13 +140,13 @@ class FleetReceiver:
         return placed
 
     def take_faults(self) -> list[FasacoError]:
-        """Return the faults since the last call that ``event`` did not raise."""
+        """Return the faults since the last call, except those that ``event`` raised."""
         faults, self._faults = self._faults, []
         return faults + self._arrivals.take_faults()
 
 
 class FleetSender:
-    """Publisher of this robot's message: once a second, on change, and more often near others.
+    """Publisher of this robot's message: once a second, on change, and more often near a robot.
 
     Args:
         publisher: of the robot's own key.
@@ -158,26 +158,26 @@ class FleetSender:
         self._publisher, self._fleet, self._cell_m = publisher, config.fleet.name, config.cell_m
         self._frame, self._origin = config.fleet.frame, _origin(config.fleet)
         self._messages = Messages(config.robot.name, config.robot.radius_m)
-        self._said: tuple[object, ...] = ()
-        # When a message was published, and one with tiles in turn.
-        self._said_at = self._tiles_at = float("-inf")
+        self._sent: tuple[object, ...] = ()
+        # Times of the last message, and of the last periodic message [s].
+        self._sent_at = self._periodic_at = float("-inf")
 
     def publish(self, mission: Mission, now: float) -> None:
         """Publish a message if due; the caller catches failures."""
-        if now - self._said_at < LEAST_PERIOD_S:
+        if now - self._sent_at < LEAST_PERIOD_S:
             return
         others, giving_way = fleet_of(mission), giving_way_of(mission)
         key = mission.state, others.numbers.number, others.shared.epoch, waits_for(mission)
-        is_news, is_due = key != self._said, now - self._tiles_at >= PERIOD_S
+        is_news, is_due = key != self._sent, now - self._periodic_at >= PERIOD_S
         if not (is_news or is_due or giving_way.is_near):
             return
         most = TILES if is_due else FEW_TILES if is_news else 0
         message = self._messages.next(mission, most, TILES)
         if message is None:
             return
-        self._said, self._said_at = key, now
+        self._sent, self._sent_at = key, now
         if is_due:
-            self._tiles_at = now
+            self._periodic_at = now
         member = FleetMember(
             version=FLEET_VERSION,
             fleet=self._fleet,
@@ -207,18 +207,18 @@ class FleetSender:
         self._publisher.put(encode_json(member))
 
     def _frame_sent(self, mission: Mission) -> str:
-        """Return the frame of the fleet; the map's own frame if the map has no place in it."""
+        """Return the fleet's frame, or the map's own if its pose in the fleet's is not known."""
         frame = mission.ledger.frame
         if not fleet_of(mission).shared.why_misplaced(frame):
             return self._frame or frame
-        # Other robots must not mistake it for the fleet's frame.
+        # Other robots must not mistake the map's frame for the fleet's.
         return frame if self._frame not in ("", frame) else f"{frame} of another map"
 
 
 def _thinned(points: Sequence[Point]) -> Sequence[Point]:
-    """Return at most as many points of a line as a message holds, evenly, with both ends [m].
+    """Return a line's points [m], evenly thinned to the number that a message holds.
 
-    Cells of less than 3.2 cm have more centres in the next 2 m.
+    Both ends remain. Lines of 2 m have more points if cells are narrower than 3.2 cm.
     """
     if len(points) <= MAX_FLEET_POINTS:
         return points

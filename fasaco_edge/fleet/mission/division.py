@@ -1,10 +1,10 @@
 """Division of the remaining cells among the robots at work: a seed and a handicap for each.
 
-A cell belongs to the robot whose seed has the shortest travel time to it, plus the robot's
-handicap. So each part is connected, and cells that a map shows later have an owner, too. Handicaps
-balance the workload of the parts. Seeds start at the robots, or far from one another; then they
-move to the centres of the parts (Lloyd's algorithm, with travel times as distances). The division
-chosen has the shortest makespan if each robot always walks to its nearest open cell.
+A cell belongs to the robot with the least sum of its handicap and the travel time from its seed. So
+each part is connected, and cells that a map shows later have an owner, too. Handicaps balance the
+workload of the parts. Seeds start at the robots, or far from one another; then they move to the
+centres of the parts (Lloyd's algorithm, with travel times as distances). The division chosen has
+the shortest makespan if each robot always walks to its nearest open cell.
 """
 
 from __future__ import annotations
@@ -20,27 +20,23 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.core.events import Part
 
-# Above this number of cells only every second, third ... is used; larger lattices get fewer rounds.
+# Above this number of cells only every second, third ... is used. Largest product of rounds, robots
+# and cells of the lattice, which reduces the rounds, but not below one.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
-# Number of searches for handicaps with the same seeds: first for equal numbers of cells, then for
-# the time that each robot needed per cell.
+# Number of searches for handicaps with the same seeds: after the first, each search uses the
+# robots' times per cell that the last one gave.
 EVENED = 3
-# Seeds are kept unless others take less than this share of their time. The share of cells that move
-# to another robot with a part is charged to the makespan, in mean times of a robot.
+# Factor on the makespan of the old seeds, below 1 to favour them. Weight of moved cells: they cost
+# the share of cells that move to another robot with a part, times the robots' mean time, times
+# this.
 STABLE, CHANGED = 0.9, 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A robot that takes a part.
-
-    Attributes:
-        name: its name.
-        cell: its cell.
-        step_s: its time to sweep one cell [s].
-    """
+    """A robot that takes a part; ``step_s`` is its time to sweep one cell [s]."""
 
     name: str
     cell: Cell
@@ -64,11 +60,11 @@ class Division:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the robots."""
+        """The names of the robots, sorted."""
         return tuple(part.robot for part in self.parts)
 
     def busiest(self, owners: NDArray[np.int8], robot: str) -> str:
-        """Return the robot other than ``robot`` that owns most of some cells; "" for none.
+        """Return the name of the robot, other than ``robot``, that owns the most cells, or "".
 
         Args:
             owners: int8 (n,), the index of each cell's robot.
@@ -99,15 +95,15 @@ def divide(
     before: Division | None = None,
     turn_steps: float = 0.0,
 ) -> Division:
-    """Divide cells among robots; independent of the order in which these are given.
+    """Divide cells among robots; the robots' order makes no difference.
 
     Args:
         lattice: the cells where robots fit.
         wanted: bool (rows, cols), the cells to divide.
         robots: at least one. A robot without a way to any of the cells gets a seed at its own cell:
             it owns the cells that it alone can reach, on its own map.
-        before: the last division; its seeds are kept unless others end much earlier, and cells
-            keep their robot if a change gains nothing.
+        before: the last division; its seeds are kept unless other seeds shorten the makespan by
+            much, and cells keep their robot if a change gains nothing.
         turn_steps: time of a quarter turn, in steps.
     """
     cells = np.flatnonzero(wanted)
@@ -156,11 +152,7 @@ def _divided(
 
 
 class _Choice:
-    """The best of the divisions offered.
-
-    Attributes:
-        seeds, handicaps_s: of the best, see ``Division``; handicaps float32 (k,).
-    """
+    """The best of the divisions offered: seeds, and handicaps, float32 (k,) [s]."""
 
     def __init__(
         self,
@@ -173,7 +165,7 @@ class _Choice:
         self.seeds: list[Cell] = []
         self.handicaps_s = np.zeros(0, np.float32)
         self._travel, self._before, self._turn_steps = travel, before, turn_steps
-        # Which robots had cells: giving cells to a robot without any is not charged.
+        # Which robots had cells: cells for a robot that had none cost nothing.
         self._had = np.bincount(before[before >= 0], minlength=len(starts)) > 0
         self._steps_s = steps_s
         lattice, cols = travel.lattice, travel.lattice.steps.shape[1]
@@ -192,7 +184,7 @@ class _Choice:
         Args:
             seeds, handicaps_s: the division.
             times_s: travel times from its seeds, float32 (k, n) [s].
-            factor: applied to the time of its last robot.
+            factor: multiplies its makespan.
 
         Returns:
             the owner of each cell, int64 (n,), and when each robot ends, float64 (k,) [s].
@@ -207,7 +199,7 @@ class _Choice:
         return owner, ends_s
 
     def _ends_s(self, owner: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return when each robot ends, float64 (k,) [s], if it walks from cell to nearest cell.
+        """Return when each robot ends, float64 (k,) [s], if it always walks to its nearest cell.
 
         If only every second, third ... cell is used, each cell of a part counts as one step.
         """
@@ -225,7 +217,7 @@ def _cells_s(
 ) -> NDArray[np.float64]:
     """Return each robot's time per cell, float64 (k,) [s]; the average for a robot without cells.
 
-    It is at least one step: a robot that stands on its only cell would have no cost.
+    It is at least the time of a step: a robot on its only cell would have the time 0.
     """
     count = np.bincount(owner, minlength=len(ends_s))
     mean_s = ends_s.sum() / len(owner)

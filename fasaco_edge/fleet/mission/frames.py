@@ -1,4 +1,4 @@
-"""Frames of a fleet: the cells that another robot sends, on this robot's lattice.
+"""Frames of a fleet: conversion of another robot's message to this robot's frame and lattice.
 
 If each robot has its own map, its configuration gives the pose of that map in a shared frame. The
 lattices of two robots are then at an angle: a cell takes the value of the other robot's cell that
@@ -19,16 +19,16 @@ from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
 from fasaco_edge.mission.core.events import MemberReceived
 from fasaco_edge.mission.coverage.ledger import TILE
 
-# Number of robots tracked at once. It exceeds the number of members: a refused robot may become a
-# member, and its tiles come one after the other.
+# Number of robots tracked at once. It exceeds the number of members, to keep the tiles of refused
+# robots: a refused robot may become a member, and it sends few tiles in a message.
 MOST_OTHERS = 64
 
-# Overlaps of tiles below this are ignored, and so are angles due to rounding [cells], [rad].
+# Overlaps of tiles [cells], and angles [rad], below these are due to rounding.
 TOUCH, STRAIGHT = 1e-6, 1e-9
 
 
 def seen_from(frame: Pose2D, other: Pose2D) -> Pose2D:
-    """Return the pose of a frame in another one; both are given in a third."""
+    """Return the pose of ``frame`` in ``other``; both poses are given in a third frame."""
     x, y = frame.x - other.x, frame.y - other.y
     cos, sin = math.cos(other.yaw), math.sin(other.yaw)
     yaw = math.remainder(frame.yaw - other.yaw, math.tau)
@@ -37,13 +37,13 @@ def seen_from(frame: Pose2D, other: Pose2D) -> Pose2D:
 
 
 def placed_point(frame: Pose2D, x: float, y: float) -> Point:
-    """Return a point of a frame in the frame that its pose is given in."""
+    """Return a point of ``frame`` in its parent frame, in which the pose of ``frame`` is given."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return frame.x + cos * x - sin * y, frame.y + sin * x + cos * y
 
 
-class Relaid:
-    """Tiles of another robot's cells, on this robot's lattice.
+class ResampledTiles:
+    """Another robot's cells, resampled on this robot's lattice.
 
     Args:
         lattice: pose of the other lattice in this one [m].
@@ -57,7 +57,7 @@ class Relaid:
         self._given: dict[tuple[int, int], bytes] = {}
         # Cached tiles of this lattice, until one of their source tiles changes.
         self._made: dict[tuple[int, int], bytes] = {}
-        # Places of the tiles that had a cell.
+        # Places of the tiles that have ever been filled.
         self._shown: set[tuple[int, int]] = set()
 
     def tiles(self, tiles: Iterable[Placed]) -> tuple[Placed, ...]:
@@ -66,17 +66,17 @@ class Relaid:
         for place, bits in tiles:
             if place not in self._given and len(self._given) >= MOST_TILES_OF_ONE:
                 continue
-            below = self._below(place)
+            overlapped = self._overlapped(place)
             if self._given.get(place) != bits:
                 self._given[place] = bits
-                for made in below:
+                for made in overlapped:
                     self._made.pop(made, None)
-            wanted.update(below)
+            wanted.update(overlapped)
         for place in wanted - self._made.keys():
             self._made[place] = self._make(place)
             if self._made[place] != EMPTY:
                 self._shown.add(place)
-        # Tiles that were always empty are left out.
+        # Tiles that have always been empty are left out.
         return tuple((place, self._made[place]) for place in sorted(wanted & self._shown))
 
     def cell(self, row: int, col: int) -> tuple[int, int]:
@@ -89,8 +89,8 @@ class Relaid:
         cos, sin = self._cos, self._sin
         return self._shift[0] + cos * x - sin * y, self._shift[1] + sin * x + cos * y
 
-    def _below(self, place: tuple[int, int]) -> list[tuple[int, int]]:
-        """Return the places of this lattice's tiles that a tile of the other reaches into."""
+    def _overlapped(self, place: tuple[int, int]) -> list[tuple[int, int]]:
+        """Return the places of this lattice's tiles that overlap a tile of the other lattice."""
         row, col = place
         corners = [self._here(x * TILE, y * TILE) for y in (row, row + 1) for x in (col, col + 1)]
         cols, rows = (
@@ -129,20 +129,20 @@ class FleetFrames:
     def __init__(self, map_frame: Pose2D, lattice_deg: float, cell_m: float) -> None:
         self._map_frame, self._cell_m = map_frame, cell_m
         self._lattice = turned(map_frame, lattice_deg)
-        # For each robot its epoch, its swept cells and those that it can reach; the robot with the
+        # For each robot its epoch, its swept cells and its reachable cells; the robot with the
         # oldest message is first.
-        self._robots: dict[str, tuple[int, Relaid, Relaid]] = {}
+        self._robots: dict[str, tuple[int, ResampledTiles, ResampledTiles]] = {}
 
     def event(
         self, message: MemberReceived, map_frame: Pose2D, lattice_deg: float
     ) -> MemberReceived:
         """Return another robot's message in this robot's frames.
 
-        Its division is dropped if a seed lies too far away for a message of this robot.
+        Its division is dropped if the index of a seed exceeds the limit of messages.
 
         Args:
             message: the message in the robot's own frames.
-            map_frame, lattice_deg: as of ``FleetFrames``, of the other robot.
+            map_frame, lattice_deg: of the other robot, see ``FleetFrames``.
         """
         frame = seen_from(map_frame, self._map_frame)
         lattice = seen_from(turned(map_frame, lattice_deg), self._lattice)
@@ -160,22 +160,25 @@ class FleetFrames:
             y=y,
             ahead=tuple(placed_point(frame, *point) for point in message.ahead),
             tiles=swept.tiles(message.tiles),
-            # A tile here is made of several of theirs, which arrive one after the other.
+            # Not known: a tile here overlaps several of theirs, which may not all have arrived.
             kept=None,
             ground=ground.tiles(message.ground),
             parts=parts,
             lattice=lattice,
         )
 
-    def _of(self, robot: str, epoch: int, lattice: Pose2D) -> tuple[int, Relaid, Relaid]:
-        """Return what is known of a robot; nothing once its frame has moved."""
+    def _of(
+        self, robot: str, epoch: int, lattice: Pose2D
+    ) -> tuple[int, ResampledTiles, ResampledTiles]:
+        """Return a robot's entry; an empty one if its frame has moved."""
         known = self._robots.get(robot)
         if known is None and len(self._robots) >= MOST_OTHERS:
             del self._robots[next(iter(self._robots))]
+        empty = ResampledTiles(lattice, self._cell_m)
         if known is None or known[1].lattice != lattice:
-            return epoch, Relaid(lattice, self._cell_m), Relaid(lattice, self._cell_m)
-        # With an epoch all earlier progress ends.
-        return known if known[0] == epoch else (epoch, Relaid(lattice, self._cell_m), known[2])
+            return epoch, empty, ResampledTiles(lattice, self._cell_m)
+        # A new epoch replaces all earlier progress.
+        return known if known[0] == epoch else (epoch, empty, known[2])
 
 
 def turned(frame: Pose2D, by_deg: float) -> Pose2D:

@@ -1,6 +1,6 @@
-"""Giving way: the robot waits for others of its fleet, and makes way for them.
+"""Giving way: when the robot waits for other robots of its fleet, and where it makes way for them.
 
-Meanwhile its path is set aside, and it resumes the path afterwards; a way home is planned again.
+While it waits, its path is set aside. Afterwards it resumes the path; a way home is planned again.
 ``fleet.mission.traffic`` decides what obstructs the robot.
 """
 
@@ -40,20 +40,20 @@ from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# A robot that stands on its path within the first distance of another robot is blocked by it; least
-# motion [m].
+# Largest gap between a robot that stands on its path and another robot that blocks it; least
+# displacement that counts as motion [m].
 BESIDE_M, MOVED_M = 0.4, 0.1
-# Distance from its place in the refuge at which it has arrived [m].
+# Distance from the centre of the refuge within which the robot has arrived [m].
 ARRIVED_M = 0.05
-# Length of the way ahead that is checked for robots in the way [points].
+# Length of the way to the refuge that is checked for other robots [points].
 LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
-# Another robot is in the way if its distance from the way is smaller by this than when the way was
+# Another robot is in the way if its distance from the way has decreased by this since the way was
 # chosen [m].
 COMES_M = 0.05
-# A robot that moves less than this for LONG_S plans around the robot that obstructs it, and is
-# reported after TOO_LONG_S [m], [s], [s]: scattered poses may make the other seem to move.
+# A robot that has stayed within STAYS_M [m] for LONG_S plans around the robot that obstructs it,
+# even if the other one's noisy poses seem to move. After TOO_LONG_S it is reported [s].
 STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
-# Least time before a robot that made way, or waits, looks for another refuge [s].
+# Least time between two searches for a refuge [s].
 AGAIN_S = 2.0
 
 
@@ -83,14 +83,14 @@ class GivingWay(Waiting):
         self._route, self._fleet = route, fleet
         self._since = self._sought_at = 0.0
         self._refuge: Cell | None = None
-        # The refuge that the robot did not get to from where it stays.
-        self._vain: Cell | None = None
+        # The refuge that the robot failed to reach from its present place.
+        self._failed_refuge: Cell | None = None
         # Distances of the way from other robots when it was chosen [m].
         self._apart_m: dict[str, float] = {}
         self._has_work = True
         # The path to resume after the wait, and the errand of that path.
         self._held, self._errand = NO_CELLS, ""
-        # The robot's place, and since when it has been free to drive from there on a path.
+        # The robot's place, and since when it has been free to drive on from there.
         self._place, self._free_since = (math.inf, math.inf), 0.0
         # Where the robot stays, and since when.
         self._stays_at, self._stays_since = (math.inf, math.inf), 0.0
@@ -105,7 +105,7 @@ class GivingWay(Waiting):
         self._stays_at, self._stays_since = before._stays_at, before._stays_since
 
     def line(self) -> Points:
-        """Return the next metres, from the robot's place on, points (x, y) [m], float64 (n, 2)."""
+        """Return the next AHEAD_M from the robot's place, as points (x, y) [m], float64 (n, 2)."""
         pose = self._map.pose
         if pose is None or self._map.lattice is None:
             return np.zeros((0, 2))
@@ -117,7 +117,7 @@ class GivingWay(Waiting):
         return np.concatenate((here, self._map.lattice.centres(cells))) if len(cells) else here
 
     def _cells(self) -> NDArray[np.int32]:
-        """Return the path ahead, also one that is set aside."""
+        """Return the path ahead, or the path set aside during a wait."""
         if self._refuge is not None and len(self._route.path.ahead):
             return self._route.path.ahead
         if not self._has_work:
@@ -132,7 +132,7 @@ class GivingWay(Waiting):
         """
         order, pose = self._orders.order_state, self._map.pose
         self._neighbours = self._fleet.others.neighbours(now)
-        # Near another robot all publish more often, even at rest.
+        # Robots near one another publish more often, even at rest.
         here = None if pose is None else (pose.pose.x, pose.pose.y)
         self.is_near = here is not None and any(
             math.dist((near.message.x, near.message.y), here) < NEAR_M
@@ -142,10 +142,10 @@ class GivingWay(Waiting):
         if not (is_going and self._fleet.has_members and may_drive):
             self._end()
             return None
-        # Meanwhile others may have swept the cells ahead of this waiting robot.
+        # Others may have swept this robot's last cells while it waited.
         is_homing = order.stage is Stage.RETURNING
-        is_vain = bool(self.waits_for) and not is_homing and not self._orders.cells.left()
-        self._has_work = bool(order.errand) or (order.is_open and not is_vain)
+        is_over = bool(self.waits_for) and not is_homing and not self._orders.cells.left()
+        self._has_work = bool(order.errand) or (order.is_open and not is_over)
         update = self._look(now, order.errand)
         if not self.waits_for:
             return None
@@ -159,20 +159,19 @@ class GivingWay(Waiting):
         return Doing(state, self._reason, update)
 
     def why_stuck(self, now: float) -> str:
-        """Return why the robot seems stuck for good, or ""."""
+        """Return why the robot seems permanently stuck, or ""."""
         is_stuck = now - self._waited_at <= STANDS_S and now - self._stays_since > TOO_LONG_S
         return f"{self._waited} for more than a minute" if is_stuck else ""
 
     def _end(self) -> None:
-        """End the wait."""
         self.waits_for = self._reason = ""
         self._refuge = None
 
     def _look(self, now: float, errand: Errand) -> PathUpdate | None:
         """Decide whether to wait; return the path to publish, if any.
 
-        A robot without work left only has paths to a refuge: it makes way, but does not wait.
-        Another errand ends the wait: its way may not lead past the other robot.
+        A robot without work left makes way, but does not wait: it has no path of its own. A change
+        of the errand ends the wait: the new way may not lead past the other robot.
 
         The first case that holds:
 
@@ -180,14 +179,14 @@ class GivingWay(Waiting):
         |---|---|
         | it has no place, or no other robot is within NEAR_M | goes on |
         | it is on its way to a refuge, for PATIENCE_S at most | goes there |
-        | another robot keeps it from going on (``traffic.obstruction``) | waits or makes way |
-        | it was free to drive, and stood for PATIENCE_S beside another robot | is blocked by that |
+        | another robot obstructs it (``traffic.obstruction``) | waits or makes way |
+        | it was free to drive, and stood for PATIENCE_S beside another robot | is blocked by it |
         | none of these | goes on |
         """
         if errand != self._errand:
             self._errand = errand
             self._end()
-        # The search for a refuge starts at the robot, which on a short cut is far from its path.
+        # The search for a refuge starts at the robot: on a short cut it is far from its path.
         area, cell, pose = self._map.area, self._map.cell_at_pose(), self._map.pose
         here = (math.inf, math.inf) if pose is None else (pose.pose.x, pose.pose.y)
         self._note_place(here, now)
@@ -197,7 +196,7 @@ class GivingWay(Waiting):
         if self._is_underway(here, now):
             return None
         if self._refuge is not None and now - self._sought_at > PATIENCE_S:
-            self._vain = self._refuge
+            self._failed_refuge = self._refuge
         self._refuge = None
         if found := self._obstruction(here, now):
             return self._hold(found, area, cell, here, now)
@@ -213,7 +212,7 @@ class GivingWay(Waiting):
         # A moment without an obstruction is no progress.
         has_waited = now - self._waited_at <= STANDS_S
         if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
-            self._stays_at, self._stays_since, self._vain = here, now, None
+            self._stays_at, self._stays_since, self._failed_refuge = here, now, None
 
     def _is_underway(self, here: tuple[float, float], now: float) -> bool:
         """Return whether the robot drives to its refuge, and no robot has come in its way."""
@@ -229,7 +228,7 @@ class GivingWay(Waiting):
         )
 
     def _apart_of(self, line: Points) -> dict[str, float]:
-        """Return a line's distance from each other robot, at most the required clearance [m]."""
+        """Return a line's distance from each other robot [m], capped at the clearance required."""
         return {
             name: min(
                 self._clear_m(near),
@@ -242,14 +241,14 @@ class GivingWay(Waiting):
         return least_apart_m(self._radius_m, near.message)
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
-        """Return whether the robot has arrived in its refuge: at its edge it may be in the way."""
+        """Return whether the robot is at the centre of its refuge: the edge may be in the way."""
         place = self._map.place_of(refuge)
         return place is None or math.dist(here, place) <= ARRIVED_M
 
     def _sees(self, area: ReachableArea, a: Points, b: Points) -> bool:
         """Return whether the robot can drive straight between two points, (2,): x, y [m].
 
-        Where cells are counted: between those of one cell, and of two that a step connects.
+        Without a map of the floor, the points must be in one cell, or in two that a step joins.
         """
         if self._map.floor is not None:
             return sees_on(self._map.floor, a, b)
@@ -257,22 +256,23 @@ class GivingWay(Waiting):
         return 1 <= len(area.shortest_path(ends[0], ends[1])) <= 2
 
     def _obstruction(self, here: tuple[float, float], now: float) -> Obstruction | None:
-        """Return what keeps the robot from going on; None for nothing."""
+        """Return the robot's obstruction; None if there is none."""
         line, pace_s_m, others = self.line(), self._fleet.step_s / self._cell_m, self._neighbours
         found = obstruction(
             self._robot, self._radius_m, pace_s_m, spaced(line), others, self.waits_for
         )
-        if found is not None or not self._hangs(now) or len(line) < 2:
+        if found is not None or not self._is_stalled(now) or len(line) < 2:
             return found
-        # The robot should drive: its line passes nearer than its cells, or a sensor has stopped it.
+        # The robot should drive, but its line passes nearer to the other robot than its cells do,
+        # or a sensor has stopped it.
         for name, near in sorted(others.items()):
             reach_m = self._radius_m + near.message.radius_m + BESIDE_M
             if math.dist(here, (near.message.x, near.message.y)) < reach_m:
                 return Obstruction(name, is_blocked=True)
         return None
 
-    def _hangs(self, now: float) -> bool:
-        """Return whether the robot stands though it has long been free to drive."""
+    def _is_stalled(self, now: float) -> bool:
+        """Return whether the robot stands although it has long been free to drive."""
         return now - self._free_since > PATIENCE_S
 
     def _hold(
@@ -285,7 +285,8 @@ class GivingWay(Waiting):
     ) -> PathUpdate | None:
         route, neighbours = self._route, self._neighbours
         if found.robot != self.waits_for:
-            # A moment without an obstruction, or another obstructing robot, is no progress.
+            # Neither a moment without an obstruction nor a change of the obstructing robot is
+            # progress.
             self._since = self._stays_since
         was_waiting = bool(self.waits_for)
         self.waits_for, self._reason = found.robot, found.reason
@@ -294,10 +295,10 @@ class GivingWay(Waiting):
         # A new order has a new path.
         if route.set_aside() or not was_waiting:
             self._held = ahead
-        is_long = now - self._since > PATIENCE_S or self._hangs(now)
-        # Standing counts only while it is free to drive: a wait starts the time again.
+        is_long = now - self._since > PATIENCE_S or self._is_stalled(now)
+        # The robot is not free to drive while it waits.
         self._free_since = now
-        # Even a robot with right of way: it may be jammed, and the wait for it endless.
+        # This includes a robot with right of way: it may be jammed.
         stands = neighbours[found.robot].stands_s > STANDS_S or now - self._stays_since > LONG_S
         if is_long and stands:
             self._fleet.others.avoid(found.robot)
@@ -306,7 +307,7 @@ class GivingWay(Waiting):
             places, sees = self._map.places_of, partial(self._sees, area)
             way = refuge(area, cell, here, self._radius_m, neighbours, places, sees)
             to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))
-            if way is not None and to and to != self._vain and not self._is_in(to, here):
+            if way is not None and to and to != self._failed_refuge and not self._is_in(to, here):
                 self._refuge = to
                 beside = discs(self._radius_m, neighbours)
                 update = route.publish(way, self._reason, now, beside=beside)

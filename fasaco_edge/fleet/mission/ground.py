@@ -1,8 +1,9 @@
 """Shared ground: the cells that the robots of a fleet can reach, each on its own map.
 
 The division includes cells that only maps of other robots show, so that all robots divide nearly
-the same area. Where this robot's own map is known, it decides; paths are planned on it alone. On
-its map a door seen only in part looks shut: ``with_doors`` adds the cells beyond such doors.
+the same area. Where this robot's own map is known, it takes precedence; paths are planned on it
+alone. A door that the robot has seen only in part looks shut on its map: ``with_doors`` adds the
+cells beyond such doors.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class SharedGround:
         self._last: dict[bool, tuple[ReachableArea, int, ReachableArea]] = {}
 
     def receive(self, robot: str, tiles: Iterable[Placed]) -> None:
-        """Take in a robot's tiles, each with TILE_BYTES of bits; a newer tile replaces an older."""
+        """Take in a robot's tiles, each with TILE_BYTES of bits; they replace older tiles."""
         known = self._robots.setdefault(robot, {})
         for place, bits in tiles:
             has_room = place in known or len(known) < MOST_TILES_OF_ONE
@@ -73,13 +74,13 @@ class SharedGround:
     def with_doors(self, area: ReachableArea) -> ReachableArea:
         """Return the area of ``joint`` with the ground beyond doors that only others show open.
 
-        A door is a cell that the area shows blocked and another robot can reach: it was seen in
-        part, or is shut to this robot. Ways lead through it, but it is not reachable itself.
+        A door is a cell that is blocked in the area and reachable for another robot. Ways lead
+        through it, but it is not reachable itself.
         """
         return self._with(area, doors=True)
 
     def _with(self, area: ReachableArea, *, doors: bool) -> ReachableArea:
-        # A robot on its way to look at a door calls this in each step.
+        # Cached, as a robot on its way to a door calls this in each step.
         last = self._last.get(doors)
         if last is None or last[0] is not area or last[1] != self.version:
             joined = _joined(area, self._merged(), doors=doors) if self._robots else area
@@ -98,9 +99,9 @@ class SharedGround:
 def viewpoint(
     area: ReachableArea, joint: ReachableArea, wanted: NDArray[np.bool_], cell: Cell
 ) -> Cell | None:
-    """Return a viewpoint for the nearest wanted cell beyond a robot's own area; None for none.
+    """Return a viewpoint for the nearest wanted cell beyond a robot's own area, or None.
 
-    It is the last cell (row, col) of its own area on the shortest way there.
+    It is the last cell (row, col) of the robot's own area on the shortest way to that cell.
 
     Args:
         area: cells that the robot can reach on its own map.
@@ -138,7 +139,7 @@ class GroundQueue:
         """Return places and bits of a limited number of tiles."""
         if area is not self._area and area is not None:
             self._area, self._tiles = area, _tiles_of(area)
-            # What is no longer reachable is sent as empty.
+            # Tiles without reachable cells any more are sent as empty.
             gone = [place for place in self._queue.sent if place not in self._tiles]
             self._tiles |= dict.fromkeys(gone, EMPTY)
         return tuple((place, self._tiles[place]) for place in self._queue.next(self._tiles, most))
@@ -149,7 +150,7 @@ def _joined(
 ) -> ReachableArea:
     """Return an area with the cells of tiles added where its lattice is unknown.
 
-    With ``doors``, ways also lead through cells that it shows blocked.
+    With ``doors``, ways also lead through blocked cells that others can reach.
     """
     lattice, window = area.lattice, area.lattice.window
     # The nearest tiles first: those far away may come from a faulty robot.
@@ -193,7 +194,8 @@ def _joined(
         return ReachableArea(whole_lattice, reached)
     first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
     joined = ReachableArea.around(whole_lattice, first).reachable
-    # Own cells that no robot can reach through the ground of others may lie behind a wall there.
+    # Own cells that only the ground of others connects must be reachable for another robot, too:
+    # a wall that this robot has not seen may separate them.
     return ReachableArea(whole_lattice, joined & (reached | known) & ~door)
 
 

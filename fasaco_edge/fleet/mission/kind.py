@@ -26,7 +26,7 @@ class FleetKind(CompanyKind):
 
     Attributes:
         robot: its name in the fleet.
-        map_place: where its map lies in the frame of the fleet; None without such a frame.
+        map_place: pose of its map in the frame of the fleet; None without such a frame.
     """
 
     robot: str
@@ -51,18 +51,18 @@ class FleetKind(CompanyKind):
         route: Route,
         company: Company,
     ) -> GivingWay:
-        """Return the part that decides when the robot waits for others."""
+        """Return the part of the mission that decides when the robot waits for others."""
         assert isinstance(company, FleetLayer)
         return GivingWay(self.robot, config.footprint, map_state, orders, route, company)
 
 
 def fleet_of(mission: Mission) -> FleetLayer:
-    """Return the other robots of a mission that has a name in a fleet."""
+    """Return the other robots of a mission, which must be of ``FleetKind``."""
     assert isinstance(mission.company, FleetLayer)
     return mission.company
 
 
 def giving_way_of(mission: Mission) -> GivingWay:
-    """Return when the robot of a mission waits, of a robot that has a name in a fleet."""
+    """Return what decides when the robot waits in a mission, which must be of ``FleetKind``."""
     assert isinstance(mission.giving_way, GivingWay)
     return mission.giving_way

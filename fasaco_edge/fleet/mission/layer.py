@@ -28,13 +28,13 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
 
-# Period of checks [s]. Least age of a division that another one replaces while no robot leaves: in
-# general, and for balance [s].
+# Period of checks [s]. While no robot leaves, least age of a division before a new one [s]: in
+# general, and for balance.
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts are rebalanced only above this ratio and this difference [s].
 UNEVEN, UNEVEN_S = 1.25, 40.0
-# Number of cells of this robot's part that another robot sweeps before a new plan: more than by
-# merely passing through. In unknown buildings a value of 4 cost 7 % of two robots' time.
+# Number of cells of this robot's part that others sweep before it plans again. Robots that only
+# pass through sweep fewer: in unknown buildings a value of 4 cost 7 % of two robots' time.
 MANY_TAKEN = 30
 Mask = NDArray[np.bool_]
 LATER = "another robot has a newer division"
@@ -65,13 +65,13 @@ class FleetLayer(Company):
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
         self._divided_at = self._looked_at = float("-inf")
-        # The owners of the cells of a joint area.
+        # A joint area, and the owners of its cells.
         self._owners: tuple[ReachableArea | None, NDArray[np.int8]]
         self._owners = None, np.zeros((0, 0), np.int8)
         # Joint area of the last check, kept because others send their ground many times a second.
         self._seen: tuple[ReachableArea, ReachableArea] | None = None
-        # Cells that this robot tried in vain while others are at work; and those of an area that
-        # it cannot reach, though another map may show a way.
+        # Cells that this robot has given up while others are at work; cells of an area that it
+        # cannot reach, although another map may show a way.
         self._tried = Window(0, 0, 0, 0), np.zeros((0, 0), np.bool_)
         self._shut: tuple[ReachableArea | None, Mask]
         self._shut = None, np.zeros((0, 0), np.bool_)
@@ -89,7 +89,7 @@ class FleetLayer(Company):
         self.others.ground.clear()
 
     def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
-        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        """Return the part of an area reachable from ``cell`` around robots in the way."""
         return self.others.passable(area, cell, radius_m)
 
     @property
@@ -113,7 +113,7 @@ class FleetLayer(Company):
         return self._division is not None
 
     def busiest(self, open_cells: OpenCells) -> str:
-        """Return the name of the other robot with the most cells left in its part; "" for none."""
+        """Return the name of the other robot with the most cells left in its part, or ""."""
         area, division = self._map.area, self._division
         if area is None or division is None:
             return ""
@@ -121,9 +121,9 @@ class FleetLayer(Company):
         return division.busiest(self._owners_on(division, joint)[left], self._robot)
 
     def viewpoints(self, open_cells: OpenCells, cell: Cell) -> Iterator[Cell]:
-        """Yield viewpoints for cells that only maps of others show, beyond a door they show open.
+        """Yield viewpoints for cells that only maps of others show.
 
-        First for cells of this robot's part, then for any cells left.
+        First for cells of this robot's part, then for any cells beyond doors that others show open.
         """
         area, division = self._map.area, self._division
         if area is None or not self.members:
@@ -152,14 +152,14 @@ class FleetLayer(Company):
 
     @property
     def others_go_on(self) -> bool:
-        """Whether only parts of other robots are left, and these make progress."""
+        """Whether only parts of other robots are left, and these robots make progress."""
         return self._division is not None and self._remainder.others_go_on
 
     def mine(self, cells: Mask, area: ReachableArea) -> Mask:
         """Return which cells are this robot's to sweep.
 
-        These are all cells if none is in its part and the others make no progress. Cells that it
-        has given up are left to the others.
+        These are the cells of its part; or all cells, if none of its part is reachable and the
+        others make no progress. Cells that it has given up are left to the others.
         """
         if self._division is None:
             return cells
@@ -171,7 +171,7 @@ class FleetLayer(Company):
         """Return the cells on which this robot sweeps the floor, visited or not.
 
         These are the cells of its part; or all, if its part is visited and the others make no
-        progress. So wherever ``mine`` leads its path to a cell, it sweeps the floor there, too.
+        progress. So the robot sweeps the floor of each cell that ``mine`` gives it.
         """
         if self._division is None:
             return cells
@@ -182,7 +182,7 @@ class FleetLayer(Company):
         return cells & own if has_work else cells
 
     def give_up(self, cells: Mask, area: ReachableArea) -> None:
-        """Leave cells that this robot tried in vain to the others, also after new maps."""
+        """Leave cells that this robot failed to sweep to the others, also after new maps."""
         self._tried = area.lattice.window, cells | self._tried_on(area)
 
     def pass_over(self, cells: Mask, area: ReachableArea) -> None:
@@ -198,7 +198,7 @@ class FleetLayer(Company):
         """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
 
         Args:
-            open_cells: mask function: a window to the cells that still need a visit.
+            open_cells: returns which cells of a window still need a visit, bool (rows, cols).
             cell: this robot's cell.
             now: time [s].
             at_once: whether this robot is out of work.
@@ -284,15 +284,15 @@ class FleetLayer(Company):
     def _why_by_parts(
         self, division: Division, joint: ReachableArea, left: Mask, names: set[str], now: float
     ) -> str:
-        """Return why the parts should change, or ""; ``names``: the robots that it can reach."""
+        """Return why the parts should change, or ""; ``names``: this robot and those in reach."""
         owners = self._owners_on(division, joint)
         cells = np.bincount(owners[left], minlength=len(division.parts))
         if not cells[division.names.index(self._robot)]:
-            # A division that gave this robot no part would give it none again soon after.
+            # If the last division gave this robot no part, another one soon after would not either.
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
-        # Only a robot that can reach all of them knows all cells left to each.
+        # A robot that cannot reach all of these robots does not know all cells left to each.
         if not names.issuperset(division.names):
             return ""
         steps_s = np.array([part.step_s for part in division.parts])
@@ -326,10 +326,7 @@ class FleetLayer(Company):
         return self._owners[1]
 
     def _why_by_taken(self) -> str:
-        """Return why a plan is wanted after others swept cells of this robot's part, or "".
-
-        It is checked once per batch of messages, as a fleet sends many.
-        """
+        """Return why a plan is wanted after others swept cells of this robot's part, or ""."""
         if self._counted == self._ledger.shared.version:
             return ""
         taken = self._count_taken()

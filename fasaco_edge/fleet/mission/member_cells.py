@@ -1,4 +1,4 @@
-"""Cells received from one robot of a fleet, and how they are stored with the ledger."""
+"""Cells received from one robot of a fleet, and their form in the stored ledger."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class MemberCells:
 
     Attributes:
         epoch: of the tiles.
-        lattice: pose of its lattice in this robot's when the tiles were placed [m].
-        is_doubtful: whether all cells of this epoch are disregarded: some were disregarded before
-            the sender's lattice moved, and their new places are not known.
+        lattice: pose of its lattice in this robot's lattice when the tiles arrived [m].
+        is_doubtful: whether all cells of this epoch are disregarded, because some were disregarded
+            when the sender's lattice moved, and their new places are not known.
     """
 
     epoch: int
@@ -45,13 +45,13 @@ class MemberCells:
         self.epoch, self.tiles, self.is_doubtful = epoch, {}, False
 
     def move(self, epoch: int, lattice: Pose2D) -> None:
-        """Drop everything: the sender's lattice was placed elsewhere."""
+        """Drop everything, as the sender's lattice has moved."""
         is_doubtful = bool(self.disregarded) or self.is_doubtful
         self.is_doubtful = is_doubtful and epoch == self.epoch
         self.epoch, self.lattice, self.tiles, self.disregarded = epoch, lattice, {}, {}
 
     def drop_gone(self) -> None:
-        """Drop disregarded bits of tiles that were not repeated in this epoch."""
+        """Drop the disregarded bits of tiles that the sender has not repeated in this epoch."""
         known = self.disregarded.items()
         self.disregarded = {place: bits for place, bits in known if place in self.tiles}
 

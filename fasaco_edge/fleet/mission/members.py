@@ -1,4 +1,4 @@
-"""Members of a fleet: the other robots, the last message of each, and which stand in the way."""
+"""Members of a fleet: the other robots, the last message of each, and those that block the way."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from fasaco_edge.mission.core.events import MemberReceived, State
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 
-# Timeout of a silent robot [s], and of a robot that should move [s]; least motion [m].
+# Timeouts of a silent robot, and of a robot at work that does not move [s]; least motion [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
-# A robot that plans avoid has driven on once it is this far from its place [m]: the poses of a
-# standing robot scatter.
+# A robot that plans avoid has driven on once it is this far from its place [m]; noise of the poses
+# of a standing robot is less.
 LEFT_M = 0.2
 
-# Absence of a robot that is silent.
+# Absence of a silent robot.
 GONE = "gone"
 AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 
@@ -38,7 +38,7 @@ class Member:
         newest: its newest message.
         received_at: time of its newest message [s].
         left_out: why it does not belong to this fleet; "" if it does.
-        place: its position x, y, to within STANDING_M [m].
+        place: its position x, y at its last motion [m].
         moved_at: time of the last motion [s].
         left_at: when it last left a new division [s].
     """
@@ -84,9 +84,9 @@ class Members:
         self._avoided: dict[str, tuple[float, float]] = {}
 
     def neighbours(self, now: float) -> dict[str, Neighbour]:
-        """Return the other robots in this robot's frame that are not silent.
+        """Return the other robots in this robot's frame, except silent ones.
 
-        The place of a silent robot is not known; at most this robot's map shows it.
+        The place of a silent robot is not known; this robot's map may show it.
         """
         return {
             name: Neighbour(
@@ -102,7 +102,7 @@ class Members:
 
     @property
     def shared(self) -> SharedProgress:
-        """The cells that they have swept."""
+        """The cells that the others have swept."""
         shared = self._ledger.shared
         assert isinstance(shared, SharedProgress)
         return shared
@@ -117,7 +117,7 @@ class Members:
         return robot in self._avoided
 
     def _is_at_avoided(self, robot: str) -> bool:
-        """Return whether paths are planned around a robot, and it is still there."""
+        """Return whether paths are planned around a robot that is still there."""
         place, member = self._avoided.get(robot), self.known.get(robot)
         if place is None or member is None or member.left_out:
             return False
@@ -126,7 +126,7 @@ class Members:
     def forget_silent(self, now: float) -> str:
         """Stop planning around silent robots; return the name of one, or "".
 
-        They may have left or not: at most this robot's map shows it.
+        Only this robot's map shows whether a silent robot still stands there.
         """
         silent = [
             name
@@ -138,7 +138,7 @@ class Members:
         return silent[0] if silent else ""
 
     def closed(self, area: ReachableArea, radius_m: float) -> NDArray[np.bool_] | None:
-        """Return the cells where robots stand in the way, bool (rows, cols); None for none."""
+        """Return the cells blocked by robots in the way, bool (rows, cols); None without robots."""
         for name in list(self._avoided):
             if not self._is_at_avoided(name):
                 del self._avoided[name]
@@ -162,7 +162,7 @@ class Members:
         return closed
 
     def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
-        """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
+        """Return the part of an area reachable from ``cell`` around robots in the way."""
         closed = self.closed(area, radius_m)
         if closed is None or not area.contains(cell):
             return area
@@ -206,7 +206,7 @@ class Members:
         return f"{event.robot}: cells must be swept again" if is_open_again else ""
 
     def division_numbers(self) -> dict[str, int]:
-        """Return the numbers of the divisions that they have sent, by name."""
+        """Return the number of the last division that each robot has sent, by name."""
         return {name: m.newest.division for name, m in self.known.items() if not m.left_out}
 
     def note_left(self, names: set[str], now: float) -> None:
@@ -217,8 +217,8 @@ class Members:
     def _make_room(self, robot: str, now: float) -> None:
         """Make room for another robot: remove the robot silent for longest, if it has timed out.
 
-        Without that condition, one robot beyond the limit would displace the others in turn, and
-        cause a new division each time.
+        Robots that send are kept: otherwise one robot beyond the limit would displace the others in
+        turn, and cause a new division each time.
         """
         if len(self.known) < MOST_ROBOTS:
             return

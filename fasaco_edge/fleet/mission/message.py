@@ -1,4 +1,4 @@
-"""Messages of a robot to its fleet: its state, its next metres, its division, and tiles in turn."""
+"""Messages of a robot to its fleet: its state, its path ahead, its division, and tiles in turn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Messages:
-    """Makes the messages of one robot, as other robots of its map frame receive them.
+    """Makes the messages of one robot, in its map frame.
 
     Args:
         robot: its name.
@@ -34,14 +34,14 @@ class Messages:
 
         Args:
             mission: of the robot.
-            most: limit on the tiles of progress, and on those of ground.
-            most_anew: the same after cells were forgotten.
+            most: largest number of tiles of progress, and also of tiles of ground.
+            most_anew: the same for the first message of an epoch.
         """
         if mission.pose is None or not mission.ledger.frame:
             return None
         others, pose, tiles = fleet_of(mission), mission.pose.pose, mission.ledger.snapshot().tiles
         if others.shared.epoch != self._epoch:
-            # Published changes are forgotten. Cells swept before a restart are not known.
+            # All tiles are sent again. Which cells were swept before a restart is not known.
             before = tiles if self._epoch else None
             self._epoch, self._swept, most = others.shared.epoch, SweptQueue(before), most_anew
         swept = self._swept.next(tiles, most)
@@ -59,21 +59,21 @@ class Messages:
             by=others.numbers.by,
             parts=others.parts,
             radius_m=self._radius_m,
-            ahead=tuple((x, y) for x, y in next_metres(mission).tolist()),
+            ahead=tuple((x, y) for x, y in path_ahead(mission).tolist()),
             waits_for=waits_for(mission),
             kept=self._swept.kept(swept),
         )
 
 
-def next_metres(mission: Mission) -> NDArray[np.float64]:
-    """Return the points of the path's next metres in the map frame [m], float64 (n, 2)."""
+def path_ahead(mission: Mission) -> NDArray[np.float64]:
+    """Return the points of the path for the next AHEAD_M in the map frame [m], float64 (n, 2)."""
     line = giving_way_of(mission).line()[1:]
     return rotated_points(line, mission.rotation.deg) if len(line) else line
 
 
 def waits_for(mission: Mission) -> str:
-    """Return the name of the robot that this one waits or makes way for, or that sweeps the rest;
-    "" for none."""
+    """Return the name of the robot that this robot waits or makes way for, or whose work it waits
+    for; "" for none."""
     name, orders = mission.giving_way.waits_for, mission.orders
     stands = mission.doing is State.COVERING and len(mission.route.path.ahead) < 2
     if name or not (stands and orders.waits_for_others):

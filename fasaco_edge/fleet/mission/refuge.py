@@ -1,7 +1,7 @@
-"""Refuge: where a robot of a fleet goes to make way for another, and its way there.
+"""Refuge: the cell that a robot of a fleet goes to in order to make way, and its way there.
 
-Two robots may stand almost in contact, in a doorway for instance. The robot that makes way must not
-come nearer to the other at first: its sensors, or contact, would stop it for good.
+Two robots may stand almost in contact, for instance in a doorway. The robot that makes way must not
+first come nearer to the other: its sensors, or contact, would stop it permanently.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ Sees = Callable[[Points, Points], bool]
 
 
 def discs(radius_m: float, neighbours: Mapping[str, Neighbour]) -> Points:
-    """Return where the middle of a robot's disc is too near to others, as ``Route.beside``."""
+    """Return the discs that the robot's centre must stay out of, float64 (n, 3): x, y, radius [m].
+
+    ``Route.beside`` takes them.
+    """
     messages = [near.message for _, near in sorted(neighbours.items())]
     rows = [(one.x, one.y, least_apart_m(radius_m, one)) for one in messages]
     return np.array(rows, np.float64).reshape(-1, 3)
@@ -40,16 +43,16 @@ def refuge(
     places: Places,
     sees: Sees,
 ) -> NDArray[np.int32] | None:
-    """Return the way to the nearest cell off the discs and paths of other robots; None for none.
+    """Return the cells of the way to the refuge, int32 (n, 2), or None.
 
-    It avoids all their discs: cells, int32 (n, 2). It starts at the robot's cell or at one beside
-    it that a straight drive reaches without coming nearer to any robot, if there is such a way;
-    else at the robot's cell.
+    The refuge is the nearest cell off the discs and paths of other robots; the way avoids their
+    discs. It begins at the robot's cell, or a cell beside it, that the robot can drive to without
+    coming nearer to any robot. If there is no such way, it begins at the robot's cell.
 
     Args:
         area: the reachable area.
         cell: the robot's cell.
-        place: the robot's place in it (x, y) [m].
+        place: the robot's position (x, y) [m].
         radius_m: radius of its disc [m].
         neighbours: the other robots.
         places: returns the points of cells.
@@ -86,12 +89,12 @@ def refuge(
         if _leads_away(first, point, beside, sees)
     ]
     way = _nearest(steps, begins, at[is_free], corner)
-    # If each way leads nearer to another robot, that robot may still let it pass.
+    # Else the robot first comes nearer to another one, which may still let it pass.
     return _nearest(steps, [(0.0, local)], at[is_free], corner) if way is None else way
 
 
 def _leads_away(here: Points, to: Points, beside: Points, sees: Sees) -> bool:
-    """Return whether a straight drive, or one with a corner, comes no nearer to any robot."""
+    """Return whether a straight drive, or a drive with one corner, comes no nearer to any robot."""
     if not comes_nearer(here, to, beside):
         return sees(here, to)
     corner = corner_past(here, to, beside)
@@ -119,7 +122,7 @@ def _nearest(
 
 
 def _inside(steps: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the step masks of a part of a lattice without those that lead out of it."""
+    """Return the step masks of a part of a lattice, without the steps that lead out of it."""
     edges = ((EAST, np.s_[:, -1]), (WEST, np.s_[:, 0]), (NORTH, np.s_[-1]), (SOUTH, np.s_[0]))
     for direction, edge in edges:
         steps[edge] &= np.uint8(0xFF ^ (1 << direction))

@@ -1,14 +1,14 @@
 """Shared progress: the cells that the other robots of a fleet report as swept.
 
-Each report carries an epoch number, changed whenever the sender forgets cells. Within an epoch the
-set only grows, so reports are merged by union: lost, repeated and late messages do no harm, and two
-halves of a split fleet agree once they receive each other's messages again. When the epoch changes,
-the sender's earlier reports are dropped. The progress of an absent robot is kept.
+Each report has an epoch number, which changes whenever the sender forgets cells. Within an epoch
+the set only grows, so reports are merged by union: lost, repeated and late messages do no harm, and
+two halves of a split fleet agree once they receive each other's messages again. When the epoch
+changes, the sender's earlier reports are dropped. The progress of an absent robot is kept.
 
 Cells that this robot has to sweep again (a second pass, a reset, a map that moved) are disregarded
-until the robot that swept them has forgotten them itself. Each robot reports which of its cells are
-from before its epoch. If the sender does not know that, or swept such cells again in an epoch of
-which no message arrived, they stay disregarded, and are swept once more than needed.
+until the robot that swept them has forgotten them itself. Each robot reports which of its cells it
+swept before its epoch. A cell stays disregarded if the sender does not know that, or if it swept
+the cell again in an epoch of which no message arrived: it is then swept once more than needed.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ if TYPE_CHECKING:
     from fasaco_edge.grid.geometry import Pose2D, Window
     from fasaco_edge.grid.lattice import Cell
 
-# Limits on the robots and, over all of them, on the tiles: 16 million cells.
+# Largest numbers of robots, and of tiles of all robots (16 million cells).
 MOST_ROBOTS, MOST_TILES = 32, 4096
 MOST_TILES_OF_ONE = MOST_TILES // 8
 
 
 @dataclass(frozen=True, slots=True)
 class MapPlace:
-    """Where the robot's map lies in the frame of its fleet.
+    """Pose of the robot's map in the frame of its fleet.
 
     Attributes:
-        origin: its origin's x, y [m], and the angle of its x axis [deg].
+        origin: x, y of the map's origin [m], and the angle of its x axis [deg].
         frame: the frame of the map with this origin; "" for the first map received.
     """
 
@@ -64,7 +64,7 @@ class SharedProgress(OthersCells):
     """The cells that other robots have swept, on this robot's lattice.
 
     Args:
-        place: where its map lies in the frame of the fleet; None without such a frame.
+        place: pose of its map in the frame of the fleet; None without such a frame.
 
     Attributes:
         epoch: epoch of this robot's own cells; 0 without a fleet.
@@ -99,16 +99,17 @@ class SharedProgress(OthersCells):
             self.version += 1
 
     def enter(self, frame: str) -> None:
-        """Note the active frame. By default the configured place is that of the first frame.
+        """Note the active frame.
 
-        A robot on another floor has another map, whose place is not configured.
+        Unless configured, the place is that of the first map. On another floor the robot has
+        another map, whose place is not known.
         """
         if self._place is not None and not self._map_frame:
             self._map_frame = frame
             self.version += 1
 
     def leave_building(self, frame: str) -> None:
-        """Note that the map in a frame shows another building: cells of others lie elsewhere."""
+        """Note that the map in a frame now shows another building, without the cells of others."""
         self._left = frame
         self.version += 1
 
@@ -118,7 +119,7 @@ class SharedProgress(OthersCells):
         self.version += 1
 
     def why_misplaced(self, frame: str) -> str:
-        """Return why a map frame has no place in the frame of the fleet; "" if it has one."""
+        """Return why a map frame's pose in the fleet's frame is not known; "" if it is known."""
         if self._left and frame == self._left:
             return (
                 "the map shows another building than before: `mission reset` makes it the fleet's"
@@ -138,15 +139,15 @@ class SharedProgress(OthersCells):
         kept: Iterable[Placed] | None = None,
         lattice: Pose2D = SAME_LATTICE,
     ) -> bool:
-        """Take in a robot's report; return whether cells need sweeping again because of it.
+        """Take in a robot's report; return whether cells must be swept again because of it.
 
         Args:
             robot: its name.
             epoch: epoch of its cells.
             tiles: places, with TILE_BYTES of bits each.
             members: names of robots that must not be displaced.
-            kept: as ``tiles``, their cells swept before the epoch; None if not known.
-            lattice: pose of its lattice in this robot's [m]; a change voids all its earlier cells.
+            kept: the cells of ``tiles`` that it swept before the epoch; None if not known.
+            lattice: pose of its lattice in this robot's [m]; a change drops all its earlier cells.
 
         Raises:
             FleetError: there is no room for its data.
@@ -209,7 +210,7 @@ class SharedProgress(OthersCells):
         return unpacked(bits)
 
     def _note_lost(self) -> None:
-        """Note that some cells may need sweeping again."""
+        """Note that some cells may have to be swept again."""
         self._known = None, self._known[1]
         self.version += 1
 
@@ -217,10 +218,10 @@ class SharedProgress(OthersCells):
         """Disregard all earlier sweeps of some cells.
 
         Args:
-            inside: mask function: rows and columns int64 (n,) to bool (n,).
+            inside: returns which cells are chosen, bool (n,), for rows and columns, int64 (n,).
         """
         for place in self._places():
-            # Once for all robots: evaluating ``inside`` is the expensive part.
+            # Once for all robots, as ``inside`` takes most of the time.
             swept = (one.tiles[place] for one in self._robots.values() if place in one.tiles)
             at = np.argwhere(unpacked(np.bitwise_or.reduce(list(swept))))
             rows, cols = (at + np.multiply(place, TILE)).T
@@ -246,7 +247,7 @@ class SharedProgress(OthersCells):
             self._note_lost()
 
     def snapshot(self, cell_m: float) -> LedgerSnapshot:
-        """Return the cells swept by others as one ledger."""
+        """Return the cells that others have swept, as one ledger."""
         tiles = {place: self._swept_of(place).astype(np.uint16) for place in self._places()}
         return LedgerSnapshot(cell_m, "", 0, MappingProxyType(tiles))
 
@@ -264,9 +265,9 @@ class SharedProgress(OthersCells):
         return self._encoded[1]
 
     def resume(self, kept: bytes) -> None:
-        """Restore the bytes of ``encode``; those of another release are ignored.
+        """Restore from bytes of ``encode``; bytes of another version are ignored.
 
-        Cells from before a change of this robot's map place are ignored, too.
+        If the configured place of this robot's map has changed, cells are ignored, too.
         """
         try:
             if not kept or msgspec.json.decode(kept, type=_Head).version != _VERSION:
@@ -287,7 +288,7 @@ class SharedProgress(OthersCells):
         return None if self._place is None else self._place.origin
 
     def _make_room(self, robot: str, members: Collection[str]) -> bool:
-        """Make room for another robot; return whether cells need sweeping again because of it."""
+        """Make room for another robot; return whether cells must be swept again because of it."""
         if len(self._robots) < MOST_ROBOTS:
             return False
         gone = sorted(self._robots.keys() - set(members))

@@ -1,15 +1,8 @@
 """Shared work of a fleet: which robots take part, what is left, and which division is the newest.
 
-Robots at work: which of the others take part in a division, and where.
-
-Remainder: how many cells are left for a fleet, and whether others sweep them all.
-
-A robot without a part stands while the others make progress: it would be in their way.
-
-Numbers of divisions: which division is the newest, of those made here and those received.
-
-The higher number is newer; between equal numbers the author's name that sorts first wins. Numbers
-too far ahead are errors of their sender.
+A robot without a part stands while the others make progress: it would be in their way. Of two
+divisions, that with the higher number is newer; between equal numbers the author's name that sorts
+first wins. Numbers too far ahead are errors of their sender.
 """
 
 from __future__ import annotations
@@ -23,9 +16,9 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.core.events import MemberReceived
 from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 
-# Others make progress if the number of swept cells has grown within this time [s].
+# Others make no progress once the number of swept cells has not grown for this long [s].
 STUCK_S = 30.0
-# Others make no progress once all of them have waited for this long, perhaps for this robot [s].
+# Others make no progress once all have waited for this long: they may wait for this robot [s].
 WAITING_S = 6.0
 
 
@@ -33,23 +26,23 @@ class Remainder:
     """Tracks the cells left for a fleet.
 
     Attributes:
-        others_go_on: whether only parts of other robots are left, and these make progress. Once
-            they have swept nothing for STUCK_S, they count as stuck until this robot has a part.
+        others_go_on: whether only parts of other robots are left, and these robots make progress.
+            Once they have swept nothing for STUCK_S, they are stuck until this robot has a part.
         had_part: whether the last division gave this robot a part.
-        divided: number of cells left at that time.
+        divided: number of cells left when that division was made.
     """
 
     def __init__(self) -> None:
         self.others_go_on = self.had_part = False
         self.divided = 0
-        # Largest number of swept cells since this robot had a part, and its time; None while it
-        # has one. The number of cells left may grow as others sweep, by cells that they find.
+        # Largest number of swept cells since this robot had a part, and when that was reached; None
+        # while it has a part. The number of cells left is no measure: others also find new cells.
         self._most: tuple[int, float] | None = None
         # Since when all others wait; None while one is at work.
         self._waiting_since: float | None = None
 
     def note_others(self, now: float, *, wait: bool) -> None:
-        """Note whether all other robots at work wait for one, perhaps for this robot."""
+        """Note whether all other robots at work wait for another robot."""
         if not wait:
             self._waiting_since = None
         elif self._waiting_since is None:
@@ -58,7 +51,7 @@ class Remainder:
     def note(self, cells: int, own: int, swept: int, now: float) -> None:
         """Take in the numbers of cells left, in all and in this robot's part, and of cells swept.
 
-        Cells of its part that only other robots' maps show count, too: it has to go and see them.
+        Cells of its part that only maps of others show are included: it must go there to look.
         """
         if own > 0:
             self._most, self.others_go_on = None, False
@@ -75,8 +68,8 @@ class Remainder:
         self.note(cells, own, swept, now)
 
 
-# Limits on a division's number: absolute, ahead of this robot's own, and the first of a newcomer.
-# A robot out of range for a day is not that far behind.
+# Largest number of a division; largest lead over this robot's own number, more than others make in
+# a day; largest first number of a robot that joins.
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 
 
@@ -94,9 +87,9 @@ class DivisionNumbers:
         self._robot, self._others = robot, others
 
     def newer(self) -> MemberReceived | None:
-        """Return the newest division received above ``number`` that has a part for this robot.
+        """Return the newest valid division received that is newer than this robot's, or None.
 
-        Newer divisions without this robot are skipped: their author takes this robot for absent.
+        Divisions without a part for this robot are skipped: their author takes it for absent.
         """
         most = self._most_valid()
         found = [
@@ -121,7 +114,7 @@ class DivisionNumbers:
         self.number, self.by = min(max([self.number, *numbers]) + 1, MOST_NUMBER), self._robot
 
     def _most_valid(self) -> int:
-        """Return the highest number that is no error."""
+        """Return the highest valid number."""
         numbers = self._others.division_numbers()
         first = min((number for number in numbers.values() if number), default=0)
         return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
@@ -130,8 +123,9 @@ class DivisionNumbers:
 class AtWork:
     """Decides which of the other robots take part.
 
-    A robot divides again if a participant is left out, so all robots have to agree. If two robots
-    do not receive each other, or one map shows no way between them, a third robot decides.
+    All robots have to agree: each makes a new division if the last one leaves out a robot that
+    takes part. If two robots do not receive each other, or a map shows no way between them, a
+    third robot decides.
     """
 
     def __init__(self, others: Members, numbers: DivisionNumbers) -> None:
@@ -156,9 +150,9 @@ class AtWork:
     ) -> list[Robot]:
         """Return the robots of the last division that take part, but are not in reach.
 
-        This robot's map shows no way to them, or their messages no longer arrive, but the robot
-        that made the division still reaches them. If left out, they would make a division of their
-        own, and leave out the robots that they do not reach.
+        This robot's map shows no way to them, or their messages no longer arrive, but the author of
+        the division still reaches them. If left out, they would make a division that leaves out the
+        robots that they do not reach.
         """
         found, seen = [], {robot.name for robot in robots}
         for part in () if division is None else division.parts:
@@ -185,8 +179,8 @@ class AtWork:
     def _is_vouched(self, now: float) -> bool:
         """Return whether the division's author is another robot at work that still sends it.
 
-        It receives robots that this one does not: the two would divide again and again, one with
-        and one without these robots.
+        The author may receive robots that this robot does not. If this robot left them out, the two
+        would replace each other's division endlessly.
         """
         maker = self._others.known.get(self._numbers.by)
         if maker is None or maker.absence(now):

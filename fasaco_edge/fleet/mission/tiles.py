@@ -1,6 +1,6 @@
 """Tiles of bits: square parts of the lattice, as the robots of a fleet send them.
 
-A tile has TILE x TILE cells; that of place (row, col) begins at cell (TILE * row, TILE * col).
+A tile has TILE x TILE cells; the tile at place (row, col) begins at cell (TILE * row, TILE * col).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     # For types only: a daemon announces itself to its fleet before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# Size of a tile as bits, row by row, the first of eight highest [bytes].
+# Size of a tile [bytes]: a bit per cell, row by row, most significant bit first.
 TILE_BYTES = TILE * TILE // 8
 EMPTY = bytes(TILE_BYTES)
 
@@ -53,10 +53,10 @@ Tile = TypeVar("Tile")
 
 
 class TileQueue(Generic[Tile]):
-    """Selects tiles to send: new and changed ones first, then all others in turn.
+    """Selects tiles to send: new and changed tiles first, then the others in turn.
 
     Attributes:
-        sent: tiles as they were sent last, in the order of sending.
+        sent: tiles as last sent, in the order of sending.
     """
 
     def __init__(self, is_same: Callable[[Tile, Tile], bool]) -> None:
@@ -64,7 +64,7 @@ class TileQueue(Generic[Tile]):
         self._is_same = is_same
 
     def next(self, tiles: Mapping[Cell, Tile], most: int) -> list[Cell]:
-        """Return the places of at most ``most`` tiles; places without a tile are forgotten."""
+        """Return the places of up to ``most`` tiles; places without a tile are forgotten."""
         self.sent = {place: tile for place, tile in self.sent.items() if place in tiles}
         new = {
             place

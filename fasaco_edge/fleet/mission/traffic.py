@@ -1,9 +1,9 @@
-"""Traffic rules of a fleet: which robot waits or makes way where two come near each other.
+"""Traffic rules of a fleet: which of two robots waits or makes way where their paths conflict.
 
-Each robot publishes its disc and the next metres of its path. If two robots would come too near
+Each robot publishes its disc and the next metres of its path. Where two robots would come too near
 each other at about the same time, the robot farther from that place waits; at about equal distance,
-the robot whose name sorts last. A waiting robot that stands on the other's path makes way for it.
-So one robot at a time passes a narrow passage.
+the robot whose name sorts last waits. A waiting robot that stands on the other's path makes way.
+So one robot at a time drives through a narrow passage.
 """
 
 from __future__ import annotations
@@ -18,31 +18,32 @@ from numpy.typing import NDArray
 
 from fasaco_edge.mission.core.events import MemberReceived
 
-# Length of the path published and checked, spacing of the points checked, and clearance [m].
+# Length of the path that is published and checked, spacing of its points, and clearance [m].
 AHEAD_M, SPACING_M, CLEARANCE_M = 2.0, 0.1, 0.1
 # Two robots conflict if they come too near each other within this time [s].
 SLACK_S = 3.0
-# Distance to a conflict at which a robot waits; least difference of two distances [m].
+# Distance to a conflict at which a robot waits; difference up to which distances are about equal
+# [m].
 WAIT_M, NEARER_M = 1.0, 0.5
-# A robot makes way for one whose path leads over it within this length [m].
+# A robot makes way for another whose path leads over it within this length [m].
 OVER_M = 1.5
-# A robot is an obstacle once it has stood for this long; a robot that is blocked or waits for this
-# long makes way, or plans around the other [s].
+# A robot that has stood for STANDS_S is an obstacle; a robot that is blocked or has waited for
+# PATIENCE_S makes way, or plans around the other [s].
 STANDS_S, PATIENCE_S = 5.0, 6.0
-# Robots this near publish more often [m]; robots silent for longer are ignored [s].
+# Distance within which robots publish more often [m]; silence after which robots are ignored [s].
 NEAR_M, OLD_S = 4.0, 5.0
 
 Points = NDArray[np.float64]
 
 
 class Neighbour(NamedTuple):
-    """Another robot, as of its last message.
+    """Another robot.
 
     Attributes:
-        message: its message.
+        message: its last message.
         age_s: age of the message [s].
         stands_s: how long it has stood [s].
-        pace_s_m: its time for a metre [s/m].
+        pace_s_m: its time per metre [s/m].
         is_avoided: whether paths are planned around it where it stands.
     """
 
@@ -59,7 +60,7 @@ class Obstruction:
 
     Attributes:
         robot: name of the other robot.
-        is_on_path: whether this robot stands on the other's path, and is to make way.
+        is_on_path: whether this robot stands on the other's path, and must make way.
         is_blocked: whether the other stands on this robot's path.
     """
 
@@ -69,14 +70,14 @@ class Obstruction:
 
     @property
     def reason(self) -> str:
-        """Text of the obstruction."""
+        """The reason of the wait, for people."""
         if self.is_blocked:
             return f"{self.robot} stands in the way"
         return f"makes way for {self.robot}" if self.is_on_path else f"waits for {self.robot}"
 
 
 def least_apart_m(radius_m: float, other: MemberReceived) -> float:
-    """Return the least distance of two robots' centres [m], for the radius of one [m]."""
+    """Return the least allowed distance of a robot's centre from another's, for its radius [m]."""
     return radius_m + other.radius_m + CLEARANCE_M
 
 
@@ -97,10 +98,10 @@ def obstruction(
     neighbours: Mapping[str, Neighbour],
     waits_for: str,
 ) -> Obstruction | None:
-    """Return what keeps a robot from going on; None for nothing.
+    """Return a robot's obstruction; None if there is none.
 
     A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. For each
-    other robot the first case that holds:
+    other robot, the first row applies whose two conditions hold:
 
     | the other robot | this robot | decision |
     |---|---|---|
@@ -118,7 +119,7 @@ NEARER_M farther than the other, or about as far and second by name | waits |
     Args:
         name: its name.
         radius_m: of its disc [m].
-        pace_s_m: its time for a metre [s/m].
+        pace_s_m: its time per metre [s/m].
         line: points every SPACING_M from its place along its path, float64 (n, 2), n >= 1.
         neighbours: the other robots, by name.
         waits_for: name of the robot that it waits for already; "" for none.
@@ -139,12 +140,12 @@ NEARER_M farther than the other, or about as far and second by name | waits |
         if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
         if message.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
-            # A path around it has clearance only at the centres of cells, and only from the place
-            # of its last motion.
+            # A path around the other robot keeps CLEARANCE_M only at the centres of cells, and from
+            # the place where that robot was last seen to move.
             passes_m = clear_m - CLEARANCE_M if near.is_avoided else clear_m
             if not _comes_to(apart_m, passes_m):
                 continue
-            # A robot without a path would move if it could: no robot waits for that.
+            # A robot without a path will not move: it is not waited for.
             if is_held and holds_it and not is_first and len(theirs) > 1:
                 return Obstruction(other, is_on_path=is_over)
             blocked = blocked or Obstruction(other, is_blocked=True)
@@ -161,7 +162,7 @@ NEARER_M farther than the other, or about as far and second by name | waits |
 
 
 class _Meeting(NamedTuple):
-    """Where two robots come too near each other: length of either's path until then [m]."""
+    """Place where two robots come too near each other: length of each path up to there [m]."""
 
     mine_m: float
     theirs_m: float
@@ -174,7 +175,7 @@ def _is_over(apart_m: Points, clear_m: float) -> bool:
 
 
 def _comes_to(apart_m: Points, clear_m: float) -> bool:
-    """Return whether this robot soon comes too near to the place of the other one."""
+    """Return whether this robot's path soon comes too near to the other robot's place."""
     first = np.flatnonzero(apart_m[:, 0] < clear_m)
     comes = len(first) > 0 and first[0] * SPACING_M <= WAIT_M / 2
     return bool(comes and apart_m[:, 0].min() < apart_m[0, 0] - 1e-3)
@@ -183,13 +184,13 @@ def _comes_to(apart_m: Points, clear_m: float) -> bool:
 def _meeting(
     apart_m: Points, clear_m: float, pace_s_m: float, near: Neighbour, slack_s: float
 ) -> _Meeting | None:
-    """Return where two robots that drive come too near each other at about the same time."""
+    """Return where two driving robots come too near each other at about the same time."""
     mine, theirs = apart_m.shape
     at_s = np.arange(mine) * SPACING_M * pace_s_m
     there_s = np.arange(theirs) * SPACING_M * near.pace_s_m - near.age_s
     is_meeting = (apart_m < clear_m) & (np.abs(at_s[:, None] - there_s[None]) < slack_s)
     is_meeting &= there_s > -1.0
-    # Robots that move apart are too near only now.
+    # Robots that move apart are too near at their present places only: no conflict.
     is_parting = is_meeting[0, 0] and apart_m.min() >= apart_m[0, 0] - 1e-3
     if is_parting or not is_meeting.any():
         return None

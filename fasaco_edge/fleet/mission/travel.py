@@ -1,4 +1,4 @@
-"""Travel: ways and travel times over a lattice, and places far apart on it."""
+"""Travel over a lattice: numbers of steps, travel times, and places far apart."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.ways import FAR, ways_from
 from fasaco_edge.mission.map.reachable_area import anchor_cell
 
-# A cell that is not coverable is replaced by the nearest coverable cell within this distance
-# [cells].
+# Largest distance at which a coverable cell replaces a cell that is not coverable [cells].
 SNAP = 2
 # Travel time to a cell that cannot be reached [s].
 UNREACHED_S = np.float32(1e9)
@@ -32,14 +31,19 @@ def ways(lattice: CoverageLattice, start: Cell) -> Steps:
 
 
 def times_of(steps: Steps, steps_s: NDArray[np.float32] | np.float32) -> Seconds:
-    """Return travel times [s], float32 (k, n); UNREACHED_S where unreachable, at any pace."""
+    """Return travel times [s], float32 (k, n); UNREACHED_S where unreachable.
+
+    Args:
+        steps: numbers of steps, float32 (k, n).
+        steps_s: time of a step [s].
+    """
     return np.where(steps < FAR, steps * steps_s, UNREACHED_S)
 
 
 def on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
-    """Return the coverable cell nearest to a cell, within SNAP cells; without one the cell itself.
+    """Return the coverable cell nearest to a cell, within SNAP cells; else the cell itself.
 
-    Seeds that others send may lie on cells that this robot's map does not show as coverable.
+    Seeds that others send may lie on cells that are not coverable on this robot's map.
     """
     if lattice.coverable[row, col]:
         return row, col
@@ -53,12 +57,11 @@ def on_ground(lattice: CoverageLattice, row: int, col: int) -> Cell:
 
 
 class Travel:
-    """Travel times to some cells of a lattice; each start is searched once.
+    """Travel times to a set of cells of a lattice; each start is searched once.
 
     Attributes:
-        lattice: the lattice.
-        cells: int64 (n,), flat.
-        every: 1 for all of the cells, 2 for every second, and so on.
+        cells: flat indices, int64 (n,).
+        every: 1 if these are all cells of interest, 2 for every second, and so on.
     """
 
     def __init__(self, lattice: CoverageLattice, cells: NDArray[np.int64], every: int) -> None:
@@ -66,7 +69,7 @@ class Travel:
         self._known: dict[Cell, Steps] = {}
 
     def times_s(self, starts: Sequence[Cell], steps_s: NDArray[np.float64]) -> Seconds:
-        """Return travel times from starts [s], float32 (k, n); huge where unreachable."""
+        """Return travel times from starts [s], float32 (k, n); UNREACHED_S where unreachable."""
         found = np.array([self._ways_from(start) for start in starts])
         return times_of(found, steps_s.astype(np.float32)[:, None])
 
@@ -87,7 +90,11 @@ def cell_of(lattice: CoverageLattice, flat: int) -> Cell:
 
 
 def apart(lattice: CoverageLattice, first: Point, count: int) -> list[Point]:
-    """Return places, each with the largest walking distance from all earlier ones."""
+    """Return ``count`` points [m], each as far as possible from ``first`` and all earlier ones.
+
+    Raises:
+        StartBlocked: the robot does not fit at ``first``, or there is no room for ``count`` more.
+    """
     start = anchor_cell(lattice, Pose2D(*first))
     if start is None:
         raise StartBlocked(f"the robot does not fit where it starts, {first} m")

@@ -1,1 +1,1 @@
-"""Fleet as an observer sees it: its robots, their cells and shares, from their messages."""
+"""Observer of a fleet: its robots, their cells and parts, from their messages."""

@@ -1,7 +1,7 @@
 """Cells that a fleet's robots send, in tiles of bits, and travel distances over them.
 
-The data of a robot is bounded here: tiles beyond a number, or so far away that the rectangle around
-all of them would be huge, are left out and counted.
+The number of a robot's tiles, and the size of the rectangle around them, are bounded: further tiles
+are left out and counted.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FAR = np.iinfo(np.int32).max
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """Position of a robot's cells: their size, their angle, and the pose of its map frame.
+    """Placement of a robot's cells: their size, their angle, and the pose of its map frame.
 
     Attributes:
         cell_m: edge of a cell [m].
@@ -72,7 +72,7 @@ class Seat:
         return GridGeometry(window.rows, window.cols, self.cell_m, Pose2D(x, y, lattice.yaw))
 
     def carried(self, cells: Cells, to: Seat) -> Cells:
-        """Return the cells of another seat in which the centres of cells (n, 2) lie."""
+        """Return the cells of another seat that contain the centres of ``cells``, int64 (n, 2)."""
         if to == self or not len(cells):
             return cells
         here, there = self.lattice, to.lattice
@@ -102,7 +102,7 @@ class TileSet:
 
         Args:
             tiles: the tiles.
-            grows: whether cells are only added; else a newer tile of a place replaces an older.
+            grows: whether tiles only add cells; else they replace older tiles.
         """
         changed = []
         for tile in tiles:
@@ -154,7 +154,8 @@ def cells_of(tiles: Iterable[CellTile]) -> Cells:
 
 
 def together(parts: Iterable[Cells]) -> Cells:
-    """Return the cells of all parts, each once; leave out a part far away from the earlier ones."""
+    """Return the cells of all parts, each once, int64 (n, 2); parts far from the earlier ones are
+    left out."""
     joined = np.zeros((0, 2), np.int64)
     for part in parts:
         both = np.concatenate([joined, part])
@@ -186,12 +187,12 @@ def _count(bits: bytes) -> int:
 
 
 def distances(ground: NDArray[np.bool_], start: Place, most_steps: int = FAR) -> NDArray[np.int32]:
-    """Return the steps from a cell to each cell of the ground, int32 (rows, cols); FAR beyond,
-    and beyond ``most_steps``.
+    """Return the steps from a cell to each cell of the ground, int32 (rows, cols); FAR for cells
+    out of reach, or farther than ``most_steps``.
 
-    Steps lead to the four neighbours: doors that only a robot's map shows are not known here.
+    Steps lead to all of the four neighbours: which of them a robot can make is not known here.
     """
-    # With a border, so that no step leads around an edge.
+    # The border keeps steps from leading around an edge.
     free = np.pad(ground, 1)
     cols = free.shape[1]
     free = free.reshape(-1)

@@ -1,9 +1,7 @@
-"""The queues between Zenoh's threads and an observer of a fleet: a set for each robot.
+"""Queues between Zenoh's threads and an observer of a fleet, separate for each robot.
 
-A robot that floods fills its own queues only, and its newest messages are kept.
-
-Some topics of each robot are subscribed. Maps are requested one at a time, so that a network
-carries no more than one.
+A robot that sends too much fills its own queues only; its newest messages are kept. Maps are
+requested from one robot at a time, to limit the load on the network.
 """
 
 from __future__ import annotations
@@ -22,10 +20,10 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import FLEET, MAP, POSE
 
-# Largest number of waiting samples of a topic; 1 for topics not named. A fleet's message is sent
-# again within a second; several poses show which cells a robot drove through.
+# Largest number of waiting samples of a topic; 1 for topics not named. Fleet messages repeat within
+# a second; all poses are needed to know which cells a robot drove through.
 DEPTHS = {FLEET.name: 4, POSE.name: 256}
-# The capacity is divided among at least this many robots.
+# Least number of shares that the capacity is divided into.
 LEAST_SHARING = 4
 
 
@@ -39,7 +37,7 @@ class Received:
 
 @dataclass(slots=True)
 class Traffic:
-    """Messages of a robot to its fleet, their bytes, and samples that were too large."""
+    """Counts of a robot's messages to its fleet, of their bytes, and of samples too large."""
 
     messages: int = 0
     bytes: int = 0
@@ -69,7 +67,7 @@ class FleetInbox:
         self._is_news = False
 
     def post(self, robot: str, topic: str, sample: Sample) -> None:
-        """Add a sample; safe from any thread, never waits for the writer."""
+        """Add a sample, from any thread, without waiting for the reader."""
         with self._changed:
             queues = self._robots.get(robot)
             if queues is None:
@@ -127,7 +125,7 @@ class FleetInbox:
         queues.bytes += size
 
 
-# Time for a robot's map before the next robot's turn [ns].
+# Time for a robot's map to arrive before the next robot is asked [ns].
 MAP_TURN_NS = 2_000_000_000
 
 Post = Callable[[str, str, Sample], None]

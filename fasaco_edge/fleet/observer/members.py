@@ -1,4 +1,4 @@
-"""The robots of a fleet as an observer knows them."""
+"""Members of a fleet, as an observer knows them from their messages."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from fasaco_edge.fleet.observer.cells import Seat, TileSet
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
-# Largest number of observed robots, that of a fleet. Silence after which a robot is gone [ns].
+# Largest number of robots observed.
 MOST_MEMBERS = MAX_FLEET_PARTS
+# Silence after which a robot is gone [ns].
 GONE_NS = 5_000_000_000
-# Messages beyond this rate are counted, not read [ns].
+# Least time between two messages of a robot; messages in between are not read [ns].
 LEAST_SPACING_NS = 100_000_000
 JOINED, GONE, WAITING = "joined", "gone", "waiting"
 
@@ -25,12 +26,12 @@ class Member:
 
     Attributes:
         name: its name on the bus.
-        number: in order of joining, from 0.
-        seat: position of its cells.
+        number: its number in the order of joining, from 0.
+        seat: placement of its cells.
         newest: its newest message.
-        received_ns: time of its newest message.
-        swept, ground: cells it has swept, and can reach.
-        changes: how often these cells have changed, or their seat.
+        received_ns: time of its newest message [ns].
+        swept, ground: cells that it has swept; cells that it can reach.
+        changes: number of changes of these cells and of their seat.
         news: tiles of ``swept`` and of ``ground`` that its newest message changed.
     """
 
@@ -45,7 +46,7 @@ class Member:
     news: tuple[Sequence[CellTile], Sequence[CellTile]] = (), ()
 
     def receive(self, said: FleetMember, at_ns: int) -> str:
-        """Take in a message; return what has changed of its frame, "" for nothing."""
+        """Take in a message; return how its frame has changed, or ""."""
         moved = ""
         if self.is_moved_by(said):
             self.seat = Seat.of(said)
@@ -63,15 +64,15 @@ class Member:
         return moved
 
     def is_moved_by(self, said: FleetMember) -> bool:
-        """Return whether a message places its cells anew."""
+        """Return whether a message changes its seat or its frame."""
         return Seat.of(said) != self.seat or said.frame != self.newest.frame
 
     def is_gone(self, now_ns: int) -> bool:
-        """Return whether it is silent."""
+        """Return whether it has been silent for too long."""
         return now_ns - self.received_ns > GONE_NS
 
     def state(self, now_ns: int) -> str:
-        """Return the state of its mission, or that it waits for another robot, or is gone."""
+        """Return the state of its mission, or WAITING for another robot, or GONE."""
         if self.is_gone(now_ns):
             return GONE
         return WAITING if self.newest.waits_for else self.newest.state
@@ -88,7 +89,7 @@ class Members:
         self._by_name: dict[str, Member] = {}
 
     def receive(self, robot: str, said: FleetMember, at_ns: int) -> tuple[Member, str]:
-        """Take in a message; return its robot, and the change: JOINED, what moved, or "".
+        """Take in a message; return its robot, and JOINED, how its frame has changed, or "".
 
         Raises:
             FleetError: the largest number of robots is reached.
@@ -116,10 +117,10 @@ class Members:
         return len(self._by_name)
 
     def dividing(self, now_ns: int) -> Member | None:
-        """Return a robot that sends the division in force; None if none sends one.
+        """Return a robot that sends the division in force; None if no robot sends a division.
 
-        A single remaining robot sends a new number without parts: all cells left are its own. The
-        last message of an absent robot counts only if all robots are absent.
+        A robot that is alone sends a number without parts: all cells left are its own. Messages of
+        absent robots count only if all robots are absent.
         """
         dividing = [member for member in self if member.newest.division]
         present = [member for member in dividing if not member.is_gone(now_ns)] or dividing

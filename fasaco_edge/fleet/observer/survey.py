@@ -1,8 +1,8 @@
-"""Survey of a fleet's floor: the cells swept and left, and the robot that each is left to.
+"""Survey of a fleet's floor: the cells swept and left, and the owner of each cell left.
 
-A cell belongs to the robot whose seed has the shortest travel time to it, plus its handicap, as in
-the robots' own division; here over the cells that they report as reachable. Each robot sends up to
-two million cells, on a lattice of its own: the floor made of them is bounded, and so is the search.
+The owner is the robot with the least sum of its handicap and the travel time from its seed, as in
+the robots' own division, here over the cells that the robots report as reachable. Each robot may
+send two million cells, on a lattice of its own, so the survey's size and search are bounded.
 """
 
 from __future__ import annotations
@@ -25,28 +25,28 @@ from fasaco_edge.fleet.observer.members import MOST_MEMBERS, Member, Members
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.wire.documents.fleet import TILE
 
-# Largest number of steps searched from the seeds of a division, over all robots: in the largest
-# mazes that messages can hold, some cells get no owner.
+# Largest number of steps searched from the seeds of a division, over all robots. Only in very large
+# mazes do some cells get no owner.
 MOST_STEPS = 60_000
-# Largest size of the rectangle around all cells, the same as for one robot.
+# Largest number of cells in the rectangle around all cells, as for one robot.
 MOST_CELLS = (MOST_SPAN * TILE) ** 2
 NOBODY = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Survey:
-    """The cells of a fleet's robots at a time.
+    """The cells of a fleet's robots at one time.
 
     Attributes:
         robots: names of the robots included.
-        geometry: of the cells, in the fleet's frame; None while there is none.
-        owners: number of the robot that each cell is left to, int16 (rows, cols); NOBODY for none.
+        geometry: placement of the cells in the fleet's frame; None without cells.
+        owners: number of the robot that owns each cell left, int16 (rows, cols); else NOBODY.
         twice: cells that several robots have swept, bool (rows, cols).
         left: number of cells left to each robot, by name.
         area: number of cells that any robot can reach or has swept.
-        swept: number of cells that any has swept.
-        division: number of the division in force; 0 without one.
-        by: name of the robot that made it.
+        swept: number of cells that any robot has swept.
+        division: number of the division in force; 0 without a division.
+        by: name of its author.
     """
 
     robots: frozenset[str] = frozenset()
@@ -71,7 +71,7 @@ class Survey:
 
     @property
     def fraction(self) -> float | None:
-        """Share of the cells that is swept; None while no cell is known."""
+        """Share of the cells that are swept; None while no cell is known."""
         return self.swept / self.area if self.area else None
 
 
@@ -108,7 +108,7 @@ def survey_of(members: Members, now_ns: int) -> Survey:
 
 
 def _window(seat: Seat, members: Members) -> Window | None:
-    """Return the window of all cells on a lattice; a robot far from earlier ones is left out."""
+    """Return the window of all cells on a lattice; cells far from the earlier ones are left out."""
     joined = None
     for member in members:
         for tiles in (member.ground, member.swept):
@@ -126,13 +126,13 @@ def owners_of(
     window: Window,
     most_steps: int = MOST_STEPS,
 ) -> NDArray[np.int16]:
-    """Return the number of the robot that a division gives each cell to; NOBODY for none.
+    """Return the number of the robot that owns each cell, int16 (rows, cols); NOBODY for none.
 
     Args:
         divider: a robot that sends the division.
         members: the robots.
         known: reachable cells, bool (rows, cols).
-        window: of these cells, on the divider's lattice.
+        window: window of ``known`` on the divider's lattice.
         most_steps: largest number of steps searched, over all robots.
     """
     first = np.full(known.shape, np.float32(np.inf))

@@ -1,1 +1,1 @@
-"""The recording of a whole fleet: one file of all its robots, and the log that reviews read."""
+"""Recording of a whole fleet: one file of all its robots, and the log that reviews read."""

@@ -1,6 +1,6 @@
-"""The layout of a fleet's recording: one map of all robots, activities, curves, states, log.
+"""Layout of a fleet's recording: a map of all robots, a card, curves, states, and the log.
 
-A card beside the map names each robot's activity and colour.
+The card beside the map shows each robot's activity and colour.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ TRAIL_S = 300.0
 
 
 def robot_entity(robot: str, name: str) -> str:
-    """Return an entity of a robot."""
+    """Return the path of a robot's entity."""
     return f"{entities.ROBOTS}/{robot}/{name}"
 
 
 def build_layout(robots: Sequence[str], bounds: Bounds) -> rrb.Blueprint:
-    """Return the layout for robots, its eye over ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
+    """Return the layout for robots, with the view fitted to ``bounds`` [m]."""
 
     def each(name: str) -> list[str]:
         return [f"/{robot_entity(robot, name)}" for robot in robots]
@@ -82,20 +82,15 @@ LEGEND = """\
 - **Line** bright its path, dark where it drove"""
 
 
-def colour_of(number: int) -> tuple[int, int, int]:
-    """Return the colour of the robot with a number."""
-    return palette.ROBOTS[number % len(palette.ROBOTS)][1]
-
-
 def card_of(title: str, members: Members, states: Mapping[str, str], survey: Survey) -> str:
-    """Return the card as Markdown; ``states``: of the robots, by their names."""
+    """Return the card as Markdown; ``states``: the robots' states, by name."""
     twice_m2, rows, swept_m2 = survey.twice_m2, [], 0.0
     for member in members:
         cell_m2, waits_for = member.seat.cell_m**2, member.newest.waits_for
         robot_m2 = member.swept.count * cell_m2
         swept_m2 += robot_m2
         state = f"waits for {waits_for}" if waits_for else states[member.name]
-        colour, _ = palette.ROBOTS[member.number % len(palette.ROBOTS)]
+        colour, _ = palette.robot(member.number)
         left_m2 = survey.left[member.name] * cell_m2
         rows.append((member.name, colour, state, f"{robot_m2:.1f}", f"{left_m2:.1f}"))
     heading = (

@@ -1,8 +1,8 @@
-"""The log of a fleet: the messages of each robot, second by second, beside the drawings.
+"""Log of a fleet: a note per second of what each robot sent, recorded beside the drawings.
 
-A review reads it. Notes are gathered for some seconds and written as one blob: deflated MessagePack
-with a version in it. The first blob of each part also holds all cells received before, so that the
-part can be read without the earlier ones.
+A review reads it. The notes of some seconds are written as one blob: deflated MessagePack with a
+version in it. The first blob of each part also holds all cells received before, so that the part
+can be read without the earlier ones.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status
 
 NOTES_VERSION: Final = 1
-# Largest content of a batch, checked while it is inflated [bytes].
+# Largest size of an inflated batch [bytes].
 MOST_BYTES = 64_000_000
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 
-# Longest distance between two poses that counts as driven; limits on cells and plans between two
-# notes.
+# Longest distance between two poses that counts as driven [m]; largest numbers of cells and of
+# plans in a note.
 MOST_STEP_M = 2.0
 MOST_PASSES, MOST_PLANS = 2_000, 200
 
@@ -45,7 +45,7 @@ Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
 class Pass(msgspec.Struct, frozen=True, array_like=True):
-    """A cell that a robot entered, and the time since the recording began [ms]."""
+    """A cell that a robot entered, and the time of that since the recording began [ms]."""
 
     at_ms: int
     row: int
@@ -60,16 +60,16 @@ class Note(msgspec.Struct, array_like=True):
         at_ms: time since the recording began [ms].
         state: of its mission; "gone" once it is silent.
         x, y: its position in its map frame [m].
-        waits_for: name of the robot it waits for; "" for none.
+        waits_for: name of the robot that it waits for; "" for none.
         division: number of its division.
-        open_cells: cells known to it that are still to sweep.
-        messages, bytes: of the fleet, since the last note.
-        driven_m: distance driven since [m].
-        plans_ms: time of each plan reported since [ms].
-        passes: cells it entered since.
-        swept, ground: whole tiles that have changed since; all tiles if ``in_force``.
+        open_cells: number of cells known to it that are still to sweep.
+        messages, bytes: number and bytes of its messages to the fleet.
+        driven_m: distance driven [m].
+        plans_ms: time of each plan reported [ms].
+        passes: cells that it entered.
+        swept, ground: whole tiles that have changed; all tiles if ``in_force``.
         in_force: whether this note repeats the content of earlier parts.
-        stamp_ms: stamp of its newest pose; 0 without one, and in recordings of before.
+        stamp_ms: stamp of its newest pose [ms]; 0 without a stamp, and in older recordings.
         time_scale: simulated seconds per second, as configured; 1 for a real robot.
     """
 
@@ -106,7 +106,7 @@ class NotedRobot(msgspec.Struct, frozen=True, array_like=True):
 
 
 class NoteBatch(msgspec.Struct, frozen=True, array_like=True):
-    """Notes of some seconds; ``run`` identifies the recording by its beginning [ns]."""
+    """Notes of some seconds; ``run``, when the recording began [ns], identifies the recording."""
 
     version: int
     run: int
@@ -120,7 +120,7 @@ class _Head(msgspec.Struct, frozen=True, array_like=True):
 
 
 @dataclass(slots=True)
-class Unnoted:
+class PendingNote:
     """Poses, plans and cells of a robot since its last note."""
 
     _pose: Pose2D | None = None
@@ -148,7 +148,7 @@ class Unnoted:
             self._passes.append(Pass(at_ms, *cell))
 
     def note_status(self, status: Status) -> None:
-        """Take in a status: the time of a plan that was made since the last, and its clock."""
+        """Take in a status: the time of a plan made since the last status, and the time scale."""
         if status.config:
             self._time_scale = known_settings(status.config).robot.time_scale
         plans, took_ms = status.plan.plans, status.latency_ms.plan
@@ -157,7 +157,7 @@ class Unnoted:
         self._plans = plans
 
     def note_cells(self, member: Member, *, has_moved: bool) -> None:
-        """Take in the tiles that the newest message changed; those before may lie elsewhere."""
+        """Take in the tiles that the newest message changed; drop all others if the frame moved."""
         if has_moved:
             self._swept.clear()
             self._ground.clear()
@@ -194,7 +194,7 @@ class Unnoted:
 
 
 def in_force(member: Member, at_ms: int) -> Note:
-    """Return all cells received from a robot up to now."""
+    """Return a note of all cells received from a robot up to now."""
     said = member.newest
     return Note(
         member.number, at_ms, said.state, said.x, said.y, said.waits_for, said.division,
@@ -203,7 +203,7 @@ def in_force(member: Member, at_ms: int) -> Note:
 
 
 def noted(member: Member) -> NotedRobot:
-    """Return a robot's name and seat."""
+    """Return a robot's entry in a batch."""
     seat = member.seat
     place = seat.cell_m, seat.lattice_deg, seat.x, seat.y, seat.deg
     return NotedRobot(member.name, member.newest.radius_m, *place)
@@ -256,7 +256,11 @@ def read_notes(paths: Sequence[Path]) -> list[NoteBatch]:
 
 
 def numbers_of(paths: Sequence[Path]) -> dict[str, int]:
-    """Return the number of each robot in a recording, which is that of its colour; as above."""
+    """Return the number of each robot in a recording, by name; the number decides its colour.
+
+    Raises:
+        UnreadableRecording, DifferentRuns: see ``read_notes``.
+    """
     return {
         robot.name: number
         for batch in read_notes(paths)

@@ -1,9 +1,9 @@
-"""The recorder of a whole fleet, a process that records all its robots into one file.
+"""Recorder of a whole fleet: a process that records all its robots into one file.
 
 Each robot is recorded from its first message to the fleet, even if it joins late. The recorder
-subscribes to the newest status, path and pose of each robot, and requests maps in turn, one at a
-time, so that a network carries no more than one. A robot's messages cannot harm another's record:
-each has its own queues, its own decoders, and its own share of the drawings.
+subscribes to the newest status, path and pose of each robot, and requests the robots' maps one at a
+time, to limit the load on the network. A robot's messages cannot harm the record of another: each
+robot has its own queues, its own decoders, and its own share of the drawings.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fasaco_edge.fleet.recording.notes import (
     NOTES_VERSION,
     Note,
     NoteBatch,
-    Unnoted,
+    PendingNote,
     encode_notes,
     in_force,
     noted,
@@ -44,13 +44,14 @@ from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.topics import FLEET, MAP, PATH, POSE, STATUS
 
+# Periods of notes and of writing them [ns].
 NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
-# Robots that send within this time of the first robot are recorded in the order of their names;
-# largest number of messages that wait for it.
+# Robots that send within this time of the first robot [ns] are numbered in the order of their
+# names; largest number of messages that wait until then.
 GATHER_NS, MOST_GATHERED = 2_000_000_000, 1_000
-# Time over which a robot's rate of messages is averaged for the plot.
+# Number of notes over which a robot's rate of messages is averaged for the plot.
 RATE_NOTES = 5
-# Number of robots and topics whose faults are counted apart, besides those of recorded robots.
+# Number of unknown robots and topics whose faults are counted separately.
 MOST_FAULTS = 256
 TOO_LARGE = "what is larger than its share of the memory is left out, its map, say"
 TOO_WIDE = "cells farther apart than are recorded, or more, are left out"
@@ -62,7 +63,7 @@ def run_fleet_recorder(
     """Record a fleet until SIGTERM or SIGINT; return the process's exit code, see ``record``.
 
     Args:
-        config: for the prefix of all keys, and the type of poses whose samples name none.
+        config: for the prefix of all keys, and the type of poses whose samples do not name it.
         bus_settings: how to join the bus.
         fleet: name of the fleet.
         output: where and how to write.
@@ -73,7 +74,7 @@ def run_fleet_recorder(
 
 
 class FleetRecorder:
-    """Connects the bus to the writer: ``step`` takes samples, writes and draws them."""
+    """Connection of the bus to the writer: ``step`` takes samples, writes and draws them."""
 
     def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
         self._fleet = fleet
@@ -92,7 +93,7 @@ class FleetRecorder:
         self._first: list[Received] = []
         self._gathers = True
         self._poses: dict[str, PoseDecoder] = {}
-        self._unnoted: dict[str, Unnoted] = {}
+        self._pending: dict[str, PendingNote] = {}
         self._notes: list[Note] = []
         self._rates: dict[str, list[int]] = {}
         self._next_note_ns = self._next_write_ns = self._began_ns
@@ -135,9 +136,10 @@ class FleetRecorder:
         return self._writer.close()
 
     def _gathered(self, arrived: list[Received]) -> list[Received]:
-        """Return the samples to process now; those of the first robots together, sorted by name.
+        """Return the samples to process now.
 
-        Sorted by name, robots have the same colours in all recordings and pictures.
+        The samples of the first robots come together, sorted by the robots' names, so that robots
+        have the same colours in all recordings and pictures.
         """
         if self._gathers:
             strange = {
@@ -161,7 +163,7 @@ class FleetRecorder:
         return self._writer.hangs
 
     def note(self, line: str) -> None:
-        """Log a fault from before the recording began."""
+        """Log a fault that occurred before the recording began."""
         self._scene.add_line(line, "WARN")
 
     def _attempt(self, received: Received) -> None:
@@ -171,13 +173,12 @@ class FleetRecorder:
         except FasacoError as error:
             what = received.robot, received.arrival.topic
             if self._members.get(received.robot) is None:
-                # A queue for each of any number of names would leave no room for real robots.
+                # Invented names must not take all queues.
                 self._inbox.forget(received.robot)
                 if what not in self._faults and len(self._faults) >= MOST_FAULTS:
                     what = "other robots", received.arrival.topic
             self._faults[what] += 1
             count = self._faults[what]
-            # A robot may send no other message.
             if is_reported(count):
                 self._scene.add_line(
                     one_line(f"{': '.join(what)}: {count} refused: {error}"), "WARN"
@@ -202,7 +203,7 @@ class FleetRecorder:
             if stamped is not None:
                 pose, seat = stamped.pose, member.seat
                 cell = seat.cell_at(pose.x, pose.y)
-                self._unnoted[robot].move(cell, stamped, self._ms(arrival.wall_ns))
+                self._pending[robot].move(cell, stamped, self._ms(arrival.wall_ns))
                 self._scene.add_pose(member, pose)
         elif arrival.topic == PATH.name:
             self._scene.add_path(member, decode_path(sample.payload).xy)
@@ -211,9 +212,9 @@ class FleetRecorder:
             self._scene.add_map(member, decode_occupancy_grid(sample.payload))
         elif arrival.topic == STATUS.name:
             status = decode_tolerant(sample.payload, Status)
-            # A second daemon of the robot's name does not plan.
+            # A second daemon with the robot's name does not plan.
             if status.claim.stand == "plans":
-                self._unnoted[robot].note_status(status)
+                self._pending[robot].note_status(status)
 
     def _take_fleet(self, robot: str, arrival: Arrival) -> None:
         said = decode_member(arrival.sample.payload, self._fleet)
@@ -230,12 +231,12 @@ class FleetRecorder:
             self._join(member)
         elif news:
             self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
-        self._unnoted[robot].note_cells(member, has_moved=bool(news))
+        self._pending[robot].note_cells(member, has_moved=bool(news))
 
     def _join(self, member: Member) -> None:
         """Record a robot from now on."""
         self._poses[member.name] = PoseDecoder(self._schema)
-        self._unnoted[member.name] = Unnoted()
+        self._pending[member.name] = PendingNote()
         self._subscriptions.subscribe(member.name)
         self._scene.add_line(f"{member.name}: joined, cells of {member.seat.cell_m:g} m")
         self._scene.join(member)
@@ -251,7 +252,7 @@ class FleetRecorder:
             if member.swept.refused or member.ground.refused:
                 self._warn_once(member.name, TOO_WIDE)
             counts = traffic.messages, traffic.bytes
-            note = self._unnoted[member.name].note(member, self._ms(now_ns), now_ns, counts)
+            note = self._pending[member.name].note(member, self._ms(now_ns), now_ns, counts)
             self._notes.append(note)
             rates = self._rates.setdefault(member.name, [])
             rates.append(traffic.bytes)
@@ -272,7 +273,7 @@ class FleetRecorder:
             self._scene.describe(self._title)
 
     def _write(self) -> None:
-        """Write the gathered notes; in a new part also the notes in force."""
+        """Write the notes gathered; in a new part also the cells of earlier parts."""
         if self._part != self._writer.part_number:
             self._part = self._writer.part_number
             at_ms = self._notes[0].at_ms if self._notes else self._ms(self._writer.wall_ns)
@@ -283,7 +284,7 @@ class FleetRecorder:
         batch = NoteBatch(NOTES_VERSION, self._began_ns, self._fleet, robots, self._notes)
         self._notes = []
         if not self._writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
-            # The next part repeats everything except events that happen once.
+            # The next part repeats all cells.
             self._part = 0
 
     def _ms(self, wall_ns: int) -> int:

@@ -1,7 +1,7 @@
-"""The scene of a fleet: the data of its robots as entities, all in the fleet's frame.
+"""Scene of a fleet: the data of its robots as entities, all in the fleet's frame.
 
-Each robot has a colour, and a tree of entities of its own. All of them together are drawn no faster
-than the scene of one robot: the robots share the rate of each layer.
+Each robot has a colour, and a tree of entities of its own. The robots share the rate of each layer,
+so that the file grows no faster than with one robot.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.drawing import palette
 from fasaco_edge.fleet.observer.cells import mask_of, window_of
 from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
 from fasaco_edge.fleet.observer.members import GONE, Member, Members
@@ -19,7 +20,6 @@ from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.fleet.recording.layout import (
     build_layout,
     card_of,
-    colour_of,
     robot_entity,
 )
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D, union_bounds
@@ -37,12 +37,11 @@ RATES = {
 }  # fmt: skip
 FLEET_RATES = {entities.FLEET_SHARES: 2_000, entities.RUN_CARD: 800}
 CHUNK_BYTES = 1_200
-# Overhead of a layer of cells in four bytes each [bytes].
+# Overhead of a layer of cells [bytes].
 GRID_BYTES = 1_200
-# Limit on the pixels of all maps, four bytes each. Each part of a recording begins with all maps:
-# they must not fill it.
+# Largest number of pixels of all maps, four bytes each: each part begins with all maps.
 MOST_PIXELS = 2_000_000
-# The view follows the growing map in steps of this share of its size.
+# The view is fitted again once the maps have grown by this share of their size.
 REFRAME = 0.15
 MAP_ORDER, SHARE_ORDER, SWEPT_ORDER, TWICE_ORDER = 0.0, 1.0, 2.0, 3.0
 SHARE_ALPHA, SWEPT_ALPHA, TWICE_COLOUR = 55, 150, (60, 60, 70, 150)
@@ -103,8 +102,8 @@ class FleetScene:
                 names=member.name, colors=colour, widths=1.8, interpolation_mode="StepAfter"
             )
             self._writer.log_static(robot_entity(member.name, f"metrics/{name}"), line)
-        palette = np.array(list(STATES.values()), np.uint32)
-        states = rr.StateConfiguration(values=list(STATES), labels=list(STATES), colors=palette)
+        colours = np.array(list(STATES.values()), np.uint32)
+        states = rr.StateConfiguration(values=list(STATES), labels=list(STATES), colors=colours)
         self._writer.log_static(robot_entity(member.name, "state"), states)
         self._show()
 
@@ -124,7 +123,7 @@ class FleetScene:
             return
         drawn.trail.append((x, y))
         if len(drawn.trail) > MOST_TRAIL:
-            # After a long time without a drawing, every other point is dropped.
+            # If the trail has not been drawn for long, every other point is dropped.
             drawn.trail = drawn.trail[::2]
 
         def draw_trail() -> None:
@@ -147,7 +146,7 @@ class FleetScene:
         self._draw(member, "path", 12 * len(points), draw_path)
 
     def add_map(self, member: Member, grid: OccupancyGrid) -> None:
-        """Draw a robot's map; unknown pixels are transparent, so that the others' maps show."""
+        """Draw a robot's map; unknown pixels are transparent, to let other maps show."""
         grid = coarser(grid, MOST_PIXELS // max(len(self._drawn), LEAST_SHARING))
         x, y = self._here(member, grid.geometry.origin.x, grid.geometry.origin.y)
         yaw = grid.geometry.origin.yaw + member.seat.frame.yaw
@@ -168,7 +167,7 @@ class FleetScene:
         self._draw(member, "map", 2 * size_in_file(grid.cells), draw_map)
 
     def add_cells(self, member: Member) -> None:
-        """Draw the cells a robot has swept."""
+        """Draw the cells that a robot has swept."""
         self._draw(
             member, "swept", GRID_BYTES + member.swept.count // 8, lambda: self._draw_swept(member)
         )
@@ -180,7 +179,7 @@ class FleetScene:
         self._layers.draw(entities.FLEET_SHARES, size, self._draw_survey, self._writer.wall_ns)
 
     def add_figures(self, member: Member, figures: dict[str, float]) -> None:
-        """Plot changed figures of a robot, of METRICS."""
+        """Plot changed figures of a robot, by names of METRICS."""
         drawn = self._drawn[member.name]
         drawn.figures |= figures
 
@@ -193,7 +192,7 @@ class FleetScene:
         self._draw(member, "metrics", CHUNK_BYTES * (len(drawn.figures) - 1), draw_figures)
 
     def enter(self, member: Member, state: str, why: str = "") -> None:
-        """Show that a robot is in a state from now on; log it."""
+        """Show and log a robot's new state."""
         drawn = self._drawn[member.name]
         if not state or drawn.state == state:
             return
@@ -253,7 +252,7 @@ class FleetScene:
         return self._anchor
 
     def _here(self, member: Member, x: float, y: float) -> tuple[float, float]:
-        """Return where a point of a robot's map frame is drawn."""
+        """Return the place of the drawing for a point of a robot's map frame [m]."""
         x, y = member.placed(x, y)
         anchor = self._anchored(x, y)
         return x - anchor.x, y - anchor.y
@@ -311,7 +310,7 @@ def _world(member: Member, name: str) -> str:
 
 
 def _colour(member: Member) -> tuple[int, int, int]:
-    return colour_of(member.number)
+    return palette.robot(member.number)[1]
 
 
 def _darker(colour: tuple[int, int, int]) -> tuple[int, int, int]:

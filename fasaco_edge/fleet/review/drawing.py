@@ -24,7 +24,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording.read.robot_clock import clock
 
-# Opacity of the colour of a robot's cells; cells that two robots pass have none.
+# Opacity of the colour of a robot's cells.
 TINT = 0.35
 # Width of a track.
 TRACK_PX = 1.6
@@ -46,10 +46,10 @@ def draw_fleet_mission(
     Args:
         grid: the map at the end.
         lattice: the planning grid at the end.
-        trails: of each robot by its name, float64 (n, 2), n >= 1: places (x, y) [m], in order.
-        swept: reachable floor that each swept, in the same order, all on one raster.
-        unswept: reachable floor that none has swept.
-        recording: files of the fleet's: robots have their colours in it, if it has notes of them.
+        trails: driven positions (x, y) of each robot [m], by name, float64 (n, 2), n >= 1.
+        swept: reachable floor that each robot swept, in the same order, all on one raster.
+        unswept: reachable floor that no robot swept.
+        recording: files of the fleet's recording, for the robots' colours.
         title: heading.
         lines: caption below it.
     """
@@ -81,14 +81,12 @@ def draw_fleet_mission(
 
 
 def robot_tint(number: int) -> palette.Colour:
-    """Return the tint of the floor that the robot with a number sweeps."""
-    colour = np.array(_track_colour(number))
-    red, green, blue = np.rint(255 - TINT * (255 - colour)).astype(int).tolist()
-    return red, green, blue
+    """Return the colour of the floor that the robot with a number sweeps."""
+    return palette.tint(_track_colour(number), TINT)
 
 
 def _track_colour(number: int) -> palette.Colour:
-    return palette.ROBOTS[number % len(palette.ROBOTS)][1]
+    return palette.robot(number)[1]
 
 
 # Share from which a cell counts as swept again.
@@ -96,7 +94,7 @@ MOSTLY = 0.5
 
 
 def draw_fleet_review(review: FleetReview) -> Image.Image:
-    """Return the picture, RGB."""
+    """Return the picture of a review, RGB."""
     figures, seat = review.figures, review.seat
     swept = [np.array([*track.swept_ms], np.int64).reshape(-1, 2) for track in review.tracks]
     window = window_of(together([review.ground, *swept])) or Window(0, 0, 1, 1)

@@ -1,4 +1,4 @@
-"""Floor that the other robots of a fleet swept, by the messages in the recording of one of them."""
+"""Floor that the other robots of a fleet swept, from their messages in one robot's recording."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from fasaco_edge.wire.documents.settings import FleetSettings
 from fasaco_edge.wire.documents.turns import decode_turns
 from fasaco_edge.wire.topics import FLEET
 
-# A cell beside another one, or diagonal to it [cells].
+# Distance that includes the eight neighbours of a cell [cells].
 BESIDE = 1.5
 
 
 def swept_by_others(
     turns: Iterable[Arrival], fleet: FleetSettings, geometry: GridGeometry
 ) -> NDArray[np.bool_] | None:
-    """Return the pixels that others swept, bool (rows, cols); None if the recording lacks it.
+    """Return the pixels that others swept, bool (rows, cols); None without messages of others.
 
-    A swept cell counts as a whole, with the floor along walls beside it, in which no robot fits.
+    A swept cell counts as a whole, and so do unreachable cells beside it: the floor along walls.
 
     Args:
-        turns: the samples of the turn log: it holds the messages of the others.
-        fleet: of the robot that was recorded.
-        geometry: of the pixels, in the frame of its map.
+        turns: the samples of the turn log, which contain the messages of the others.
+        fleet: settings of the recorded robot.
+        geometry: placement of the pixels in the recorded robot's map frame.
     """
     members = _members(turns, fleet.name)
     if not members:
@@ -62,7 +62,7 @@ def swept_by_others(
 
 
 def _members(turns: Iterable[Arrival], fleet: str) -> list[Member]:
-    """Return the others by their last messages."""
+    """Return the other robots as of their last messages."""
     members: dict[str, Member] = {}
     decoder = SampleDecoder()
     for arrival in turns:

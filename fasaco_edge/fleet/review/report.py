@@ -1,8 +1,8 @@
-"""The review of a fleet's recording: makespan, balance, floor swept again, waiting, messages.
+"""Review of a fleet's recording: makespan, balance, floor swept again, waiting, messages.
 
-A cell that two robots passed is swept again, or only driven through. While a robot is on floor that
-others have swept, its steps from entry to exit are counted. The shortest way between the two counts
-as driving through; all further steps count as sweeping again.
+A robot drives through floor that others have swept, or sweeps it again. From entry to exit of such
+floor, it needs as many steps as the shortest way has: these count as driving through, its further
+steps as sweeping again.
 
 Durations are by the robots' own clocks, which run faster than the recorder's in a simulation. The
 recorder's clock decides which robot was first on a cell.
@@ -34,7 +34,7 @@ from fasaco_edge.fleet.review.tracks import RobotTrack, seat_of, seconds_of, tra
 from fasaco_edge.grid.geometry import Window
 
 AT_WORK = ("planning", "covering", "degraded")
-# Messages are counted over this time for their highest rate [s].
+# Time over which the highest rate of messages is averaged [s].
 PEAK_S = 5.0
 # Notes come once a second: a longer interval means that no message arrived [s].
 LONGEST_NOTE_S = 3.0
@@ -45,17 +45,17 @@ class FleetRobotFigures(msgspec.Struct, frozen=True):
     """Figures of one robot of a fleet.
 
     Attributes:
-        name: of the robot.
-        state: its last.
-        busy_s: planning or covering, without waiting [s].
-        waited_s: waited or made way for another robot [s].
-        waits, longest_wait_s: how often, and the longest [s].
-        driven_m: by its poses [m].
-        swept_m2: cells it swept [m2].
-        through_m2: of these, swept by another before, and only driven through [m2].
-        again_m2: of these, swept by another before, and swept again [m2].
-        messages_s, kb_s: messages to the fleet, and their size, a second.
-        peak_kb_s: the most over five seconds.
+        name: name of the robot.
+        state: its last state.
+        busy_s: time of planning or covering, without waiting [s].
+        waited_s: time of waiting or making way for another robot [s].
+        waits, longest_wait_s: number of waits; the longest wait [s].
+        driven_m: distance driven, by its poses [m].
+        swept_m2: area of the cells that it swept [m2].
+        through_m2: area of these that another robot had swept, and it only drove through [m2].
+        again_m2: area of these that another robot had swept, and it swept again [m2].
+        messages_s, kb_s: rate of its messages to the fleet [1/s], [kB/s].
+        peak_kb_s: the highest rate over five seconds [kB/s].
         plans: number of plans reported.
         plan_ms_p50, plan_ms_p99: time of a plan [ms]; null without one.
     """
@@ -84,16 +84,16 @@ class FleetFigures(msgspec.Struct, frozen=True):
     Attributes:
         fleet: its name.
         time_scale: simulated seconds per second, as configured for the first robot; 1 if real.
-        duration_s: of the recording [s].
-        makespan_s: from the first robot's start of work to the last robot's end [s].
-        busy_balance: the least busy robot's time at work over the busiest one's.
-        swept_balance: the same of the swept area.
-        swept_m2: cells that any robot swept [m2].
-        through_m2, again_m2: of these, driven through and swept again by another robot [m2].
+        duration_s: duration of the recording [s].
+        makespan_s: time from the first robot's start of work to the last robot's end [s].
+        busy_balance: shortest over longest of the robots' times at work.
+        swept_balance: smallest over largest of the robots' swept areas.
+        swept_m2: area of the cells that any robot swept [m2].
+        through_m2, again_m2: sums over the robots [m2].
         again_share: ``again_m2`` as a share of ``swept_m2``.
-        waited_s: by all robots [s].
-        divisions: number of the last one.
-        robots: each.
+        waited_s: sum over the robots [s].
+        divisions: number of the last division.
+        robots: figures of each robot.
     """
 
     fleet: str
@@ -144,11 +144,11 @@ def review_fleet(paths: Sequence[Path]) -> FleetReview:
 
 
 def find_again(tracks: Sequence[RobotTrack], ground: Cells) -> None:
-    """Find the cells that robots swept after others, and how much of that was sweeping again.
+    """Find the cells that robots swept after others, and the share of sweeping again in each.
 
     Args:
-        tracks: their passes and swept cells; ``again`` is filled in.
-        ground: int64 (n, 2), the cells that they could reach.
+        tracks: passes and swept cells of the robots; ``again`` is filled in.
+        ground: cells that the robots could reach, int64 (n, 2).
     """
     window = window_of(ground)
     if window is None:
@@ -221,7 +221,7 @@ def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigur
 def _until_last(tracks: Sequence[RobotTrack], states: Sequence[str] = ()) -> float:
     """Return the time from the beginning, or the first note in ``states``, to the last note [s].
 
-    The clock is that of the robot with the last note.
+    It is by the clock of the robot with the last note.
     """
     at = [(note.at_ms, track) for track in tracks for note in track.notes
           if not states or note.state in states]  # fmt: skip
@@ -276,7 +276,7 @@ def _robot(track: RobotTrack, cell_m2: float) -> FleetRobotFigures:
 
 
 def _peak_kb_s(notes: Sequence[Note], times: Sequence[float]) -> float:
-    """Return the highest rate of messages over some seconds [kB/s], of notes at ``times`` [s]."""
+    """Return the highest rate of messages over PEAK_S [kB/s], of notes at ``times`` [s]."""
     most, first, total = 0.0, 0, 0
     for note, at_s in zip(notes, times, strict=True):
         total += note.bytes

@@ -1,4 +1,4 @@
-"""The robots of a recorded fleet: their notes, cells on one lattice, and clocks."""
+"""Tracks of a recorded fleet's robots: their notes, cells on one lattice, and clocks."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ from fasaco_edge.fleet.observer.cells import (
 from fasaco_edge.fleet.recording.notes import Note, NoteBatch, NotedRobot
 from fasaco_edge.recording.read.robot_clock import RobotClock
 
-# How far a simulated robot's clock is extended beyond its stamps [s]: longer than any recording.
+# Time by which a simulated robot's clock is extended beyond its stamps [s], longer than recordings.
 AROUND_S = 1e6
 
 
 @dataclass(slots=True, eq=False)
 class RobotTrack:
-    """Notes of a robot, its cells on the lattice of the first robot.
+    """Notes of a robot, and its cells on the lattice of the first robot.
 
     Attributes:
-        name, number: of the robot, the latter in order of joining: its colour.
+        name: name of the robot.
+        number: its number in the order of joining, which decides its colour.
         notes: in order of time.
-        swept_ms: the cells it swept, and the time of the first report [ms].
-        passes: the cells it entered, in order, int64 (n, 3): time [ms], row, col.
-        again: the cells of ``swept_ms`` that another robot had swept before: for each the share of
-            the passes around it that counts as sweeping again.
-        clock: its seconds since the recording began.
+        swept_ms: the cells that it swept, with the time of their first report [ms].
+        passes: the cells that it entered, in order, int64 (n, 3): time [ms], row, col.
+        again: the cells of ``swept_ms`` that another robot had swept before, each with the share of
+            the robot's steps there that counts as sweeping again.
+        clock: conversion of the recorder's time to the robot's seconds since the recording began.
     """
 
     name: str
@@ -80,8 +81,7 @@ def tracks_of(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack
 def _clock(notes: Sequence[Note]) -> RobotClock:
     """Return the clock of a robot, by the stamps of its poses if it is simulated.
 
-    Before the first and after the last stamp it has the configured time scale: other robots may be
-    at work then.
+    Before the first stamp and after the last one, it runs at the configured time scale.
     """
     stamped = [note for note in notes if note.stamp_ms]
     scale = stamped[-1].time_scale if stamped else 1.0

@@ -1,4 +1,4 @@
-"""The feed of samples of all robots of a fleet from the bus."""
+"""Feed of the samples of a fleet's robots from the bus."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Rec
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import STATUS
 
-# Largest size of all waiting samples; a quarter of it for each robot [bytes].
+# Largest size of all waiting samples [bytes]; a robot gets at most a quarter of it.
 CAPACITY_BYTES = 128_000_000
 
 
 class FleetFeed(Joining):
     """The samples of the robots of a fleet; a context manager.
 
-    The reader decides which robots these are: it gets the fleet messages of all robots, and selects
-    by ``attend`` the robots whose statuses it wants.
+    The reader gets the fleet messages of all robots, and selects by ``attend`` the robots whose
+    statuses it wants.
     """
 
     def __init__(self, settings: BusSettings, keys: Keys) -> None:

@@ -1,7 +1,4 @@
-"""The screen of a fleet that is watched: a table of its robots, and the latest events.
-
-The table has one row per robot with its activity, and the total of all robots.
-"""
+"""Screen of ``watch --fleet``: a table of the robots' activities, and the latest events."""
 
 from __future__ import annotations
 
@@ -13,11 +10,11 @@ from rich.text import Text
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
-from fasaco_edge.client.phrases import clock, percent
+from fasaco_edge.client.phrases import clock
 from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.fleet.watch.feed import FleetFeed
 from fasaco_edge.fleet.watch.view import FleetRobot, FleetView, short
-from fasaco_edge.text import one_line
+from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.watch.page import Layout
@@ -29,7 +26,7 @@ WIDEST = 80
 
 
 def robot_table(robots: Sequence[FleetRobot], width: int) -> Table:
-    """Return a table of robots of a given width, a line each."""
+    """Return a table of robots, one line each, for a width [characters]."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style=FAINT)
     table.width = min(width, WIDEST)
     table.add_column("robot", no_wrap=True, overflow="ellipsis", max_width=max(width // 3, 5))
@@ -55,12 +52,12 @@ def _doing(robot: FleetRobot) -> Text:
 
 
 def total_rows(floor: Survey, unheard: Sequence[str], width: int, glyphs: GlyphSet) -> list[Text]:
-    """Return lines with the total of all robots, and the names of silent robots."""
+    """Return lines with the totals over all robots, and the names of silent robots."""
     silent = [Text(f"no messages: {', '.join(unheard)}", GONE_COLOUR)] if unheard else []
     if floor.fraction is None:
         return silent
     swept_m2, area_m2 = floor.swept * floor.cell_m2, floor.area * floor.cell_m2
-    share = Text(phrases.percent(floor.fraction), "bold")
+    share = Text(percent(floor.fraction), "bold")
     share.append(f" swept: {swept_m2:.1f} of {area_m2:.1f} m2", "not bold")
     lines = [share, glyphs.bar(floor.fraction, min(width, LONGEST_BAR))]
     if floor.twice_m2:
@@ -72,7 +69,7 @@ def total_rows(floor: Survey, unheard: Sequence[str], width: int, glyphs: GlyphS
 
 
 class FleetPage:
-    """Draws a fleet's view as lines of text; caches unchanged parts."""
+    """Drawing of a fleet's view as lines of text, with a cache for unchanged parts."""
 
     def __init__(self, console: Console) -> None:
         self._blocks = Blocks(console)
@@ -87,7 +84,7 @@ class FleetPage:
         """
         blocks, robots, layout = self._blocks, view.robots(now), Layout.of(width, height)
         page = blocks.block(headline(view, robots, now, width), width, 1)
-        # The table takes the line of the legend.
+        # A fleet's page has no legend: the table gets its line.
         room = min(layout.lines + 1, height - 1)
         totals = total_rows(view.floor, view.unheard(now), width, blocks.glyphs)
         shown = Group(robot_table(robots, width), "", *totals) if robots else Text("")
@@ -101,7 +98,7 @@ class FleetPage:
 
 
 def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: int) -> Text:
-    """Return a line that sums up the fleet's activity, for a width."""
+    """Return a line that sums up the fleet's activity, for a width [characters]."""
     line = Text().append(f" {short(view.fleet)} ", "bold reverse").append("  ")
     present = [robot for robot in robots if robot.silent_s is None]
     if view.trouble:
@@ -122,8 +119,8 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: i
     return with_keys(line, width, "q quits", clock(now))
 
 
-# Time to wait for the other robots after the first message [s]. Each robot sends its place and its
-# swept cells once a second.
+# Longest time to wait for the other robots after the first message; time within which each robot
+# sends a message, as it sends one per second [s].
 REST_S, SENT_S = 4.0, 1.3
 # Period of printing JSON [s].
 EVERY_S = 1.0
@@ -143,7 +140,7 @@ class FleetWatch:
 
     @property
     def events(self) -> EventLog:
-        """What happened."""
+        """The latest events."""
         return self._view.events
 
     @property
@@ -159,7 +156,7 @@ class FleetWatch:
         for received in items:
             view.take(received)
             if view.members.get(received.robot) is None:
-                # A queue for each of any number of names would leave no room for real robots.
+                # Invented names must not take all queues.
                 feed.forget(received.robot)
         now = phrases.steady_now()
         if not was_known:
@@ -170,7 +167,7 @@ class FleetWatch:
         return bool(items)
 
     def documents(self) -> list[dict[str, object]]:
-        """Return the fleet, once a second if it has changed."""
+        """Return the fleet's document if it is due and has changed, else none."""
         now = phrases.steady_now()
         if now - self._printed_at < EVERY_S or not self.is_known():
             return []
@@ -181,7 +178,7 @@ class FleetWatch:
         return [document]
 
     def document(self) -> dict[str, object]:
-        """Return the fleet and its robots."""
+        """Return the fleet's document."""
         return self._view.document(phrases.steady_now())
 
     def line(self, now: float) -> str:
@@ -192,7 +189,7 @@ class FleetWatch:
         if not robots:
             return f"waiting for robots of fleet {one_line(view.fleet)}"
         fraction = view.floor.fraction
-        share = "" if fraction is None else f"{phrases.percent(fraction)} of cells  "
+        share = "" if fraction is None else f"{percent(fraction)} of cells  "
         return f"{share}{', '.join(f'{robot.name}: {robot.doing}' for robot in robots)}"
 
     def page(self, now: float, width: int, height: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""The view of a fleet from its robots' messages: their activities, and the latest events."""
+"""View of a fleet from its robots' messages: their activities, and the latest events."""
 
 from __future__ import annotations
 
@@ -22,14 +22,12 @@ from fasaco_edge.wire.reasons import plain
 
 # Least time between two notes of a robot's state [s].
 NOTED_EVERY_S = 1.0
-# Least time between two surveys of the floor [s]; and as a multiple of the time that one takes.
+# Least time between two surveys of the floor: in [s], and as a multiple of a survey's duration.
 LEAST_AGE_S, LEAST_REST = 1.0, 10.0
-# Robots that others received messages from within this time are named, even if silent here [s].
+# A robot that is silent here is named if others received a message from it within this time [s].
 RECENT_S = 600.0
-# Number of robots and topics whose faults are counted apart; of other fleets that are named.
+# Number of robots and topics whose faults are counted separately; of other fleets that are named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
-
-
 # States of a robot that does something for its mission.
 AT_WORK = ("planning", "covering", "returning", "degraded")
 # Longest text of a robot that shares a line with other texts [characters].
@@ -38,17 +36,17 @@ LONGEST = 40
 
 @dataclass(frozen=True, slots=True)
 class FleetRobot:
-    """A robot of the fleet at a time.
+    """A robot of the fleet at one time.
 
     Attributes:
-        name: of the robot.
-        state: of its mission, in its last message; one line.
-        waits_for: name of the robot it waits for; "" for none.
-        silent_s: time since its last message if it counts as gone; else None.
+        name: name of the robot.
+        state: state of its mission, in its last message; one line.
+        waits_for: name of the robot that it waits for; "" for none.
+        silent_s: time since its last message if it is gone [s]; else None.
         away: why others give it no part of the remaining cells; "" if they do.
         x, y: its position in the fleet's frame, in its last message [m].
-        swept_cells: number of cells it has swept.
-        left_cells: number of cells left to it by the division in force; None without a division.
+        swept_cells: number of cells that it has swept.
+        left_cells: number of cells left in its part; None without a division.
         cell_m2: area of its cells [m2].
         division: number of its division.
         revision: number of its path; None if not known.
@@ -97,7 +95,7 @@ class FleetRobot:
 
 
 def short(text: str) -> str:
-    """Return a robot's text as one short line."""
+    """Return a text from a robot as one short line."""
     line = one_line(text)
     return line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."
 
@@ -135,7 +133,7 @@ class FleetView:
         self._faults: Counter[tuple[str, str]] = Counter()
 
     def take(self, received: Received) -> None:
-        """Take in a sample. One that cannot be read is dropped and noted."""
+        """Take in a sample; an unreadable sample is dropped and noted."""
         arrival, robot = received.arrival, received.robot
         try:
             if arrival.topic == "fleet":
@@ -147,7 +145,7 @@ class FleetView:
             self._note_often(robot, arrival.topic, text, 1e-9 * arrival.wall_ns)
 
     def tick(self, now: float) -> None:
-        """Note changes up to ``now``, since the epoch [s]; call it often."""
+        """Note changes up to ``now``, time since the epoch [s]; call it often."""
         now_ns = int(1e9 * now)
         divider = self.members.dividing(now_ns)
         self._look_at_floor(divider, now_ns)
@@ -174,7 +172,7 @@ class FleetView:
         return [member.name for member in self.members]
 
     def unheard(self, now: float) -> list[str]:
-        """Return the names of robots that others received lately, but this observer did not."""
+        """Return the names of robots that sent to other robots recently, but not to this watch."""
         named = {
             other.name
             for status in self._reports(int(1e9 * now)).values()
@@ -257,7 +255,7 @@ class FleetView:
 
     def _read_status(self, member: Member, sample: Sample) -> None:
         status = decode_tolerant(sample.payload, Status)
-        # A second daemon of the robot's name does not plan.
+        # A second daemon with the robot's name does not plan.
         if status.claim.stand == "plans":
             self._seen[member.name].status = status
 
@@ -284,7 +282,7 @@ class FleetView:
         if fault not in self._faults and (
             robot not in self._seen or len(self._faults) >= MOST_FAULTS
         ):
-            # Bounded, as there may be any number of names.
+            # Invented names must not fill the memory.
             fault = "other robots", what
         self._faults[fault] += 1
         count = self._faults[fault]

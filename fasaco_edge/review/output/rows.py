@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import astuple
 
-from fasaco_edge.client.phrases import percent, scale_words
+from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import figures, floor_words
@@ -16,6 +16,7 @@ from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.orders import order_words, ordered_words
 from fasaco_edge.review.rooms import room_at
 from fasaco_edge.review.wording import NOT_KNOWN, amount, count
+from fasaco_edge.text import percent
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
 

@@ -127,7 +127,7 @@ class Product:
             self.follower.take_path(payload)
         if now - self._heartbeat_at >= HEARTBEAT_S:
             self._heartbeat_at = now
-            self.follower.heard_status(now)
+            self.follower.take_heartbeat(now)
         self._step_mission(now)
         command = self.follower.step(now)
         if (said := self._standstill.report(self.follower, NAME, self._revision, now)) is not None:

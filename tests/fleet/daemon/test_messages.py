@@ -17,7 +17,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.fleet.daemon.exchange import TILES, FleetReceiver, FleetSender
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.fleet.mission.message import next_metres
+from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.core.events import MapReceived, Part
@@ -195,7 +195,7 @@ def test_a_robot_sends_its_next_metres_for_any_cell_size(cell_m, monkeypatch):
     drive.mission.covered.shared.begin(1)
     drive.tell(MapReceived(building("." * 600)), pose_at(0, 0))
     drive.plan()
-    line, listener = next_metres(drive.mission), Listener()
+    line, listener = path_ahead(drive.mission), Listener()
     FleetSender(listener, CONFIG).publish(drive.mission, 0.0)
     told = np.array(listener.heard[-1].ahead)
     assert told[-1] == pytest.approx(line[-1], abs=1e-3)

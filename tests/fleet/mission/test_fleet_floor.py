@@ -11,7 +11,7 @@ import pytest
 
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.layer import MANY_TAKEN
-from fasaco_edge.fleet.mission.message import next_metres
+from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.judge.floor import judge_floor
 from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part, State
 from fasaco_edge.mission.core.mission import Mission
@@ -63,10 +63,10 @@ def test_a_polished_line_survives_the_wait_for_another_robot():
     robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(60)
-    while math.dist(robot.at, next_metres(robot.mission)[1]) > 2 * CELL_M:
+    while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
         robot.drive()
     before = {tuple(point) for point in robot.mission.line._ahead.xy().tolist()}
-    x, y = next_metres(robot.mission)[1].tolist()
+    x, y = path_ahead(robot.mission)[1].tolist()
     in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
     robot.tell(in_the_way)
     assert robot.mission.giving_way.waits_for == "r2"
@@ -83,9 +83,9 @@ def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
     robot.mission.covered.shared.begin(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(40)
-    while math.dist(robot.at, next_metres(robot.mission)[1]) > 2 * CELL_M:
+    while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
         robot.drive()
-    x, y = next_metres(robot.mission)[1].tolist()
+    x, y = path_ahead(robot.mission)[1].tolist()
     in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
     robot.tell(in_the_way)
     assert robot.mission.giving_way.waits_for == "r2"
@@ -140,7 +140,7 @@ def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     assert len(robot.line) > 1
     assert nearest_to(robot.line, (x, y)) >= apart - 1e-6
     # Others are told where it goes, not of the path that it has set aside.
-    assert math.dist(next_metres(robot.mission)[-1], robot.line[-1]) < CELL_M
+    assert math.dist(path_ahead(robot.mission)[-1], robot.line[-1]) < CELL_M
     robot.reasons.clear()
     for _ in range(6):
         robot.now += 0.3

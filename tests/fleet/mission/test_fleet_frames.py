@@ -15,7 +15,7 @@ from fasaco_edge.fleet.mission.division import Division
 from fasaco_edge.fleet.mission.frames import (
     MOST_OTHERS,
     FleetFrames,
-    Relaid,
+    ResampledTiles,
     placed_point,
     seen_from,
 )
@@ -50,21 +50,21 @@ def cells_of(tiles):
 )
 def test_on_the_same_lattice_tiles_stay_as_they_are(cells):
     told = (((-1, 2), bits_of(cells)),)
-    assert Relaid(Pose2D(0.0, 0.0), CELL).tiles(told) == told
+    assert ResampledTiles(Pose2D(0.0, 0.0), CELL).tiles(told) == told
 
 
 def test_quarter_turns_and_whole_cells_lose_and_add_no_cell():
     cells = {(0, 0), (0, 63), (7, 9), (63, 63)}
-    relaid = Relaid(Pose2D(5 * CELL, -3 * CELL, math.pi / 2), CELL)
+    resampled = ResampledTiles(Pose2D(5 * CELL, -3 * CELL, math.pi / 2), CELL)
     # A quarter-turn leads from (x, y) to (-y, x).
     expected = {(col - 3, -1 - row + 5) for row, col in cells}
-    assert cells_of(relaid.tiles([((0, 0), bits_of(cells))])) == expected
-    assert {relaid.cell(*cell) for cell in cells} == expected
+    assert cells_of(resampled.tiles([((0, 0), bits_of(cells))])) == expected
+    assert {resampled.cell(*cell) for cell in cells} == expected
 
 
 def test_a_cell_askew_has_the_value_of_the_cell_below_its_centre():
     cells = {(row, col) for row in range(3, 40) for col in range(10, 50)}
-    found = cells_of(Relaid(AT, CELL).tiles([((0, 0), bits_of(cells))]))
+    found = cells_of(ResampledTiles(AT, CELL).tiles([((0, 0), bits_of(cells))]))
     back = seen_from(Pose2D(0.0, 0.0), AT)
     for row in range(-60, 60):
         for col in range(-60, 80):
@@ -74,13 +74,13 @@ def test_a_cell_askew_has_the_value_of_the_cell_below_its_centre():
 
 
 def test_tiles_are_made_of_all_that_was_told_and_repeated_alike():
-    relaid = Relaid(AT, CELL)
+    resampled = ResampledTiles(AT, CELL)
     every = bits_of({(row, col) for row in range(TILE) for col in range(TILE)})
-    relaid.tiles([((0, 0), every)])
-    both = cells_of(relaid.tiles([((0, 1), every)]) + relaid.tiles([((0, 0), every)]))
+    resampled.tiles([((0, 0), every)])
+    both = cells_of(resampled.tiles([((0, 1), every)]) + resampled.tiles([((0, 0), every)]))
     # Along the border of the two tiles nothing is missing.
     assert abs(len(both) - 2 * TILE * TILE) < 4 * TILE * 0.1
-    assert relaid.tiles([((0, 1), every)]) == relaid.tiles([((0, 1), every)])
+    assert resampled.tiles([((0, 1), every)]) == resampled.tiles([((0, 1), every)])
 
 
 def test_a_new_epoch_ends_what_was_swept_before():

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.fleet.mission.message import next_metres
+from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.fleet.mission.traffic import PATIENCE_S
 from fasaco_edge.mission.config import Place
@@ -51,7 +51,7 @@ def test_a_robot_on_its_way_home_waits_and_goes_on(drive):
     assert drive.mission.state is State.RETURNING
     assert not drive.walk
     # Where it goes is told to others all the same.
-    assert next_metres(drive.mission)[0].tolist() == pytest.approx([5.5 * CELL, 2.5 * CELL])
+    assert path_ahead(drive.mission)[0].tolist() == pytest.approx([5.5 * CELL, 2.5 * CELL])
     drive.tell(pose_at(2, 4), member((2, 23)), after=1.0)
     assert drive.mission.giving_way.waits_for == ""
     while drive.walk:

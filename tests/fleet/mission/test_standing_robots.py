@@ -9,7 +9,7 @@ import pytest
 
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.members import Members
-from fasaco_edge.fleet.mission.message import next_metres
+from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.fleet.mission.shared import SharedProgress
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.fleet.mission.traffic import OLD_S, PATIENCE_S, STANDS_S
@@ -210,7 +210,7 @@ def test_a_waiting_robot_is_done_when_others_sweep_the_rest():
     for _ in range(3):
         drive.tell(pose_at(2, 4), ahead, after=1.0)
     assert drive.mission.giving_way.waits_for == "r2"
-    assert len(next_metres(drive.mission))
+    assert len(path_ahead(drive.mission))
     swept = replace(ahead, tiles=(((0, 0), b"\xff" * TILE_BYTES),))
     for _ in range(3):
         drive.tell(pose_at(2, 4), swept, after=1.0)
@@ -218,7 +218,7 @@ def test_a_waiting_robot_is_done_when_others_sweep_the_rest():
             drive.plan()
     assert drive.mission.state == "done"
     assert drive.mission.giving_way.waits_for == ""
-    assert not len(next_metres(drive.mission))
+    assert not len(path_ahead(drive.mission))
 
 
 def test_one_that_makes_way_drives_to_the_middle_of_its_refuge():
