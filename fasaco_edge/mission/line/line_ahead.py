@@ -50,6 +50,7 @@ from fasaco_edge.mission.line.way import (
     leads_out,
     shortened,
 )
+from fasaco_edge.planners.path import common_beginning
 
 # Number of nearest cells tried for one that the robot can drive to straight.
 TRIED = 8
@@ -59,7 +60,6 @@ class LineAhead:
     """Owns the line, which begins at the last point behind the robot, and its sweeps.
 
     Attributes:
-        line: the rest of the line.
         tally: counts of its sweeps.
         cell: index of the robot's cell in the walk.
 
@@ -69,12 +69,30 @@ class LineAhead:
     """
 
     def __init__(self, floor: FloorMap, *, is_curved: bool = False) -> None:
-        self.line = Line()
         self.tally = SweepTally(floor)
         self.cell = 0
         self._floor, self._geometry, self._is_curved = floor, floor.geometry, is_curved
+        # The walk and its line; if a map has cut the walk off, with all beyond: the next walk
+        # mostly leads there again. And how many of the walk's cells come before the cut.
         self._walk: Walk = np.empty((0, 2), np.int32)
+        self._whole, self._until = Line(), 0
         self._place = PlaceOnLine()
+
+    @property
+    def line(self) -> Line:
+        """The rest of the line, up to a cut."""
+        return self._whole.part(0, self._whole.before(self._until))
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the walk was cut off, and the line beyond is kept for the next one."""
+        return self._until < len(self._walk)
+
+    def end_at_cut(self) -> None:
+        """Drop the line beyond a cut: the walk ends there."""
+        line = self.line
+        self.tally.exchange(edges_between(self._whole.points[max(len(line) - 1, 0) :]), NO_EDGES)
+        self._walk, self._whole = self._walk[: self._until], line
 
     def follow_floor(self, floor: FloorMap) -> bool:
         """Follow the floor to another raster; return whether the line had to be dropped.
@@ -92,7 +110,7 @@ class LineAhead:
         if floor.geometry.origin.yaw == before.origin.yaw:
             self._carry(before)
             return False
-        dropped, self.line = bool(len(self.line)), Line()
+        dropped, self._whole = bool(len(self._whole)), Line()
         return dropped
 
     def _carry(self, before: GridGeometry) -> None:
@@ -101,15 +119,15 @@ class LineAhead:
         If a mapper's map begins at the farthest point seen, all its pixels move with that point.
         """
         carried = partial(raster_to_raster, before, self._geometry)
-        self.line = self.line.at(carried(self.line.points))
-        self.tally.exchange(NO_EDGES, edges_between(self.line.points))
+        self._whole = self._whole.at(carried(self._whole.points))
+        self.tally.exchange(NO_EDGES, edges_between(self._whole.points))
         self._place.here = carried(self._place.here[None])[0]
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
         """Move to a raster of another shape, (rows, cols), and shift."""
-        points, before = self.line.points, self.tally.shape
-        self.line = self.line.moved(by)
-        moved = self.line.points
+        points, before = self._whole.points, self.tally.shape
+        self._whole = self._whole.moved(by)
+        moved = self._whole.points
         # Sweeps beyond a raster are not counted: such edges are subtracted before and added after.
         margin = self._tool + 1.0
         beyond = is_outside(points, before, margin) | is_outside(moved, shape, margin)
@@ -121,14 +139,15 @@ class LineAhead:
 
     def stop(self) -> None:
         """Leave the line for a path that is kept while the robot stands, as in a pause."""
-        self.line = self.line.renumbered(-self.cell)
-        self._walk, self.cell = self._walk[self.cell :], 0
+        self._whole = self._whole.renumbered(-self.cell)
+        self._walk, self._until, self.cell = self._walk[self.cell :], self._until - self.cell, 0
 
     def lay(
         self,
         walk: NDArray[np.int32],
         pose: Pose2D,
         *,
+        is_cut: bool = False,
         keeps: bool = True,
         beside: NDArray[np.float64] | None = None,
     ) -> None:
@@ -137,6 +156,7 @@ class LineAhead:
         Args:
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
+            is_cut: whether the walk ends where a map has cut off the previous one.
             keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
                 cells in another order, and by far longer ways.
             beside: discs that such a way keeps clear of, as ``Route.beside``.
@@ -148,17 +168,22 @@ class LineAhead:
         is_off = np.isnan(self._floor.stands.stands_of(walk)[:, 0])
         if is_off.any():
             walk = walk[: int(np.argmax(is_off))]
-        ahead, line = self._walk[self.cell :], self.line.renumbered(-self.cell)
-        if keeps and len(walk) and self.is_followed and np.array_equal(walk, ahead):
-            self._walk, self.line, self.cell = walk, line, 0
-            return
+        ahead, line = self._walk[self.cell :], self._whole.renumbered(-self.cell)
+        beyond = Piece(Line(), 0)
+        is_beginning = keeps and len(walk) > 0 and common_beginning(walk, ahead) == len(walk)
+        if is_beginning and (is_cut or len(walk) == len(ahead)):
+            count = line.before(len(walk))
+            if count > 1 and self.is_followed:
+                self._walk, self._whole, self._until, self.cell = ahead, line, len(walk), 0
+                return
+            line, beyond = line.part(0, count), Piece(line.part(count), count)
         pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
         if pieces and pieces[0].begin == 0 and not self.is_followed:
             # The robot is no longer behind its first point.
             rest = pieces[0].without_first()
             pieces[:1] = [rest] if len(rest.line) else []
-        self._walk, self.cell = walk, 0
-        self._join(pieces, skips=beside is None)
+        self._walk, self._until, self.cell = ahead if len(beyond.line) else walk, len(walk), 0
+        self._join(pieces, beyond, skips=beside is None)
         if not keeps and len(self.line):
             way = self._past(discs_on(self._floor, beside))
             self._take([Piece(way.only(shortened(way.points, self._floor, beside)), -1)])
@@ -175,11 +200,12 @@ class LineAhead:
         state = np.full(1, POLISHED, np.uint8)
         return line.part(0, 1).joined(Line(corner[None], line.cells[:1], state), line.part(1))
 
-    def _join(self, pieces: list[Piece], *, skips: bool = True) -> None:
+    def _join(self, pieces: list[Piece], beyond: Piece, *, skips: bool = True) -> None:
         """Replace the line by one joined from pieces.
 
         Args:
             pieces: in order.
+            beyond: the line beyond a cut, which is not joined.
             skips: whether it may skip the stand of the robot's cell, where that is swept.
         """
         if not len(self._walk):
@@ -192,7 +218,7 @@ class LineAhead:
         stands, tally = self._floor.stands, self.tally
         joiner = Joiner(
             here,
-            self._walk,
+            self._walk[: self._until],
             self.cell,
             stand=stands.stand,
             raw=stands.line,
@@ -200,7 +226,7 @@ class LineAhead:
             is_swept=lambda cell: skips and not tally.is_open(stands.stand(cell)),
             way=lambda a, b: corners_between(self._floor, a, b),
         )
-        self._take(joiner.joined(pieces))
+        self._take([*joiner.joined(pieces), *([beyond] if len(beyond.line) else [])])
 
     def check(self, touched: Window) -> bool:
         """Replace parts that a new map blocks by stands; return whether it blocks any.
@@ -220,9 +246,9 @@ class LineAhead:
             blocked = blocked[leads_out(self._floor, self._place.here, line.points[1]) :]
         if not blocked:
             return False
-        first, last = blocked[0], blocked[-1] + 1
-        head = [Piece(line.part(0, first + 1), 0)] if first else []
-        self._join([*head, Piece(line.part(last), last)])
+        bounds = [0, *(number + 1 for number in blocked), len(line)]
+        pieces = [Piece(line.part(first, end), first) for first, end in pairwise(bounds)]
+        self._join(pieces, Piece(self._whole.part(len(line)), len(line)))
         return True
 
     def drive(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
@@ -242,14 +268,14 @@ class LineAhead:
         if number > 0:
             self.tally.pass_line(self.line.points[: number + 1])
             self.tally.exchange(edges_between(self.line.points[: number + 1]), NO_EDGES)
-            self.line = self.line.part(number)
+            self._whole = self._whole.part(number)
         # At the last cell the robot has arrived, which is checked below.
         first, second = self.line.cells[:2].tolist()
         nearest = self._nearest(max(first, self.cell), second + 1)
-        self.cell = max(self.cell, min(nearest, len(self._walk) - 2))
+        self.cell = max(self.cell, min(nearest, self._until - 2))
         left_m = float(self.lengths(self._tool * self.tally.unit_m)[-1])
         if self._place.has_arrived(self.line.points, left_m, self._tool, self.tally.unit_m):
-            self.cell = len(self._walk) - 1
+            self.cell = self._until - 1
 
     @property
     def is_followed(self) -> bool:
@@ -320,19 +346,19 @@ class LineAhead:
 
         The first and the last one stay, and keep their cells.
         """
-        line = self.line
+        line = self._whole
         begin, last = int(line.cells[first]), int(line.cells[end - 1])
         cells = begin + aligned(points, self._stands(begin, last + 1))
         state = line.state[first:end].min(initial=POLISHED)
         part = Line(points, cells, np.full(len(points), state, np.uint8))
-        self.line = line.part(0, first).joined(part, line.part(end))
+        self._whole = line.part(0, first).joined(part, line.part(end))
 
     def put_curve(self, first: int, end: int, xy: Points) -> None:
         """Replace the points from ``first`` to ``end`` by a curve, float64 (n, 2): x, y [m].
 
         From the first point on the curve begins at the robot.
         """
-        line, geometry = self.line, self._floor.geometry
+        line, geometry = self._whole, self._floor.geometry
         points = np.array([map_to_raster(geometry, x, y) for x, y in xy.tolist()])
         begin, last = int(line.cells[first]), int(line.cells[end - 1])
         cells = np.full(len(points), begin)
@@ -345,7 +371,7 @@ class LineAhead:
         if not first:
             self._place.along = 0.0
         self.tally.exchange(edges_between(line.points), edges_between(new.points))
-        self.line = new
+        self._whole = new
 
     def _nearest(self, begin: int, end: int) -> int:
         """Return the nearest cell of the walk from ``begin`` to ``end``.
@@ -363,7 +389,7 @@ class LineAhead:
 
     def note(self, first: int, end: int, state: int) -> None:
         """Mark points as MOVED or POLISHED."""
-        self.line = self.line.marked(first, end, state)
+        self._whole = self._whole.marked(first, end, state)
 
     def lengths(self, within_m: float = math.inf) -> NDArray[np.float64]:
         """Return the distance along the line to each point, float64 (n,) [m]; the first is 0.
@@ -379,14 +405,14 @@ class LineAhead:
         Args:
             pieces: their ``begin`` is 0 or more if they are part of the previous line.
         """
-        old = self.line
+        old = self._whole
         new, goes, comes = exchanged(old, pieces)
         if not np.array_equal(old.points[:2], new.points[:2]):
             if len(old) > 1:
                 self.tally.pass_line(np.stack([old.points[0], self._place.on(old.points)]))
             self._place.along = 0.0
         self.tally.exchange(goes, comes)
-        self.line = new
+        self._whole = new
 
     def _is_clear(self, a: Points, b: Points) -> bool:
         return is_clear_between(self._floor, a, b)
