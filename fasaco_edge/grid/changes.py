@@ -1,9 +1,10 @@
 """Lattice changes: incremental update of the coverage lattice to a new map.
 
-If the new map shows all of the previous one on its raster (it was patched, or has grown by whole
-pixels), pixels are compared, and only cells near changed pixels are reclassified. Otherwise (it was
-cut, its origin has moved by a fraction of a pixel, or was rotated) all cells are reclassified.
-Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of the new map.
+If the new map lies on the raster of the previous one (it was patched, or has grown, shrunk or moved
+by whole pixels), pixels are compared, and only cells near changed pixels are reclassified. On
+another raster (its origin has moved by a fraction of a pixel, or was rotated) all cells are
+reclassified. Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of the new
+map.
 """
 
 from __future__ import annotations
@@ -133,13 +134,10 @@ class LatticeChange:
         return cls(before, after, changed)
 
 
-def shown_before(grids: tuple[OccupancyGrid, OccupancyGrid]) -> tuple[Window, Window] | None:
-    """Return the windows of the previous map and of the new one on their raster.
-
-    None if they lie on different rasters, or if the new one does not show all of the previous one.
-    """
+def windows_on_raster(grids: tuple[OccupancyGrid, OccupancyGrid]) -> tuple[Window, Window] | None:
+    """Return the windows of the previous map and of the new one on their raster; None for two."""
     (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
-    return (old, new) if raster == old_raster and new.contains(old) else None
+    return (old, new) if raster == old_raster else None
 
 
 def carried(array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0) -> NDArray[Scalar]:
@@ -180,7 +178,7 @@ def cells_near_changes(
 ) -> NDArray[np.bool_]:
     """Return which cells of the new window are near changed pixels, bool (rows, cols).
 
-    Growth by unknown pixels is no change, as everything outside a map is unknown.
+    Everything outside a map is unknown: unknown pixels that come or go with its rim are no change.
 
     Args:
         grids: the previous map and the new one.
@@ -189,11 +187,12 @@ def cells_near_changes(
         thresholds: thresholds of free and occupied.
         within: see ``LatticeChange.between``.
     """
-    shown = shown_before(grids)
-    if shown is None:
+    windows = windows_on_raster(grids)
+    if windows is None:
         return np.ones((window.rows, window.cols), np.bool_)
-    old, new = shown
-    regions = (old, *new.without(old))
+    old, new = windows
+    common = old.intersection(new)
+    regions = (*((common,) if common else ()), *new.without(old), *old.without(new))
     if old == new and within is not None:
         regions = (within.moved(new.row0, new.col0),)
     near = np.zeros((window.rows, window.cols), np.bool_)

@@ -1,6 +1,6 @@
 """Floor map: places, stands and the lattice over them, for a map that changes.
 
-If the new map shows all of the previous one on its raster, only cells near changed pixels are
+If the new map lies on the raster of the previous one, only cells near changed pixels are
 recomputed (``grid.changes``). The result equals that of the new map alone.
 
 The raster spans whole chunks of the map's pixels, so that a growing map seldom moves it, and then
@@ -20,7 +20,7 @@ from fasaco_edge.grid.changes import (
     carried,
     cells_near_changes,
     new_cells,
-    shown_before,
+    windows_on_raster,
 )
 from fasaco_edge.grid.fine_raster import (
     REACH_CELLS,
@@ -126,18 +126,23 @@ class FloorMap:
         before = self.stands.lattice
         geometry, parts = self._geometry_of(grids[1])
         is_same_raster = geometry.resolution == self.geometry.resolution
-        if not is_same_raster or shown_before(grids) is None:
+        if not is_same_raster or windows_on_raster(grids) is None:
             self._compute_all(grids[1], plain)
             return self._compared(before)
         wide = placement_of(grids[1].geometry, self._footprint)
         scale = self._footprint.cell_m / grids[1].geometry.resolution
         clearance = self.discs.clearance_m / grids[1].geometry.resolution
         wide = wide._replace(radius=wide.radius + clearance + REACH_CELLS * scale + REACH_PX)
-        near = cells_near_changes(grids, plain.window, wide, self._footprint.thresholds, within)
+        thresholds = self._footprint.thresholds
+        near = cells_near_changes(grids, plain.window, wide, thresholds, within)
         self.revision += 1
         self.shift = geometry.corner_of(self.geometry)
         # New cells are left out: along the sides of a grown map they contain little new floor.
         self.touched = self._reach.pixels_of(near, plain.window, geometry)
+        if plain.window != before.window:  # floor that is no longer shown may lie beyond the new cells
+            lost = cells_near_changes(grids, before.window, wide, thresholds, within)
+            lost_pixels = self._reach.pixels_of(lost, before.window, geometry)
+            self.touched = Window.around(self.touched, lost_pixels)
         is_same = geometry == self.geometry
         if self.touched is None and is_same and plain.window == before.window:
             return LatticeChange.to(before, self._with_states(plain))

@@ -97,8 +97,7 @@ def test_changes_lead_where_a_new_look_does(yaw, chunk, clearance_m, monkeypatch
         plain = LatticeChange.between((known, new), plain, FOOTPRINT).after
         change = floor.change((known, new), plain)
         assert_same(floor, over(new))
-        if floor.shift is not None:  # else the map was cut, and looked at as a whole
-            assert_touched(floor, pixels)
+        assert_touched(floor, pixels)
         assert change.before is before
         assert change.after is floor.stands.lattice
         expected = LatticeChange.to(before, over(new).stands.lattice)
@@ -173,8 +172,10 @@ def test_what_a_map_shows_no_more_is_not_free():
     whole = room(6.0, 5.0)
     less = part_of(whole, 20, 30, 70, 80)
     floor = over(whole)
+    pixels = pixels_of(floor)
     floor.change((whole, less), CoverageLattice.from_map(less, FOOTPRINT))
     assert_same(floor, over(less))
+    assert_touched(floor, pixels)
 
 
 def test_a_map_that_grows_by_unknown_pixels_touches_little():
@@ -188,6 +189,10 @@ def test_a_map_that_grows_by_unknown_pixels_touches_little():
     floor.change((known, grown), plain)
     assert floor.touched is None
     assert_same(floor, over(grown))
+    # Nor does one that shows less of them.
+    floor.change((grown, known), CoverageLattice.from_map(known, FOOTPRINT))
+    assert floor.touched is None
+    assert_same(floor, over(known))
     cells = known.cells.copy()
     cells[30, 40] = 100  # which the grown map shows no more
     known, floor = OccupancyGrid(known.geometry, cells), over(known)

@@ -122,7 +122,7 @@ def laid(line_xy):
     points = np.array([map_to_raster(floor.geometry, x, y) for x, y in line_xy])
     numbers, state = np.zeros(len(points), np.int64), np.full(len(points), POLISHED, np.uint8)
     ahead.tally.exchange(edges_between(ahead.line.points), edges_between(points))
-    ahead.line = Line(points, numbers, state)
+    ahead._whole = Line(points, numbers, state)
     ahead._see(Pose2D(*line_xy[0]))
     return ahead, floor
 

@@ -115,7 +115,7 @@ def check_tally(mission):
     fresh = SweepTally(ahead._floor)
     swept = mission.covered.floor.swept_on(ahead._floor.geometry)
     whole = Window(0, 0, *swept.shape)
-    state, points = ahead.tally._state, ahead.line.points
+    state, points = ahead.tally._state, ahead._whole.points  # beyond a cut, too
     # Without a reachable area no floor is asked for, and all is looked at once there is one.
     assert mission.line.left._asked is None or (((state & SWEPT) > 0) == swept).all()
     fresh._state |= state & PASSED

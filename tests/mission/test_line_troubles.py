@@ -16,10 +16,12 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
+from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.line.line_ahead import LineAhead
+from fasaco_edge.mission.line.polyline import NO_EDGES, POLISHED, edges_between
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from tests.grid.test_floor import room
 from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot, assert_clear
@@ -149,6 +151,66 @@ def test_a_robot_beside_a_long_line_gets_a_line_that_leaves_it():
     ahead.lay(np.array(turns_off, np.int32), aside)
     assert ahead.xy()[0].tolist() == pytest.approx([aside.x, aside.y])
     assert ahead.xy()[-1].tolist() == pytest.approx([16.5 * 0.25, 8.5 * 0.25], abs=0.03)
+
+
+# Lanes to and fro over rows 2 to 11 of a hall.
+LANES = [(row, col) for row in range(2, 12) for col in range(2, 20)[:: 1 - row % 2 * 2]]
+
+
+def polished_line(grid):
+    """A line along the lanes, as if polished, and the floor under it."""
+    footprint = Footprint(0.25, 0.12)
+    plain = CoverageLattice.from_map(grid, footprint)
+    floor = FloorMap(grid, plain, footprint, RobotDiscs(0.12, 0.27), 10_000_000)
+    ahead = LineAhead(floor)
+    ahead.lay(np.array(LANES, np.int32), Pose2D(0.625, 0.625))
+    ahead.note(0, len(ahead.line), POLISHED)
+    return ahead, floor
+
+
+@pytest.mark.parametrize("until", [4, 26, 60])
+def test_the_line_beyond_a_cut_is_kept_for_the_next_plan(until):
+    ahead, _ = polished_line(grid_of(np.ones((120, 120), bool)))
+    whole, here = ahead.line.points.tolist(), Pose2D(0.625, 0.625)
+    ahead.lay(np.array(LANES[:until], np.int32), here, is_cut=True)
+    assert ahead.is_cut
+    assert len(ahead.line) < len(whole)
+    assert ahead.line.cells[-1] < until
+    last, behind = LANES[until - 1], LANES[until + 3]
+    (row, _), cols = last, range(last[1], behind[1], 1 if behind[1] > last[1] else -1)
+    round_it = [(row - 1, col) for col in [*cols, behind[1]]]
+    ahead.lay(np.array([*LANES[:until], *round_it, *LANES[until + 3 :]], np.int32), here)
+    assert not ahead.is_cut
+    kept = [point for point in whole if point in ahead.line.points.tolist()]
+    assert len(kept) >= len(whole) - 2
+    assert np.count_nonzero(ahead.line.state < POLISHED) <= 10
+
+
+def test_a_line_ends_at_a_cut_that_stays():
+    ahead, _ = polished_line(grid_of(np.ones((120, 120), bool)))
+    ahead.lay(np.array(LANES[:40], np.int32), Pose2D(0.625, 0.625), is_cut=True)
+    ahead.end_at_cut()
+    assert not ahead.is_cut
+    counts, line = ahead.tally.sweeps.counts.copy(), ahead.line.points
+    ahead.tally.exchange(edges_between(line), NO_EDGES)
+    assert set(np.unique(ahead.tally.sweeps.counts)) == {NEVER}
+    assert counts.max() > NEVER
+
+
+def test_what_lies_between_two_blocked_lanes_stays():
+    """It was laid anew, with all the lanes between."""
+    free = np.ones((120, 120), bool)
+    ahead, floor = polished_line(before := grid_of(free))
+    whole = ahead.line.points.tolist()
+    for row in (3, 10):
+        free[5 * row + 1 : 5 * row + 4, 55:58] = False
+    blocked = grid_of(free)
+    floor.change((before, blocked), CoverageLattice.from_map(blocked, Footprint(0.25, 0.12)))
+    ahead.follow_floor(floor)
+    assert ahead.check(floor.touched)
+    kept = [point for point in whole if point in ahead.line.points.tolist()]
+    assert kept == whole
+    assert np.count_nonzero(ahead.line.state == POLISHED) >= len(whole) - 6
 
 
 def test_a_robot_that_does_not_fit_is_led_out_once_for_all_maps():

@@ -115,6 +115,7 @@ class FloorLeft:
         tally = self._tally
         if tally is None or self._map.area is None:
             return None
+        self._explain()
         left_m2 = tally.left_m2
         possible = self._possible_m2 if self._orders.is_over else None
         ahead_m2, passed_m2 = tally.open_m2 - left_m2, tally.passed_m2
@@ -223,7 +224,7 @@ class FloorLeft:
         self._ledger.open_again(again)
         return bool(again)
 
-    def explain(self) -> None:
+    def _explain(self) -> None:
         """Update the causes of unreachable floor where they may have changed."""
         tally, floor, part = self._tally, self._map.floor, self._unexplained
         assert tally is not None

@@ -140,18 +140,21 @@ class LineLayer:
             if len(path.ahead):
                 why = "map on another raster" if self._is_dropped else "robot further on its path"
                 update = replace(self._route.publish_anew(why, now), may_wait=True)
+        if ahead.is_cut and not self._route.is_cut:
+            ahead.end_at_cut()  # so does the next plan, or the path was given up
         self._is_dropped = False
         is_driven = len(self._route.path.cells) > 0
         if is_driven and self._unchecked is not None:
             reason = "line blocked" if ahead.check(self._unchecked) else ""
-            self._unchecked = None
+            self._unchecked = self._unchecked if ahead.is_cut else None
         if touched is not None:
             self._is_settled = not self._orders.cells.is_exploring
-        # Urgent updates are published first; the rest comes with the next pose.
+        # Urgent updates are published first. With a map or a plan only a change is polished that
+        # is due; the rest comes with the next pose.
         held = self._publication.look(ahead)
-        if update is None and not reason and not is_further:
-            self.left.explain()
         may_change = (update is None or update.may_wait) and not reason and not is_further
+        is_new = update is not None or touched is not None
+        may_change = may_change and not (is_new and (ahead.is_cut or not self._publication.is_near))
         # On such a way the robot sweeps nothing beside its path.
         if may_change and is_driven and not self._is_way:
             held = max(held, ahead.line.first_below(CURVED)) if self._curver else held
@@ -186,7 +189,8 @@ class LineLayer:
 
     def _lay(self, ahead: LineAhead, cells: NDArray[np.int32], pose: Pose2D) -> None:
         """Lay the line along cells; a way leads straight to the goal, clear of other robots."""
-        ahead.lay(cells, pose, keeps=not self._is_way, beside=self._route.beside)
+        beside, is_cut = self._route.beside, self._route.is_cut
+        ahead.lay(cells, pose, is_cut=is_cut, keeps=not self._is_way, beside=beside)
 
     def unswept(self) -> tuple[GridGeometry, NDArray[np.uint8]] | None:
         """Return the raster, and why its pixels are not swept, see ``Unswept``."""

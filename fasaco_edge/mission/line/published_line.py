@@ -85,6 +85,11 @@ class PublishedLine:
         """Number of points, from the line's first on, that are not to be polished."""
         return min(self._last_held - self._next + 2, self._common + 1)
 
+    @property
+    def is_near(self) -> bool:
+        """Whether the robot is near the first change."""
+        return self.differs_m <= self._due_m
+
     def is_due(self, now: float, is_settled: bool, leads_on: Callable[[Points], bool]) -> bool:
         """Return whether the line of the last comparison has to be published.
 
@@ -94,7 +99,7 @@ class PublishedLine:
             leads_on: whether the robot can drive along the next points of the published line,
                 float64 (n, 2): x, y [m], while a plan is made.
         """
-        if self.differs_m > self._due_m:
+        if not self.is_near:
             self._due_since = math.inf
             return False
         self._due_since = min(self._due_since, now)
@@ -151,6 +156,11 @@ class Publication:
         """Compare the line with the published one; return how many of its points are held."""
         self._line.look(ahead.next_xy(SEEN_POINTS))
         return self._line.held
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the robot is near what has changed, as of the last look."""
+        return self._line.is_near
 
     def forget(self) -> None:
         """Note that the robot has no line, or another one."""

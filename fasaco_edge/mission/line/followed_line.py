@@ -1,0 +1,257 @@
+"""Followed line: the line that the robot drives along a walk, and its place on it.
+
+The line consists of points on the fine raster, which keep the index of their cell in the walk: so
+the robot's place on the line gives its place on the walk.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map, raster_to_raster
+from fasaco_edge.grid.floor_map import FloorMap
+from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D
+from fasaco_edge.kernels.floor.line import LEAST_EDGE
+from fasaco_edge.mission.line.place_on_line import (
+    LOOK_AHEAD_M,
+    Beside,
+    PlaceOnLine,
+    aligned,
+    by_distance,
+)
+from fasaco_edge.mission.line.polyline import (
+    CURVED,
+    NO_EDGES,
+    POLISHED,
+    Line,
+    Points,
+    Walk,
+    edges_between,
+    is_outside,
+    lengths,
+)
+from fasaco_edge.mission.line.tally import SweepTally
+from fasaco_edge.mission.line.way import (
+    is_clear_between,
+)
+
+# Number of nearest cells tried for one that the robot can drive to straight.
+TRIED = 8
+
+
+class FollowedLine:
+    """Owns the line, which begins at the last point behind the robot, and its sweeps.
+
+    Attributes:
+        tally: counts of its sweeps.
+        cell: index of the robot's cell in the walk.
+
+    Args:
+        floor: the floor under it.
+        is_curved: whether the robot cannot turn on the spot, so that it is along the line.
+    """
+
+    def __init__(self, floor: FloorMap, *, is_curved: bool = False) -> None:
+        self.tally = SweepTally(floor)
+        self.cell = 0
+        self._floor, self._geometry, self._is_curved = floor, floor.geometry, is_curved
+        # The walk and its line; if a map has cut the walk off, with all beyond: the next walk
+        # mostly leads there again. And how many of the walk's cells come before the cut.
+        self._walk: Walk = np.empty((0, 2), np.int32)
+        self._whole, self._until = Line(), 0
+        self._place = PlaceOnLine()
+
+    @property
+    def line(self) -> Line:
+        """The rest of the line, up to a cut."""
+        return self._whole.part(0, self._whole.before(self._until))
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether the walk was cut off, and the line beyond is kept for the next one."""
+        return self._until < len(self._walk)
+
+    def end_at_cut(self) -> None:
+        """Drop the line beyond a cut: the walk ends there."""
+        line = self.line
+        self.tally.exchange(edges_between(self._whole.points[max(len(line) - 1, 0) :]), NO_EDGES)
+        self._walk, self._whole = self._walk[: self._until], line
+
+    def follow_floor(self, floor: FloorMap) -> bool:
+        """Follow the floor to another raster; return whether the line had to be dropped.
+
+        The line keeps its place on the map, to be checked there, unless the raster is turned.
+        """
+        is_same, before = floor is self._floor, self._geometry
+        self._floor, self._geometry = floor, floor.geometry
+        if is_same and floor.shift is not None:
+            shape = floor.geometry.rows, floor.geometry.cols
+            if floor.shift != (0, 0) or shape != self.tally.shape:
+                self._move(shape, floor.shift)
+            return False
+        self.tally = SweepTally(floor)
+        if floor.geometry.origin.yaw == before.origin.yaw:
+            self._carry(before)
+            return False
+        dropped, self._whole = bool(len(self._whole)), Line()
+        return dropped
+
+    def _carry(self, before: GridGeometry) -> None:
+        """Convert to the floor's raster, which has another size or is shifted by part of a pixel.
+
+        If a mapper's map begins at the farthest point seen, all its pixels move with that point.
+        """
+        carried = partial(raster_to_raster, before, self._geometry)
+        self._whole = self._whole.at(carried(self._whole.points))
+        self.tally.exchange(NO_EDGES, edges_between(self._whole.points))
+        self._place.here = carried(self._place.here[None])[0]
+
+    def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
+        """Move to a raster of another shape, (rows, cols), and shift."""
+        points, before = self._whole.points, self.tally.shape
+        self._whole = self._whole.moved(by)
+        moved = self._whole.points
+        # Sweeps beyond a raster are not counted: such edges are subtracted before and added after.
+        margin = self._tool + 1.0
+        beyond = is_outside(points, before, margin) | is_outside(moved, shape, margin)
+        is_edge = beyond[:-1] | beyond[1:]
+        self.tally.exchange(edges_between(points, is_edge), NO_EDGES)
+        self.tally.move(shape, by)
+        self.tally.exchange(NO_EDGES, edges_between(moved, is_edge))
+        self._place.here = self._place.here + np.array(by)
+
+    def stop(self) -> None:
+        """Leave the line for a path that is kept while the robot stands, as in a pause."""
+        self._whole = self._whole.renumbered(-self.cell)
+        self._walk, self._until, self.cell = self._walk[self.cell :], self._until - self.cell, 0
+
+    def drive(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
+        """Note the robot's pose; the driven part is dropped.
+
+        ``farthest_m``: how far it can have driven since the pose before; 0 if not known [m].
+        """
+        self._see(pose)
+        look_m = max(LOOK_AHEAD_M, farthest_m)
+        along = None
+        if self._is_curved:
+            yaw = pose.yaw - self._floor.geometry.origin.yaw
+            along = np.array([math.sin(yaw), math.cos(yaw)])
+        number = self._place.find(self.line.points, self._tool, look_m / self.tally.unit_m, along)
+        if number is None:
+            return
+        if number > 0:
+            self.tally.pass_line(self.line.points[: number + 1])
+            self.tally.exchange(edges_between(self.line.points[: number + 1]), NO_EDGES)
+            self._whole = self._whole.part(number)
+        # At the last cell the robot has arrived, which is checked below.
+        first, second = self.line.cells[:2].tolist()
+        nearest = self._nearest(max(first, self.cell), second + 1)
+        self.cell = max(self.cell, min(nearest, self._until - 2))
+        left_m = float(self.lengths(self._tool * self.tally.unit_m)[-1])
+        if self._place.has_arrived(self.line.points, left_m, self._tool, self.tally.unit_m):
+            self.cell = self._until - 1
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether the robot is on the line, within half the tool."""
+        return self._place.is_on(self.line.points, self._tool)
+
+    @property
+    def here(self) -> Point:
+        """The robot's position, x, y [m]."""
+        row, col = self._place.here.tolist()
+        return self._floor.geometry.to_map(col + 0.5, row + 0.5)
+
+    @property
+    def place(self) -> Points:
+        """The robot's position, (2,): y, x [pixels]."""
+        return self._place.here
+
+    @property
+    def beside(self) -> Beside | None:
+        """The robot's place beside the line; None if it does not follow one."""
+        return self._place.beside(self.line.points, self.tally.unit_m) if self.is_followed else None
+
+    @property
+    def _tool(self) -> float:
+        return self._floor.discs.tool_m / 2 / self.tally.unit_m
+
+    def _see(self, pose: Pose2D) -> None:
+        self._place.here = np.array(map_to_raster(self._floor.geometry, pose.x, pose.y))
+
+    def next_xy(self, count: int) -> Points:
+        """Return the first points of ``xy``, from the robot's place on, at most ``count``."""
+        return raster_to_map(self._floor.geometry, self._from_place()[:count])
+
+    def _from_place(self) -> Points:
+        """Return the line from the robot's place on it."""
+        points = self.line.points
+        if len(points) > 1:
+            points = points.copy()
+            points[0] = self._place.on(points)
+        return points
+
+    def put(self, first: int, end: int, points: Points) -> None:
+        """Replace the points from ``first`` to ``end`` by polished ones, and update the counts.
+
+        The first and the last one stay, and keep their cells.
+        """
+        line = self._whole
+        begin, last = int(line.cells[first]), int(line.cells[end - 1])
+        cells = begin + aligned(points, self._stands(begin, last + 1))
+        state = line.state[first:end].min(initial=POLISHED)
+        part = Line(points, cells, np.full(len(points), state, np.uint8))
+        self._whole = line.part(0, first).joined(part, line.part(end))
+
+    def put_curve(self, first: int, end: int, xy: Points) -> None:
+        """Replace the points from ``first`` to ``end`` by a curve, float64 (n, 2): x, y [m].
+
+        From the first point on the curve begins at the robot.
+        """
+        line, geometry = self._whole, self._floor.geometry
+        points = np.array([map_to_raster(geometry, x, y) for x, y in xy.tolist()])
+        begin, last = int(line.cells[first]), int(line.cells[end - 1])
+        cells = np.full(len(points), begin)
+        if len(points) > 1:
+            cells = begin + aligned(points, self._stands(begin, last + 1))
+        part = Line(points, cells, np.full(len(points), CURVED, np.uint8))
+        while end < len(line) and np.abs(points[-1] - line.points[end]).sum() < LEAST_EDGE:
+            end += 1
+        new = line.part(0, first).joined(part, line.part(end))
+        if not first:
+            self._place.along = 0.0
+        self.tally.exchange(edges_between(line.points), edges_between(new.points))
+        self._whole = new
+
+    def _nearest(self, begin: int, end: int) -> int:
+        """Return the nearest cell of the walk from ``begin`` to ``end``.
+
+        It has to have a stand that the robot can drive to straight, as the next walk begins there.
+        """
+        stands, here = self._stands(begin, end), self._place.here
+        nearest: list[int] = by_distance(here, stands)[:TRIED].tolist()
+        seen = (number for number in nearest if self._is_clear(here, stands[number]))
+        return begin + next(seen, nearest[0])
+
+    def _stands(self, begin: int, end: int) -> Points:
+        """Return the stands of the walk's cells from ``begin`` to ``end``, at least one."""
+        return self._floor.stands.stands_of(self._walk[begin : max(end, begin + 1)])
+
+    def note(self, first: int, end: int, state: int) -> None:
+        """Mark points as MOVED or POLISHED."""
+        self._whole = self._whole.marked(first, end, state)
+
+    def lengths(self, within_m: float = math.inf) -> NDArray[np.float64]:
+        """Return the distance along the line to each point, float64 (n,) [m]; the first is 0.
+
+        Only for the first points, up to one that is farther than ``within_m`` [m], if there is one.
+        """
+        unit_m = self.tally.unit_m
+        return lengths(self.line.points, within_m / unit_m, self._place.along) * unit_m
+
+    def _is_clear(self, a: Points, b: Points) -> bool:
+        return is_clear_between(self._floor, a, b)
