@@ -139,7 +139,8 @@ class FloorMap:
         self.shift = geometry.corner_of(self.geometry)
         # New cells are left out: along the sides of a grown map they contain little new floor.
         self.touched = self._reach.pixels_of(near, plain.window, geometry)
-        if plain.window != before.window:  # floor that is no longer shown may lie beyond the new cells
+        if plain.window != before.window:
+            # Floor that is no longer shown may lie beyond the new cells.
             lost = cells_near_changes(grids, before.window, wide, thresholds, within)
             lost_pixels = self._reach.pixels_of(lost, before.window, geometry)
             self.touched = Window.around(self.touched, lost_pixels)
