@@ -62,9 +62,10 @@ class LineAhead(FollowedLine):
         # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
         walk = walk.copy()
         # Any line ends before a cell that is off the lattice.
-        is_off = np.isnan(self._floor.stands.stands_of(walk)[:, 0])
-        if is_off.any():
-            walk = walk[: int(np.argmax(is_off))]
+        lattice = self._floor.stands.lattice
+        is_on = lattice.window.values_at(lattice.coverable, walk, 0)
+        if not is_on.all():
+            walk = walk[: int(np.argmin(is_on))]
         ahead, line = self._walk[self.cell :], self._whole.renumbered(-self.cell)
         beyond = Piece(Line(), 0)
         is_beginning = keeps and len(walk) > 0 and common_beginning(walk, ahead) == len(walk)
