@@ -206,7 +206,8 @@ def test_a_mapper_that_begins_anew_hides_no_floor_of_an_order(over):
         drive.go()
     if over:
         drive.finish()
-    kept, order = drive.mission.snapshot(), drive.mission.order_state
+    kept = drive.mission.snapshot()
+    order = OrderState.from_json(kept.note)
     again = Drive((1, 1), order_state=order)
     again.mission.restore_ledger(kept)
     again.mission.restore_order(order)
@@ -222,3 +223,22 @@ def test_a_mapper_that_begins_anew_hides_no_floor_of_an_order(over):
         again.tell(MapReceived(whole))
         again.finish()
         assert len(again.visited) == 12
+
+
+def test_on_the_same_map_after_a_restart_nobody_looks_where_it_ends():
+    wall = "#" * 14
+    seen = building(wall, "#........     ", wall)
+    drive = Drive((1, 8), MapReceived(seen), pose_at(1, 8))
+    while len(drive.visited) < 5:
+        if drive.request is not None:
+            drive.plan()
+        drive.go()
+    kept = drive.mission.snapshot()
+    order = OrderState.from_json(kept.note)
+    again = Drive(drive.cell, order_state=order)
+    again.mission.restore_ledger(kept)
+    again.mission.restore_order(order)
+    again.tell(MapReceived(seen), pose_at(*drive.cell))
+    again.finish()
+    assert len(again.visited) == 8
+    assert (1, 8) not in again.driven

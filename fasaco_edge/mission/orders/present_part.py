@@ -8,7 +8,8 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.changes import carried
+from fasaco_edge.grid.lattice import UNKNOWN, Cell
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -127,12 +128,19 @@ class PresentPart(OrderReach):
         if reason := exploration.seek(zone, area, free, cell):
             return reason
         of_others = self._company.viewpoints(self.cells.open_cells, cell)
-        viewpoints = chain(
-            ((at, OTHERS_SEE) for at in of_others),
-            ((at, MAP_ENDS) for at in self.cells.ends_of_map(cell)),
-        )
+        ends = self.cells.ends_of_map(cell) if self._is_map_cut() else ()
+        viewpoints = chain(((at, OTHERS_SEE) for at in of_others), ((at, MAP_ENDS) for at in ends))
         looks = (exploration.look_beyond(at, cell, why) for at, why in viewpoints)
         return next(filter(None, looks), "")
+
+    def _is_map_cut(self) -> bool:
+        """Return whether the map shows less than was in reach of the order, before a restart."""
+        lattice = self._map.lattice
+        if lattice is None or self._once is None:
+            return False
+        window, once = self._once
+        shown = carried(lattice.states != UNKNOWN, lattice.window, window)
+        return bool((once & ~shown).any())
 
     def why_standing(self, now: float) -> str:
         """Return why the robot stands although a plan is wanted, or ""."""
