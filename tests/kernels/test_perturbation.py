@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from fasaco_edge.kernels.ants.fold import NOTHING
 from fasaco_edge.kernels.local_search.perturbation import (
     COOLING,
+    DRAWN,
     PERTURBATIONS,
     PerturbationRules,
     Search,
     perturb,
     recall,
     remember,
-    touch_up,
 )
 from fasaco_edge.kernels.local_search.walk_array import COST, LENGTH
 from tests import naive
@@ -100,7 +100,7 @@ def test_perturbations_leave_a_sound_walk_and_remember_the_best(
     random = stream(seed)
     seen = [walk.counts[COST]]
     for number in range(1, 25):
-        perturb(search, rules, 1, random)
+        perturb(search, rules, 1, DRAWN, random)
         assert_sound(task, ground, walk, prices)
         seen.append(walk.counts[COST])
         assert memory.best_counts[COST] == min(seen)
@@ -127,7 +127,7 @@ def test_many_perturbations_at_once_are_as_many_one_by_one(prices, radius):
         search = set_up(task, prices)
         memory, random = search.memory, stream(9)
         for times in pieces:
-            perturb(search, rules_for(prices, radius), times, random)
+            perturb(search, rules_for(prices, radius), times, DRAWN, random)
         ends.append((cells_of(search.walk), best_of(memory), memory.work.tolist(), random.tolist()))
     assert ends[0] == ends[1] == ends[2]
 
@@ -137,7 +137,7 @@ def bare_perturbations(task, prices, times, seed):
     rules = rules_for(prices, 0, proposals=0, patience=1e4)
     for number in range(times):
         search = set_up(task, prices)
-        perturb(search, rules, 1, stream((seed, number)))
+        perturb(search, rules, 1, DRAWN, stream((seed, number)))
         yield search.ground, cells_of(search.walk)
 
 
@@ -174,9 +174,9 @@ def test_a_perturbation_finds_the_other_way_round_a_pillar():
     prices = PRICES[1]
     search = set_up(task, prices)
     memory = search.memory
-    perturb(search, rules_for(prices, -1, loops_of_256=0), 20, stream(1))
+    perturb(search, rules_for(prices, -1, loops_of_256=0), 20, DRAWN, stream(1))
     assert memory.best_counts[LENGTH] - 1 == 14
-    perturb(search, rules_for(prices, -1), 20, stream(1))
+    perturb(search, rules_for(prices, -1), 20, DRAWN, stream(1))
     assert memory.best_counts[LENGTH] - 1 == 8
 
 
@@ -186,7 +186,7 @@ def test_a_spots_surroundings_are_improved_at_each_temperature(radius):
     search = set_up(task, prices)
     memory = search.memory
     rules = rules_for(prices, radius, proposals=101, loops_of_256=0)
-    perturb(search, rules, 1, stream(1))
+    perturb(search, rules, 1, DRAWN, stream(1))
     away = naive.distances(task.steps, task.unframed(memory.touched[0]))
     near = {cell for cell, steps in away.items() if steps <= radius}
     assert {task.unframed(cell) for cell in memory.area[: len(near)]} == near
@@ -195,7 +195,7 @@ def test_a_spots_surroundings_are_improved_at_each_temperature(radius):
 
 @examples(60)
 @given(task=tasks(), prices=st.sampled_from(PRICES), seed=st.integers(0, 2**32))
-def test_touching_up_a_spot_makes_the_walk_better_or_leaves_it(task, prices, seed):
+def test_improving_given_cells_makes_the_walk_better_or_leaves_it(task, prices, seed):
     search = set_up(task, prices)
     ground, walk, _, _, memory, _ = search
     random = stream(seed)
@@ -203,7 +203,7 @@ def test_touching_up_a_spot_makes_the_walk_better_or_leaves_it(task, prices, see
         before, cost = cells_of(walk), walk.counts[COST]
         spots = sorted(set(before[number::7])) or before[:1]
         memory.touched[: len(spots)] = spots
-        touch_up(search, rules_for(prices, 2), len(spots), random)
+        perturb(search, rules_for(prices, 2, strict=True), 1, len(spots), random)
         assert_sound(task, ground, walk, prices)
         assert cells_of(walk) == before or walk.counts[COST] < cost
         assert cells_of(walk) == best_of(memory)

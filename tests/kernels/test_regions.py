@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import JUMPS
-from fasaco_edge.kernels.local_search.perturbation import Search, perturb, remember
+from fasaco_edge.kernels.local_search.perturbation import DRAWN, Search, perturb, remember
 from fasaco_edge.kernels.local_search.proposals import improve
 from fasaco_edge.kernels.local_search.regions import (
     AFTER,
@@ -212,7 +212,7 @@ def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, per
         cells = region.put_back()
         assert_whole_walk(task, region, cells)
         if perturbed:
-            perturb(region.search, rules, 3, random)
+            perturb(region.search, rules, 3, DRAWN, random)
             assert_counts(region.ground, region.walk)
             assert_whole_walk(task, region, region.put_back())
         if not prices.quarter_turn_us:
@@ -308,7 +308,7 @@ def test_sections_are_passed_in_either_direction():
         if region is None or not region.tally.counts[JUMPS]:
             continue
         rules = rules_for(prices, 0, proposals=0, patience=1e4, loops_of_256=128, ants_of_256=128)
-        perturb(region.search, rules, 3, stream(seed))
+        perturb(region.search, rules, 3, DRAWN, stream(seed))
         after = region.put_back().tolist()
         for first, last in region.sections[: region.tally.counts[JUMPS]].tolist():
             section = region.cells[first : last + 1].tolist()

@@ -149,7 +149,7 @@ def test_a_plan_needs_no_more_than_its_stages():
     assert (done.stdout, done.stderr) == ("\n", "")
 
 
-@pytest.mark.parametrize(("kernel", "most"), [("line.gain_above", 2), ("program.solve_window", 1)])
+@pytest.mark.parametrize(("kernel", "most"), [("line.gain_above", 2), ("search.solve_windows", 1)])
 def test_a_large_kernel_is_not_compiled_for_each_constant(kernel, most):
     compile_missing()
     folder, _ = chosen_folder(STAGES)

@@ -119,8 +119,7 @@ def test_a_line_keeps_its_corners_and_loses_the_rest():
     [
         (
             9,
-            "9 steps to drive\nbranching factor 1.75 "
-            "(1: one way in each cell, 4: none is preferred)",
+            "9 steps to drive; ants see 1.8 ways in a cell (1: sure, 4: undecided)",
         ),
         (0, "nothing left to drive"),
     ],

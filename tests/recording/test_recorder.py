@@ -243,8 +243,8 @@ def test_the_pheromone_is_neither_flat_nor_misplaced(recorded):
     *_, trail = read_column(recorded.path, entities.TRAIL_LABEL, "Points3D:labels").values
     best = recorded.mission.best_steps
     path = f"path {recorded.mission.revision}"
-    decided = "branching factor 1.03 (1: one way in each cell, 4: none is preferred)"
-    assert trail == [f"pheromone at {path}, {best} steps to drive\n{decided}"]
+    decided = "ants see 1.0 ways in a cell (1: sure, 4: undecided)"
+    assert trail == [f"pheromone at {path}, {best} steps to drive; {decided}"]
 
 
 def test_how_decided_the_trail_is_is_a_curve(recorded):

@@ -169,7 +169,7 @@ def test_states_are_those_heard(told, review, recording):
 def test_a_moment_tells_what_the_colony_held(review):
     instant = scene_at(review, 0.6 * review.duration_s).instant
     assert instant.trail.startswith("pheromone at path ")
-    assert "; branching factor " in instant.trail
+    assert "; ants see " in instant.trail
     assert instant.path.at_s <= instant.at_s < (instant.path_after or instant.path).at_s + 60
 
 

@@ -41,6 +41,8 @@ from fasaco_edge.kernels.random import draw, index_of
 
 # Entries of ``Memory.work``.
 PROPOSALS, PERTURBATIONS = 0, 1
+# No cells are given: what a perturbation changes is drawn.
+DRAWN = -1
 
 # Steps from a disc that ants have rebuilt to the rim of what is improved.
 AROUND_DISC = 2
@@ -223,37 +225,8 @@ def _settle(
 
 
 @lean_kernel
-def touch_up(
-    search: Search, rules: PerturbationRules, touched: int, random: NDArray[np.uint64]
-) -> None:
-    """Improve the walk around the first ``touched`` cells of ``memory.touched``.
-
-    If that gains nothing the walk is unchanged.
-    """
-    walk, memory = search.walk, search.memory
-    length, cost = walk.counts[LENGTH], walk.counts[COST]
-    copy(walk.cells, memory.saved, length)
-    _settle(search, rules, touched, rules.radius, random)
-    memory.work[PERTURBATIONS] += 1
-    if walk.counts[COST] < cost:
-        remember(walk, memory)
-    else:
-        _load(search, memory.saved, length)
-
-
-@lean_kernel
-def _let_ants_rebuild(search: Search, random: NDArray[np.uint64]) -> int:
-    """Let ants rebuild a disc; return how many cells were touched, 0 if nothing was."""
-    ground, walk, prices, _, memory, colony = search
-    touched = rebuild_disc(ground, walk, prices, colony, memory.saved, random)
-    copy(colony.area, memory.touched, touched)
-    memory.work[PROPOSALS] += colony.rules.ants * touched
-    return touched
-
-
-@lean_kernel
 def perturb(
-    search: Search, rules: PerturbationRules, times: int, random: NDArray[np.uint64]
+    search: Search, rules: PerturbationRules, times: int, given: int, random: NDArray[np.uint64]
 ) -> None:
     """Perturb the walk ``times`` times; ``memory.best`` holds the best walk.
 
@@ -261,33 +234,39 @@ def perturb(
         search: changed in place.
         rules: how to perturb.
         times: how often.
+        given: number of cells in ``memory.touched`` around which the walk is only improved; DRAWN
+            to draw what is changed.
         random: stream, uint64 (1,), not 0; advanced.
     """
-    walk, memory = search.walk, search.memory
+    ground, walk, prices, _, memory, colony = search
     for _ in range(times):
         length, cost = walk.counts[LENGTH], walk.counts[COST]
         copy(walk.cells, memory.saved, length)
-        kind = draw(random) & 255
-        touched = by_ants = as_value(0)
-        if kind < rules.loops_of_256:
-            touched = _change_parity(search, rules, random)
-        elif kind < rules.loops_of_256 + rules.ants_of_256:
-            touched = by_ants = _let_ants_rebuild(search, random)
-        if touched == 0:
-            # Nothing to change there: anneal around a spot.
-            spot = walk.cells[index_of(draw(random), walk.counts[LENGTH])]
-            if spot < search.ground.bound:
-                memory.touched[0] = spot
-                touched = 1
+        touched, by_ants = given, as_value(0)
+        if given == DRAWN:
+            kind = draw(random) & 255
+            touched = as_value(0)
+            if kind < rules.loops_of_256:
+                touched = _change_parity(search, rules, random)
+            elif kind < rules.loops_of_256 + rules.ants_of_256:
+                touched = by_ants = rebuild_disc(ground, walk, prices, colony, memory.saved, random)
+                copy(colony.area, memory.touched, touched)
+                memory.work[PROPOSALS] += colony.rules.ants * touched
+            if touched == 0:
+                # Nothing to change there: anneal around a spot.
+                spot = walk.cells[index_of(draw(random), walk.counts[LENGTH])]
+                if spot < ground.bound:
+                    memory.touched[0] = spot
+                    touched = 1
         radius = AROUND_DISC if by_ants else rules.radius
         _settle(search, rules, touched, radius, random)
         memory.work[PERTURBATIONS] += 1
         if walk.counts[COST] < memory.best_counts[COST]:
             if by_ants:
                 gain_us = memory.best_counts[COST] - walk.counts[COST]
-                search.colony.saved_us[cohort(search.colony)] += gain_us
+                colony.saved_us[cohort(colony)] += gain_us
             remember(walk, memory)
         elif rules.strict or not accepts(walk.counts[COST] - cost, rules.acceptance_us, random):
             _load(search, memory.saved, length)
         if by_ants:
-            strengthen(search.ground, walk, search.colony)
+            strengthen(ground, walk, colony)

@@ -175,6 +175,29 @@ class Window(NamedTuple):
     mirrored: int
 
 
+class Aim(NamedTuple):
+    """Positions and sizes of windows.
+
+    Attributes:
+        cells: int32 (k,), framed cells that windows are laid around.
+        rows, cols: of the framed ground.
+        frame: cells of its frame on each side.
+        least_side, most_side: of a window's shorter side.
+        least_area, most_area: of a window at first, and in the end.
+        beam: limit on the states kept.
+    """
+
+    cells: NDArray[np.int32]
+    rows: int
+    cols: int
+    frame: int
+    least_side: int
+    most_side: int
+    least_area: int
+    most_area: int
+    beam: int
+
+
 LAYER_STAMP, EXPANDED = 0, 1
 
 # Entries of ``Program.at``: number and line of the next cell; the layer before it and the number of

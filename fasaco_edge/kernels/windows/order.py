@@ -6,7 +6,7 @@ walk.
 """
 
 from fasaco_edge.kernels.jit import inlined
-from fasaco_edge.kernels.windows.memory import Window
+from fasaco_edge.kernels.windows.memory import Aim, Window
 
 # Bits of ``Window.mirrored``: lines, or the cells of each line, from the last to the first.
 LINES, PLACES = 1, 2
@@ -36,3 +36,12 @@ def directions_of(window: Window) -> tuple[int, int]:
     ahead = (ahead + 2) & 3 if window.mirrored & PLACES else ahead
     below = (below + 2) & 3 if window.mirrored & LINES else below
     return ahead, below
+
+
+@inlined
+def laid_in(aim: Aim, row: int, col: int, rows: int, cols: int, mirrored: int) -> Window:
+    """Return a window as near to its drawn position as the ground allows."""
+    rows, cols = min(rows, aim.rows - 2 * aim.frame), min(cols, aim.cols - 2 * aim.frame)
+    row = min(max(row, aim.frame), aim.rows - aim.frame - rows)
+    col = min(max(col, aim.frame), aim.cols - aim.frame - cols)
+    return Window(row, col, rows, cols, aim.cols, mirrored)

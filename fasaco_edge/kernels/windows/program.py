@@ -60,38 +60,6 @@ from fasaco_edge.kernels.windows.passages import BEGIN, END, NONE, SLOTS, Passag
 
 
 @lean_kernel
-def solve_window(
-    ground: Ground,
-    passages: Passages,
-    terms: Terms,
-    window: Window,
-    program: Program,
-    beam: int,
-    noise: int,
-    allowance: int,
-    random: NDArray[np.uint64],
-) -> int:
-    """Re-optimise a window; return the change of the walk's cost [half us], 0 for none.
-
-    Args:
-        ground: framed.
-        passages: of the walk; changed in place if a better solution is found.
-        terms: costs and end of the walk.
-        window: the window.
-        program: memory.
-        beam: limit on the states kept after a cell.
-        noise: largest random amount added to each passage's cost, so that the walk may become a
-            little more expensive.
-        allowance: accepted increase in cost, to join several rings in the window into one.
-        random: state of the stream, uint64 (1,).
-    """
-    begin_window(ground, passages, terms, window, program, noise, allowance, as_value(0), random)
-    while advance_window(ground, passages, terms, window, program, beam):
-        pass
-    return end_window(ground, passages, terms, window, program)
-
-
-@lean_kernel
 def begin_window(
     ground: Ground,
     passages: Passages,
@@ -103,7 +71,20 @@ def begin_window(
     ring_price: int,
     random: NDArray[np.uint64],
 ) -> None:
-    """Begin to solve a window; see ``solve_window``, and above for ``ring_price``."""
+    """Begin to solve a window: ``advance_window`` until no line is left, then ``end_window``.
+
+    Args:
+        ground: framed.
+        passages: of the walk.
+        terms: costs and end of the walk.
+        window: the window.
+        program: memory.
+        noise: largest random amount added to each passage's cost, so that the walk may become a
+            little more expensive.
+        allowance: accepted increase in cost, to join several rings in the window into one.
+        ring_price: see above.
+        random: state of the stream, uint64 (1,).
+    """
     lines, wide = shape_of(window)
     at, count = program.at, as_value(0)
     for line in range(lines):
@@ -147,7 +128,7 @@ def _begin_of(passages: Passages, program: Program) -> int:
 def advance_window(
     ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program, beam: int
 ) -> bool:
-    """Decide the next line of cells; return whether any are left."""
+    """Decide the next line of cells; return whether any are left. ``beam``: most states kept."""
     lines, wide = shape_of(window)
     at = program.at
     line = at[LINE]
@@ -184,7 +165,11 @@ def advance_window(
 def end_window(
     ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program
 ) -> int:
-    """Put the best state's passages back, if it is better; return as ``solve_window`` does."""
+    """Put the best state's passages back, if it is better.
+
+    Returns:
+        The change of the walk's cost [half us], 0 for none.
+    """
     at, (_, wide) = program.at, shape_of(window)
     layer, end_id, count = at[LAYER], at[END_ID], at[COUNT]
     best, cost = as_value(-1), at[LIMIT]

@@ -4,16 +4,17 @@ The solution of a whole ground with few states consists of several rings. A smal
 seam of two, re-optimised for one ring, joins them at the least cost.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import as_value, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw, index_of
-from fasaco_edge.kernels.windows.memory import Program, Terms
+from fasaco_edge.kernels.windows.memory import Aim, Window
+from fasaco_edge.kernels.windows.order import laid_in
 from fasaco_edge.kernels.windows.passages import NONE, SLOTS, Passages, across
-from fasaco_edge.kernels.windows.program import solve_window
-from fasaco_edge.kernels.windows.search import COST, SOLVED, Aim, laid_in
 
 # Sides of the windows: least length, and number of lengths.
 SIDE, SIDES = 4, 3
@@ -24,64 +25,37 @@ SEVERAL = -2
 RING, SEEN = 0, 1
 
 
-@lean_kernel
-def join_rings(
-    ground: Ground,
-    passages: Passages,
-    terms: Terms,
-    program: Program,
-    aim: Aim,
-    rings: NDArray[np.int32],
-    seams: NDArray[np.int32],
-    tally: NDArray[np.int64],
-    windows: int,
-    random: NDArray[np.uint64],
-) -> int:
-    """Join rings by some windows; return the number of rings left.
+class Seams(NamedTuple):
+    """Memory to join rings.
 
-    Args:
-        ground: framed.
-        passages: changed in place.
-        terms: costs and end of the walk.
-        program: memory.
-        aim: where windows may lie; the beam.
-        rings: int32 (n, 2), working memory; seams int32 (cells of ``aim``,), too.
-        tally: as in ``solve_windows``; COST and SOLVED are changed in place.
-        windows: limit on the windows.
-        random: state of the stream, uint64 (1,).
+    Attributes:
+        rings: int32 (n, 2): each cell's RING, and its slots SEEN.
+        cells: int32 (cells of an aim,): cells where two rings touch.
     """
-    left = _label(ground, passages, aim, rings)
-    for _ in range(windows):
-        count = _list_seams(ground, aim, rings, seams)
-        if left <= 1 or not count:
-            break
-        cell = seams[index_of(draw(random), count)]
-        rows = SIDE + index_of(draw(random), SIDES)
-        cols = SIDE + index_of(draw(random), SIDES)
-        # All cells beside it are in the window, too.
-        row = cell // aim.cols - 1 - index_of(draw(random), rows - 2)
-        col = cell % aim.cols - 1 - index_of(draw(random), cols - 2)
-        window = laid_in(aim, row, col, rows, cols, 0)
-        tally[COST] += solve_window(
-            ground,
-            passages,
-            terms,
-            window,
-            program,
-            aim.beam,
-            as_value(0),
-            as_value(ANY_PRICE),
-            random,
-        )
-        tally[SOLVED] += 1
-        left = _label(ground, passages, aim, rings)
-    return left
+
+    rings: NDArray[np.int32]
+    cells: NDArray[np.int32]
 
 
 @lean_kernel
-def _label(ground: Ground, passages: Passages, aim: Aim, rings: NDArray[np.int32]) -> int:
+def draw_seam(ground: Ground, aim: Aim, seams: Seams, random: NDArray[np.uint64]) -> Window:
+    """Draw a window where two rings touch; one without rows if none do."""
+    count = _list_seams(ground, aim, seams.rings, seams.cells)
+    if not count:
+        return laid_in(aim, as_value(0), as_value(0), as_value(0), as_value(0), as_value(0))
+    cell = seams.cells[index_of(draw(random), count)]
+    rows = SIDE + index_of(draw(random), SIDES)
+    cols = SIDE + index_of(draw(random), SIDES)
+    # All cells beside it are in the window, too.
+    row = cell // aim.cols - 1 - index_of(draw(random), rows - 2)
+    col = cell % aim.cols - 1 - index_of(draw(random), cols - 2)
+    return laid_in(aim, row, col, rows, cols, as_value(0))
+
+
+@lean_kernel
+def label_rings(ground: Ground, passages: Passages, aim: Aim, seams: Seams) -> int:
     """Write each cell's ring and its visited slots; return the number of rings."""
-    partner = passages.partner
+    partner, rings = passages.partner, seams.rings
     for index in range(aim.cells.size):
         rings[aim.cells[index], RING], rings[aim.cells[index], SEEN] = NONE, 0
     found = 0

@@ -4,41 +4,17 @@ Source: Shaw, "Using constraint programming and local search methods to solve ve
 problems", 1998, for the scheme: a part is freed, the rest is fixed, and the part is re-optimised.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw, index_of
-from fasaco_edge.kernels.windows.memory import EXPANDED, Program, Terms, Window
+from fasaco_edge.kernels.windows.memory import EXPANDED, Aim, Program, Terms, Window
+from fasaco_edge.kernels.windows.order import laid_in
 from fasaco_edge.kernels.windows.passages import SLOTS, Passages
-from fasaco_edge.kernels.windows.program import solve_window
-
-
-class Aim(NamedTuple):
-    """Positions and sizes of windows.
-
-    Attributes:
-        cells: int32 (k,), framed cells that windows are laid around.
-        rows, cols: of the framed ground.
-        frame: cells of its frame on each side.
-        least_side, most_side: of a window's shorter side.
-        least_area, most_area: of a window at first, and in the end.
-        beam: limit on the states kept.
-    """
-
-    cells: NDArray[np.int32]
-    rows: int
-    cols: int
-    frame: int
-    least_side: int
-    most_side: int
-    least_area: int
-    most_area: int
-    beam: int
-
+from fasaco_edge.kernels.windows.program import advance_window, begin_window, end_window
+from fasaco_edge.kernels.windows.rings import ANY_PRICE, Seams, draw_seam, label_rings
 
 # Entries of the tally: cost of the walk and of the best one [half us]; windows solved and cells
 # in them since the search began.
@@ -59,41 +35,63 @@ def solve_windows(
     terms: Terms,
     program: Program,
     aim: Aim,
+    seams: Seams,
     tally: NDArray[np.int64],
+    windows: int,
     expansions: int,
     random: NDArray[np.uint64],
-) -> None:
-    """Solve windows until a number of states were expanded.
+) -> int:
+    """Solve windows until a number of states were expanded; or windows that join rings.
 
     Args:
         ground: framed.
         passages: of the walk; changed in place.
-        best: out, the passages of the best walk, if a better one is found.
+        best: out, the passages of the best walk, if a better one is found; not of one with rings.
         terms: costs and end of the walk.
         program: memory.
         aim: positions and sizes of windows.
+        seams: memory to join rings at any price; without any, windows lie anywhere.
         tally: int64 (4,), COST, BEST, SOLVED, SWEPT; changed in place.
+        windows: limit on the windows: one without a possible gain expands no state.
         expansions: states to expand at least.
         random: state of the stream, uint64 (1,).
+
+    Returns:
+        Number of rings left; 1 if there are no ``seams``.
     """
-    until = program.clock[EXPANDED] + expansions
-    # A window without a possible gain expands none.
-    for _ in range(max(expansions // 64, 1)):
+    until, left = program.clock[EXPANDED] + expansions, as_value(1)
+    is_joining = seams.cells.size > 0
+    if is_joining:
+        left = label_rings(ground, passages, aim, seams)
+    for _ in range(windows):
         if program.clock[EXPANDED] >= until:
             break
-        window = _draw_window(aim, tally[SWEPT], random)
-        # At first nearly any change gains: few states suffice.
-        beam = min(aim.beam, FIRST_BEAM + FIRST_BEAM * (tally[SWEPT] // aim.cells.size) // 2)
-        noise = terms.turn // NOISE
-        gain = solve_window(
-            ground, passages, terms, window, program, beam, noise, as_value(0), random
-        )
+        if is_joining:
+            if left <= 1:
+                break
+            window = draw_seam(ground, aim, seams, random)
+            if not window.rows:
+                break
+            beam, noise, allowance = aim.beam, as_value(0), as_value(ANY_PRICE)
+        else:
+            window = _draw_window(aim, tally[SWEPT], random)
+            # At first nearly any change gains: few states suffice.
+            beam = min(aim.beam, FIRST_BEAM + FIRST_BEAM * (tally[SWEPT] // aim.cells.size) // 2)
+            noise, allowance = terms.turn // NOISE, as_value(0)
+        ring_price = as_value(0)
+        begin_window(ground, passages, terms, window, program, noise, allowance, ring_price, random)
+        while advance_window(ground, passages, terms, window, program, beam):
+            pass
+        tally[COST] += end_window(ground, passages, terms, window, program)
         tally[SOLVED] += 1
+        if is_joining:
+            left = label_rings(ground, passages, aim, seams)
+            continue
         tally[SWEPT] += window.rows * window.cols
-        tally[COST] += gain
         if tally[COST] < tally[BEST]:
             tally[BEST] = tally[COST]
             _copy(passages, best)
+    return left
 
 
 @inlined
@@ -121,12 +119,3 @@ def _draw_window(aim: Aim, swept: int, random: NDArray[np.uint64]) -> Window:
     row = cell // aim.cols - index_of(draw(random), min(rows, aim.rows - 2 * aim.frame))
     col = cell % aim.cols - index_of(draw(random), min(cols, aim.cols - 2 * aim.frame))
     return laid_in(aim, row, col, rows, cols, int(bits >> 1 & 3))
-
-
-@inlined
-def laid_in(aim: Aim, row: int, col: int, rows: int, cols: int, mirrored: int) -> Window:
-    """Return a window as near to its drawn position as the ground allows."""
-    rows, cols = min(rows, aim.rows - 2 * aim.frame), min(cols, aim.cols - 2 * aim.frame)
-    row = min(max(row, aim.frame), aim.rows - aim.frame - rows)
-    col = min(max(col, aim.frame), aim.cols - aim.frame - cols)
-    return Window(row, col, rows, cols, aim.cols, mirrored)

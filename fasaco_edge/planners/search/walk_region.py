@@ -13,6 +13,7 @@ from fasaco_edge.kernels.ants.fold import ANTS
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import JUMPS, Tally
 from fasaco_edge.kernels.local_search.perturbation import (
+    DRAWN,
     PERTURBATIONS,
     PROPOSALS,
     Memory,
@@ -21,7 +22,6 @@ from fasaco_edge.kernels.local_search.perturbation import (
     perturb,
     recall,
     remember,
-    touch_up,
 )
 from fasaco_edge.kernels.local_search.proposals import improve
 from fasaco_edge.kernels.local_search.regions import (
@@ -175,13 +175,13 @@ class WalkRegion:
     def touch_up(
         self, cells: NDArray[np.int32], rules: PerturbationRules, random: NDArray[np.uint64]
     ) -> None:
-        """Improve the walk around cells of the region, int32 (n,), only for a gain."""
+        """Improve the walk around cells of the region, int32 (n,); ``rules`` are strict."""
         self._memory.touched[: cells.size] = cells
-        touch_up(self._search, rules, cells.size, random)
+        perturb(self._search, rules, 1, cells.size, random)
 
     def perturb(self, rules: PerturbationRules, times: int, random: NDArray[np.uint64]) -> None:
         """Perturb the walk ``times`` times."""
-        perturb(self._search, rules, times, random)
+        perturb(self._search, rules, times, DRAWN, random)
 
     def go_back(self) -> None:
         """Continue from the best walk here."""

@@ -20,6 +20,7 @@ from fasaco_edge.kernels.windows.memory import (
     MOST_PAIRS,
     NO_END,
     PAIRINGS,
+    Aim,
     Choice,
     Parts,
     Program,
@@ -28,8 +29,8 @@ from fasaco_edge.kernels.windows.memory import (
 )
 from fasaco_edge.kernels.windows.passages import BEGIN, NONE, SLOTS, Passages, passages_of, walk_of
 from fasaco_edge.kernels.windows.program import advance_window, begin_window, end_window
-from fasaco_edge.kernels.windows.rings import ANY_PRICE, join_rings
-from fasaco_edge.kernels.windows.search import BEST, COST, SOLVED, Aim, solve_windows
+from fasaco_edge.kernels.windows.rings import ANY_PRICE, Seams
+from fasaco_edge.kernels.windows.search import BEST, COST, SOLVED, solve_windows
 from fasaco_edge.planners.bound import LowerBound
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
@@ -48,6 +49,9 @@ MOST_LATTICE = 250_000
 RING_TURNS = 1000
 JOINS_AT_ONCE, JOIN_PIECES, JOIN_BEAM = 8, 40, 20
 NO_SIDE = 1 << 60
+# A window without a possible gain expands no state: it counts as so many.
+EXPANSIONS_OF_WINDOW, NO_LIMIT = 64, 1 << 60
+NO_SEAMS = Seams(np.empty((0, 2), np.int32), np.empty(0, np.int32))
 
 
 def suits(problem: CoverageProblem) -> bool:
@@ -126,9 +130,16 @@ class WindowSearch:
 
     def solve(self, expansions: int, random: NDArray[np.uint64]) -> None:
         """Solve windows until this many states were expanded."""
-        ground, passages, best = self._ground, self._passages, self._best
-        terms, program, aim = self._terms, self._program, self._aim
-        solve_windows(ground, passages, best, terms, program, aim, self._tally, expansions, random)
+        windows = max(expansions // EXPANSIONS_OF_WINDOW, 1)
+        self._solve(self._aim, NO_SEAMS, windows, expansions, random)
+
+    def _solve(
+        self, aim: Aim, seams: Seams, windows: int, expansions: int, random: NDArray[np.uint64]
+    ) -> int:
+        return solve_windows(
+            *(self._ground, self._passages, self._best, self._terms, self._program, aim, seams),
+            *(self._tally, windows, expansions, random),
+        )
 
     def solve_whole(self, beam: int, mirrored: int, random: NDArray[np.uint64]) -> Iterator[None]:
         """Solve the whole ground as one window, with this beam; pause after each line.
@@ -152,13 +163,10 @@ class WindowSearch:
             yield
         self._tally[COST] += end_window(ground, passages, terms, window, program)
         self._tally[SOLVED] += 1
-        rings, seams = np.empty((self._size, 2), np.int32), np.empty_like(self._aim.cells)
         aim = self._aim._replace(beam=JOIN_BEAM)
+        seams = Seams(np.empty((self._size, 2), np.int32), np.empty_like(aim.cells))
         for _ in range(JOIN_PIECES):
-            left = join_rings(
-                *(ground, passages, terms, self._program, aim, rings, seams, self._tally),
-                *(JOINS_AT_ONCE, random),
-            )
+            left = self._solve(aim, seams, JOINS_AT_ONCE, NO_LIMIT, random)
             yield
             if left == 1:
                 break

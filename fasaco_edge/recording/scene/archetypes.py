@@ -107,8 +107,8 @@ def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3
     """Return the label over the living trail: its path, and how decided it is."""
     text = f"pheromone at path {about.revision}, "
     if message.best_steps:
-        text += f"{message.best_steps} steps to drive\nbranching factor {about.branching:.2f} "
-        text += "(1: one way in each cell, 4: none is preferred)"
+        text += f"{message.best_steps} steps to drive; "
+        text += f"ants see {about.branching:.1f} ways in a cell (1: sure, 4: undecided)"
     else:
         # Without a way to drive it says nothing how many ways a cell has.
         text += "nothing left to drive"

@@ -22,6 +22,8 @@ MOST_GAP = 2.0
 
 MAP_BACKGROUND = [38, 41, 48]
 PHEROMONE_BACKGROUND = [10, 10, 14]
+# The path over the field: its colour, and its width [points], so thin that the field is seen.
+PATH_ON_FIELD, PATH_WIDTH = [255, 255, 255], 0.8
 
 
 def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
@@ -63,17 +65,19 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
 
 
 def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
+    thin_path = rr.LineStrips3D.from_fields(colors=[PATH_ON_FIELD], radii=[-PATH_WIDTH])
     return rrb.Spatial3DView(
         origin=f"/{entities.WORLD}",
-        name="Pheromone of the ants, and where most of it leads",
+        name="Pheromone that ants follow (bright: much), and the path that came of it (white)",
         contents=[
             f"/{entities.PHEROMONE}/**",
-            f"/{entities.DIRECTIONS}/**",
+            f"/{entities.PATH}",
             f"/{entities.ROBOT}/**",
         ],
         eye_controls=eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
+        overrides={entities.PATH: thin_path},
     )
 
 
