@@ -142,7 +142,7 @@ class Mission:
         if self._layout.resume(before.lattice_deg):
             self._lay_cells()
         self._resume(before)
-        self.covered.before = self.covered.current.snapshot()
+        self.covered.note_restart(in_order=True)
 
     def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         self._rotated_by_deg = self._rotation.deg - before.lattice_deg
@@ -160,7 +160,7 @@ class Mission:
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
         if order.stage is Stage.OVER:
-            self.covered.before = None
+            self.covered.note_restart(in_order=False)
         self._changes.begin(self._rotation.order(order, self._rotated_by_deg, self._scaled_by))
         self.state, self.reason = self._executive.status()
 

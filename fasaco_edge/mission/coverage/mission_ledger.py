@@ -150,6 +150,11 @@ class MissionLedger:
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
+    def note_restart(self, *, in_order: bool) -> None:
+        """Note that the present coverage is from before a restart, in the middle of an order or
+        not."""
+        self.before = self.current.snapshot() if in_order else None
+
     def not_since(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window were last visited before the restart."""
         visits = self.current.visits(window)
