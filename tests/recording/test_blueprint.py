@@ -41,7 +41,7 @@ def test_no_view_complains(shot):
     assert len(shot.views) == 12
     assert {
         "Map, swept floor, track and path",
-        "Pheromone that ants follow (bright: much), and the path that came of it (white)",
+        "Pheromone that ants follow (bright: much), and the path of that time (white)",
         "States",
         "Log",
         "Run",

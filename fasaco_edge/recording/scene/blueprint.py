@@ -68,7 +68,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
     thin_path = rr.LineStrips3D.from_fields(colors=[PATH_ON_FIELD], radii=[-PATH_WIDTH])
     return rrb.Spatial3DView(
         origin=f"/{entities.WORLD}",
-        name="Pheromone that ants follow (bright: much), and the path that came of it (white)",
+        name="Pheromone that ants follow (bright: much), and the path of that time (white)",
         contents=[
             f"/{entities.PHEROMONE}/**",
             f"/{entities.PATH}",

@@ -29,7 +29,7 @@ LEGEND = """\
 - **Pink frame** around all changes of the map that led to this path, and its reason
 - **Blue line** a zone of the order, **orange line** a keep-out zone
 - **Pheromone** left by the planner's ants, for its next ants: dark little, bright much
-- **White line** over the pheromone: the path that came of it"""
+- **White line** over the pheromone: the path of that time"""
 
 
 @dataclass(frozen=True, slots=True)
