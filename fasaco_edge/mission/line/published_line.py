@@ -1,10 +1,10 @@
-"""Published line: the part of the line that the robot has, and when it needs the newest line.
+"""Published line: the line as last published, and the decision when to publish a changed one.
 
-Maps, plans and polish change the line all the time, mostly far ahead of the robot. A change waits
-until the robot comes near it: it may be undone before, and is published with others. What is
-published stays as it is for the next metres: polish begins beyond.
+Maps, plans and polishing change the line all the time, mostly far ahead of the robot. A change
+waits until the robot comes near it, as a later change may undo it. The next metres of the published
+line are not polished.
 
-A new path for a robot that stands never waits, as the robot comes no nearer to the change.
+A new path for a robot that stands is published at once, as the robot comes no nearer to the change.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED, Points
 
-# A change this near is published at once: the robot needs a metre to stop, and a second [m], [s].
+# A change this near is published at once, unless the robot can drive on along the published line:
+# the robot needs a metre to stop, and a second [m], [s].
 NEAR_M, NEAR_S = 1.0, 1.0
-# A change less than this ahead is published once neither a plan nor polish is under way there, or
-# after the patience [m], [s]. The same holds for a line that is cut off nearer than that, if the
-# robot can drive on along the published one: a cell was lost, and a new plan comes within that
-# time.
+# A change within this distance waits while a plan is pending, or the line up to there is not yet
+# polished, but not longer than the patience [m], [s]: a line that a map has cut off gets a new plan
+# within that time.
 DUE_M, DUE_S, PATIENCE_S = 2.0, 1.0, 1.0
-# Length of a published line ahead of the robot that is no longer polished [m].
+# Length of the published line ahead of the robot that is no longer polished [m].
 HELD_M = 4.0
-# Number of points compared: they reach farther than that.
+# Number of points compared; they reach farther than HELD_M.
 SEEN_POINTS = 128
-# A point has not moved if it is this near to its former place [m]: rasters are shifted.
+# Points within this distance are the same [m]: a change of the raster rounds their coordinates.
 SAME_M = 1e-3
 NONE: NDArray[np.float64] = np.empty((0, 2))
 
@@ -57,8 +57,8 @@ class PublishedLine:
         self._due_since = math.inf
 
     def look(self, xy: Points) -> None:
-        """Compare the line, float64 (n, 2): x, y [m], of which the first ``SEEN_POINTS`` points are
-        enough; it begins at the robot."""
+        """Compare the line from the robot on, float64 (n, 2): x, y [m]; its first ``SEEN_POINTS``
+        points suffice."""
         ahead, known = xy[1:SEEN_POINTS], self._xy[self._next :]
         self._common, self.differs_m = 0, 0.0
         if len(xy) and len(self._xy) and not len(ahead) and not len(known):
@@ -82,7 +82,7 @@ class PublishedLine:
 
     @property
     def held(self) -> int:
-        """Number of points, from the line's first on, that are not to be polished."""
+        """Number of the line's first points that are not to be polished."""
         return min(self._last_held - self._next + 2, self._common + 1)
 
     @property
@@ -176,7 +176,7 @@ class Publication:
             update: the new path, if there is one.
             reason: why the line changes; "" if it does not, or is polished.
             now: [s].
-            is_way: whether the path is only a way, on which nothing waits.
+            is_way: whether the path is only a way: then nothing waits.
         """
         route, waiting = self._route, self._waiting
         stands = self._stands(ahead, now)
