@@ -28,16 +28,16 @@ from fasaco_edge.wire.limits import (
 
 # A tolerant reader cuts texts at this length.
 MAX_TEXT = 500
-# What to do about a document that is refused.
+# Hint for a document that is refused.
 OF_JSON = "send a JSON object as the schema of this key describes it (protocol/schema)"
 
 Struct = TypeVar("Struct", bound=msgspec.Struct)
 
 
 def allowed(**schema: object) -> Meta:
-    """Return a limit that a schema states and writers keep; readers do not check it.
+    """Return a limit that a schema states and writers observe; readers do not check it.
 
-    Limits of numbers, which readers check, are stated by ``Meta(ge=...)``.
+    Limits of numbers, which readers check, are given by ``Meta(ge=...)``.
     """
     return Meta(extra_json_schema=schema)
 
@@ -109,13 +109,13 @@ def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
 def tolerant(document: Mapping[str, object], kind: type[Struct]) -> Struct:
     """Return the members of a JSON object that fit ``kind``; others keep their defaults.
 
-    What is beyond a limit of numbers or depth does not fit, texts are cut at ``MAX_TEXT``.
+    A member beyond a limit of numbers or depth does not fit; texts are cut at ``MAX_TEXT``.
 
     Raises:
         TypeError: a member without a default is missing, or does not fit.
     """
-    # Nearly all documents fit as a whole: much faster than member by member. A deeply nested one
-    # has unknown members.
+    # Nearly all documents fit as a whole, which is much faster than member by member. Only unknown
+    # members are nested too deeply for that.
     with suppress(msgspec.ValidationError, RecursionError):
         if _is_within_bounds(document):
             return msgspec.convert(document, kind)
@@ -145,7 +145,7 @@ def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - any type ann
     """Return a JSON value as one of ``kind``; UNSET where it does not fit."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        # A type of numbers has a range.
+        # Only a number has a range.
         is_plain = arguments[0] in (int, float)
         return _fitting_plain(value, kind) if is_plain else _fitting(value, arguments[0])
     if origin in (Union, UnionType):

@@ -133,7 +133,7 @@ class UnreachedArea(Document, frozen=True):
 
 
 class UnreachedReport(Document, frozen=True):
-    """The part of the order that stays uncovered as things are."""
+    """The part of the order that cannot be covered at present."""
 
     cells: Count = 0
     m2: Amount = 0.0
@@ -163,18 +163,18 @@ class MissionReport(Document, frozen=True):
         zone: the zone being covered; null for everything reachable.
         pass: number of the present pass; null without an order.
         passes: number of all passes.
-        pass_kind: what is special about the present pass, as text: edge, rest, cross, 30 degrees;
-            null if nothing is.
+        pass_kind: how the present pass differs from a usual one, as text: edge, rest, cross, 30
+            degrees; null if it does not.
         keep_out: number of keep-out zones, with those of the configuration; a mask counts as one.
         keep_outs: the keep-out zones in force, without those of the configuration.
-        home: position the robot returns to; by default where the first order began since a reset.
+        home: position the robot returns to; by default where the first order after a reset began.
         tries: retries of cells left over.
-        unreached: part of the order that stays uncovered as things are.
+        unreached: part of the order that cannot be covered at present.
         waits_for_room: name of the room that the order waits for; null for none.
         left_out: rooms that the order for everything leaves out, by their settings.
         time_left_s: time until the order ends with the robot at home [s]; null without a limit.
-        first_from: priority from which on floor is planned now, as time or battery do not allow
-            all; null while all is.
+        first_from: least priority of the floor that is planned now, if time or battery do not
+            suffice for all; null otherwise.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None

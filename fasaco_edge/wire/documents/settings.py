@@ -23,7 +23,7 @@ class RobotSettings(Document, frozen=True):
 
 
 class PlannerSettings(Document, frozen=True):
-    """The form of path that the robot is given."""
+    """The form of the published path."""
 
     line: str = "cells"
 
@@ -74,7 +74,7 @@ class RosSettings(Document, frozen=True):
 
 
 class FleetSettings(Document, frozen=True):
-    """Name of the fleet, "" without one; pose of the map's origin in its frame [m], [deg]."""
+    """Name of the fleet, "" without one; pose of the map's origin in the fleet's frame."""
 
     name: str = ""
     x_m: Coordinate = 0.0
