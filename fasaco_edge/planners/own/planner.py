@@ -1,4 +1,4 @@
-"""Planner of the user's own, as planners of the registry are called."""
+"""Planner of the user's own, with the interface of the registry's planners."""
 
 from __future__ import annotations
 
