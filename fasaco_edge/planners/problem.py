@@ -176,7 +176,7 @@ class CoverageProblem:
         return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
     def cost_us(self, walk: NDArray[np.int32], framed: FramedGround | None = None) -> int:
-        """Return the price [us] of a walk, int32 (n,): flat indices, or those of ``framed``."""
+        """Return the price [us] of a walk, int32 (n,), flat indices; framed ones if ``framed``."""
         cost = self.cost
         price_us = int(walk_cost(walk, cost.step_us, cost.quarter_turn_us)) + self._added_us(walk)
         if self.rooms is not None:

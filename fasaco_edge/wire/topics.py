@@ -76,8 +76,8 @@ BATTERY = Topic(
 KEEP_OUT_MASK = Topic(
     name="keep_out_mask",
     direction="in",
-    when="areas that the robot must not touch are new, or have changed; only where the "
-    "configuration says `mission.keep_out_topic`",
+    when="the areas that the robot must not touch have changed; only if the configuration has "
+    "`mission.keep_out_topic`",
     speaker="mapper",
     listeners=("robot",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -224,8 +224,8 @@ COMMAND = Topic(
 TURNS = Topic(
     name="turns",
     direction="out",
-    when="the loop has run, twice a second at most; only while a subscriber gets it from the first "
-    "cycle on",
+    when="the loop has run, twice a second at most; only for a subscriber that gets it from the "
+    "first cycle on",
     speaker="robot",
     listeners=("recorder",),
     json="turns.json",

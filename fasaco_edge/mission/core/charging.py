@@ -55,7 +55,7 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.received_at = float("-inf")
-        # Time of the last message; time of the last accepted level, at first that of the beginning.
+        # Time of the last message; time since which no level was accepted.
         self._noted_at = float("-inf")
         self._accepted_at: float | None = None
         # A level not accepted yet, and the time of its first report.
@@ -236,7 +236,7 @@ class Charging:
 
     @property
     def may_work_s(self) -> float:
-        """How long the robot may go on from here until it has to go and charge [s]."""
+        """How long the robot may work from here until it has to go to charge [s]."""
         level, drain = self.gauge.level, self.gauge.drain_per_s
         if self.policy is None or level is None or not drain:
             return float("inf")

@@ -34,7 +34,7 @@ SAME_DEG, PLENTY_M = 1.5, 15.0
 LEAST_ROTATION_DEG = 2.0
 # Distance driven between estimates [m]; limit on the number of estimates.
 BETWEEN_M, MOST_LOOKS = 1.0, 40
-# Distance between poses that is a jump [m]; estimates on maps with more pixels take too long.
+# Distance between poses that is a jump [m]; limit on a map's pixels, as estimates take long.
 JUMP_M, MOST_PIXELS = 1.0, 4_000_000
 
 
@@ -142,7 +142,8 @@ class LatticeLayout:
         return True
 
     def changes_for_pass(self, lay: Laid, grid: OccupancyGrid) -> bool:
-        """Return whether angle or edge change to those of the lanes of a pass on the newest map."""
+        """Change angle and edge to those of a pass's lanes, if they fit the newest map; return
+        whether that changes any."""
         deg = lay.angle_deg
         if self._resumed_deg is not None and self._resumed_deg == deg:
             # The ledger's angle was that of the pass; the usual one is not known.

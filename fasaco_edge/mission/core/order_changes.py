@@ -61,7 +61,7 @@ class OrderChanges:
         self.update_area()
 
     def _keep_out(self, order: OrderState) -> None:
-        """Keep out of all areas under an order."""
+        """Apply the keep-outs of the configuration and of an order."""
         ordered = order.order.keep_out if order.order else ()
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:

@@ -95,7 +95,7 @@ class Standing:
 
     @property
     def is_beside_path(self) -> bool:
-        """Whether the robot stands in another cell than that of its index on the path."""
+        """Whether the robot stands in a cell that is not its place on the path."""
         ahead = self._route.path.ahead
         is_beside = len(ahead) > 1 and self._cell != tuple(ahead[0].tolist())
         has_path_s = self._now - self._route.published_at

@@ -27,7 +27,7 @@ class Piece:
 
     Attributes:
         line: the piece, as in the new line.
-        begin: index of its first point in the previous line, or of its last point if ``backward``.
+        begin: lowest index of its points in the previous line.
         backward: whether the direction is reversed.
     """
 
@@ -61,7 +61,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
             turned = Line(part.points[::-1], cells, part.state[::-1])
             pieces.append(Piece(turned, first, backward=True))
         else:
-            # If both begin together, include the point behind the robot.
+            # If both walks begin with this run, include the point behind the robot.
             first = 0 if begin == origin == 0 else line.before(origin + 1)
             last = line.before(origin + steps)
             pieces.append(Piece(line.part(first, last).renumbered(begin - origin), first))

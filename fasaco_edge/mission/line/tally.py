@@ -121,8 +121,8 @@ class SweepTally:
     def pass_line(self, points: NDArray[np.float64]) -> None:
         """Note that the robot has passed a part of its line, float64 (n, 2), y, x [pixels].
 
-        Whether it swept the floor there is known only from poses, later. The robot does not return
-        for the rest before the end of its path, as a detour seldom makes poses show it as swept.
+        Poses show later whether it swept the floor there. The robot does not return for the rest
+        before the end of its path, as poses after a detour seldom show more.
         """
         self._open_pixels -= pass_line(self.sweeps, self._state, points, self._tool, self._scratch)
         (row0, col0), (row1, col1) = points.min(axis=0), points.max(axis=0)

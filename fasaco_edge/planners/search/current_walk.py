@@ -84,7 +84,7 @@ class CurrentWalk:
         return min(self.best_us, self.windows.best_us)
 
     def progress(self) -> tuple[int, int]:
-        """Return cost [us] and steps of the best walk, as far as known.
+        """Return cost [us] and steps of the best walk.
 
         A region's gain counts before it is put back, unless turns cost and the region has a border,
         whose turns are known only afterwards.

@@ -103,7 +103,7 @@ def _rules(problem: CoverageProblem, config: ColonyConfig) -> AntRules:
 def powers_of_turns(cost: CoverageCost, beta: float) -> NDArray[np.float64]:
     """Return eta ** beta of equation (5) by the quarter-turns of a move, float64 (5,).
 
-    Eta is the seconds of a step over those of the move with its turns.
+    Eta is the duration of a step divided by the duration of the move with its turns.
     """
     move_s = cost.step_s + np.arange(MOST_QUARTERS + 1) * cost.quarter_turn_s
     eta = cost.step_s / move_s

@@ -76,11 +76,11 @@ class FloorReport(Document, frozen=True):
 
     Attributes:
         swept_m2: floor that the tool has passed over, reachable now or not.
-        reachable_m2: floor that the tool can reach and has to sweep, as far as known; while the
-            robot is shut in, what it could reach since the order began; null if the robot drives
-            through the centres of cells.
+        reachable_m2: known floor that the tool can reach and has to sweep; for a robot that is shut
+            in, floor that it could reach since the order began; null if the robot drives through
+            the centres of cells.
         left: unswept part of that by reason, the largest first; null if unknown.
-        out_of_reach: floor that the map shows free and the tool cannot reach, part of the order or
+        out_of_reach: free floor on the map that the tool cannot reach, whether part of the order or
             not, by reason, the largest first; null if unknown.
         possible_m2: floor that the tool would reach if walls and furniture were a pixel thinner
             than on the map; null before the end of an order, or if unknown.
