@@ -12,9 +12,8 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.wire.documents.json_text import OF_JSON, Document
+from fasaco_edge.wire.documents.json_text import OF_JSON, Coordinate, Document, Text
 from fasaco_edge.wire.limits import (
-    MAX_COORDINATE_M,
     MAX_FLEET_INDEX,
     MAX_FLEET_PARTS,
     MAX_FLEET_POINTS,
@@ -30,10 +29,8 @@ TILE: Final = 64
 TILE_BYTES: Final = TILE * TILE // 8
 MOST_TILE_INDEX: Final = MAX_FLEET_INDEX // TILE
 
-Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
 Point = tuple[Coordinate, Coordinate]
 Angle = Annotated[float, Meta(ge=-360, le=360)]
-Text = Annotated[str, Meta(max_length=256)]
 Named = Annotated[str, Meta(min_length=1, max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]

@@ -20,10 +20,12 @@ from msgspec import UNSET, Meta
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.limits import (
+    MAX_COORDINATE_M,
     MAX_JSON_BYTES,
     MAX_JSON_DEPTH,
     MAX_JSON_INTEGER,
     MAX_JSON_NUMBER,
+    MAX_STRING_BYTES,
 )
 
 # A tolerant reader cuts texts at this length.
@@ -46,6 +48,10 @@ Count = Annotated[int, Meta(ge=0, extra_json_schema={"minimum": 0})]
 Ordinal = Annotated[int, Meta(ge=1, extra_json_schema={"minimum": 1})]
 Amount = Annotated[float, Meta(ge=0, extra_json_schema={"minimum": 0})]
 Name = Annotated[str, allowed(minLength=1)]
+Text = Annotated[str, Meta(max_length=MAX_STRING_BYTES)]
+ZenohId = Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")]
+Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Corners = Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)]
 
 
 class Document(msgspec.Struct, frozen=True):

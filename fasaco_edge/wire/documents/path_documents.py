@@ -5,7 +5,15 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING, Annotated, Self
 
-from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal, allowed
+from fasaco_edge.wire.documents.json_text import (
+    Amount,
+    Count,
+    Document,
+    Name,
+    Ordinal,
+    ZenohId,
+    allowed,
+)
 
 if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath
@@ -129,7 +137,7 @@ class PathAttachment(PlanFigures, frozen=True):
         speed_m_s: speed to drive it at, below the robot's usual one [m/s]; null for that.
     """
 
-    daemon: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
+    daemon: ZenohId = ""
     revision: Count = 0
     map_stamp_ns: int = 0
     map_revision: Count = 0

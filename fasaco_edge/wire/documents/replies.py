@@ -10,6 +10,7 @@ from msgspec import Meta
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.wire.documents.json_text import (
     Amount,
+    Corners,
     Count,
     Document,
     Name,
@@ -115,7 +116,7 @@ class ZoneReport(Document, frozen=True):
     pass_number: Count = msgspec.field(name="pass", default=0)
     cells: Count = 0
     covered: Count = 0
-    polygon: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    polygon: Corners = ()
 
 
 class UnreachedArea(Document, frozen=True):
@@ -151,7 +152,7 @@ class KeepOutReport(Document, frozen=True):
     """
 
     name: str = ""
-    polygon: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    polygon: Corners = ()
     by: Annotated[str, allowed(enum=("operator", "order"))] = "operator"
 
 

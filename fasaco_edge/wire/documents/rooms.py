@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Ordinal, allowed
+from fasaco_edge.wire.documents.json_text import Amount, Corners, Count, Document, Ordinal, allowed
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
 
 # A polygon of fewer corners has no inside.
@@ -35,7 +35,7 @@ class RoomReport(Document, frozen=True):
 
     id: Ordinal = 1
     name: str = ""
-    outline: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    outline: Corners = ()
     area_m2: Amount = 0.0
     neighbours: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
     encloses: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()

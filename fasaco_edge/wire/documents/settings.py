@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fasaco_edge.wire.documents.fleet import Angle, Coordinate
-from fasaco_edge.wire.documents.json_text import Document, tolerant
+from fasaco_edge.wire.documents.fleet import Angle
+from fasaco_edge.wire.documents.json_text import Coordinate, Corners, Document, tolerant
 
 Settings = dict[str, object]
 """The configuration in force, without secrets, by sections."""
@@ -39,9 +39,6 @@ class PoseSettings(Document, frozen=True):
     """The message type of poses whose samples name none."""
 
     schema: str = ""
-
-
-Corners = tuple[tuple[float, float], ...]
 
 
 class ZoneSettings(Document, frozen=True):
