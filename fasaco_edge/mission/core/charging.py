@@ -16,7 +16,7 @@ import numpy as np
 from fasaco_edge.mission.config import BatteryPolicy, MissionConfig
 from fasaco_edge.mission.core.events import BatteryReceived
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.time_limit import LOOK_EVERY_S, SPARE, Lapse, seconds_back
+from fasaco_edge.mission.core.time_limit import LINE_FACTOR, LOOK_EVERY_S, Lapse, seconds_back
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -30,7 +30,7 @@ STEP, LEAST_S = 0.01, 10.0
 # The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
 # Least difference between the level at which the robot turns back and the one at which it resumes.
-BETWEEN = 0.1
+HYSTERESIS = 0.1
 # Number of unknown cells assumed beyond each cell at the border of the map, to estimate the rest.
 BEYOND_CELLS = 20
 # A robot near its dock may go to charge up to this much above the level at which it turns back;
@@ -39,7 +39,7 @@ EARLY, PLACES_AHEAD = 0.2, 8
 # Largest lattice on which these places are compared [cells]: it takes too long on larger ones.
 MOST_CELLS = 200_000
 # The battery counts as full once its level has risen by less than RISE for this long [s].
-RISE, ALL_AFTER_S = 0.005, 1800.0
+RISE, FULL_AFTER_S = 0.005, 1800.0
 
 
 class BatteryGauge:
@@ -137,9 +137,9 @@ class Charging:
     _is_best_here: bool = field(default=False, init=False)
     # The highest level since the robot entered its dock, and its time; None outside the dock.
     _best: tuple[float, float] | None = field(default=None, init=False)
-    # The level of turning back when the robot went to charge; the level at which the battery last
-    # stopped charging, None if that was high enough to resume.
+    # ``turns_back_at`` when the robot last went to charge.
     _turned_at: float = field(default=0.0, init=False)
+    # The level at which the battery last stopped charging; None if it sufficed to resume.
     _most: float | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -221,8 +221,8 @@ class Charging:
         low, drain = self.policy.low, self.gauge.drain_per_s
         if drain is None:
             return low
-        needed = self.policy.reserve + drain * SPARE * self._to_dock_s
-        return min(max(low, needed), self.policy.enough - BETWEEN)
+        needed = self.policy.reserve + drain * LINE_FACTOR * self._to_dock_s
+        return min(max(low, needed), self.policy.enough - HYSTERESIS)
 
     @property
     def goes_on_at(self) -> float:
@@ -231,8 +231,8 @@ class Charging:
         policy, drain = self.policy, self.gauge.drain_per_s
         if drain is None or self._rest_s is None:
             return policy.enough
-        needed = max(policy.low, policy.reserve) + drain * SPARE * self._rest_s
-        return min(policy.enough, max(needed, policy.low + BETWEEN))
+        needed = max(policy.low, policy.reserve) + drain * LINE_FACTOR * self._rest_s
+        return min(policy.enough, max(needed, policy.low + HYSTERESIS))
 
     @property
     def may_work_s(self) -> float:
@@ -254,12 +254,12 @@ class Charging:
             self._best = level, now
         # Some batteries report full, others only stop rising.
         power, waited_s = self.gauge.power, now - self._best[1]
-        is_all = power == "full" or (power != "discharging" and waited_s >= ALL_AFTER_S)
+        is_full = power == "full" or (power != "discharging" and waited_s >= FULL_AFTER_S)
         is_charged = level >= self.goes_on_at
         # From a lower level it would soon return.
-        least = max(self.policy.low, self._turned_at) + BETWEEN
-        self._most = level if is_all and not is_charged else None
-        return is_charged or (is_all and level >= least)
+        least = max(self.policy.low, self._turned_at) + HYSTERESIS
+        self._most = level if is_full and not is_charged else None
+        return is_charged or (is_full and level >= least)
 
     def why(self, now: float) -> str:
         """Return why a robot waits in its dock."""

@@ -18,7 +18,7 @@ from fasaco_edge.planners.walk_before import HELD_CELLS
 # Retry period after a failed plan [s].
 BROKEN_S = 30.0
 # Reason of a request for a better path.
-SPARE = "spare time"
+SPARE_TIME = "spare time"
 # Longest time of an attempt: by repairs, and by a search of the whole rest [s].
 REPAIR_S, SEARCH_S = 0.05, 0.3
 # A path is replaced only if that saves this many steps and this share of the rest.
@@ -220,7 +220,7 @@ class PlanRequests:
 
     def _request_attempt(self, attempt: Attempt) -> PlanRequest:
         self._attempt = attempt
-        return self._request(attempt.problem, SPARE)
+        return self._request(attempt.problem, SPARE_TIME)
 
     def _request(
         self, problem: CoverageProblem, reason: str, changed: Window | None = None

@@ -42,8 +42,8 @@ class Standing:
         self._entered_at = 0.0
         # The robot's position, to within STANDING_M.
         self._place = math.inf, math.inf
-        # Time since which the robot has had a path there, or got it again: by our clock, and by the
-        # robot's [ns]. Any time without a path is added to it.
+        # When it got a path there, or got it again, by our clock, and by the robot's [ns]; moved on
+        # by any time without a path.
         self._since = 0.0, 0
         # The last time that it had a path to drive there, by both clocks.
         self._had_path = 0.0, 0
@@ -53,7 +53,7 @@ class Standing:
         self._yaw, self._turned_at = 0.0, -math.inf
 
     def succeed(self, before: Standing) -> None:
-        """Take over the count of a predecessor, whose path was the robot's last one."""
+        """Take over a predecessor's count of the time and of the tries."""
         self._place, self._since, self._tries = before._place, before._since, before._tries
         self._had_path = before._had_path
 
@@ -160,7 +160,7 @@ class Standing:
 
 
 # A report is valid for this long, as the follower repeats it once a second.
-SHOWN_S = 3.0
+VALID_S = 3.0
 # Period of new paths for a follower that cannot join its path, or is blocked at an unknown place.
 AGAIN_S = 5.0
 
@@ -208,4 +208,4 @@ class BlockedFollower:
         return f"the robot cannot follow it: {report.detail}"
 
     def _report(self, now: float) -> FollowerBlocked | None:
-        return self._newest if now - self._at <= SHOWN_S else None
+        return self._newest if now - self._at <= VALID_S else None

@@ -18,15 +18,15 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # Period of estimates [s].
 LOOK_EVERY_S = 5.0
 # Factor on estimated times, as lines are longer than walks over cells.
-SPARE = 1.2
+LINE_FACTOR = 1.2
 # Largest ratio of simulated time to ours; if stamps advance faster, their clock was set.
-FASTEST = 30.0
+MOST_SPEED_UP = 30.0
 
 
 class Lapse:
     """Time since a look: the longer of the times by our clock and by the robot's stamps.
 
-    Simulated time may run up to ``FASTEST`` times as fast as ours, and stamps may stand still.
+    Simulated time may run ``MOST_SPEED_UP`` times as fast as ours, and stamps may stand still.
     """
 
     def __init__(self, map_state: MapState) -> None:
@@ -51,7 +51,7 @@ class Lapse:
         at, stamp_ns = self._since
         ours_s, newest_ns = now - at, self._stamp_ns
         theirs_s = 1e-9 * (newest_ns - stamp_ns) if stamp_ns and newest_ns else 0.0
-        return theirs_s if ours_s < theirs_s <= FASTEST * ours_s else ours_s
+        return theirs_s if ours_s < theirs_s <= MOST_SPEED_UP * ours_s else ours_s
 
     @property
     def _stamp_ns(self) -> int:
@@ -107,7 +107,7 @@ class TimeLimit:
         left_s = self.left_s
         if left_s is None:
             return float("inf")
-        return left_s - self._looked.seconds(now) - SPARE * self._to_home_s
+        return left_s - self._looked.seconds(now) - LINE_FACTOR * self._to_home_s
 
     def is_due(self, now: float) -> bool:
         """Return whether the robot has to turn home at ``now``; to be called in each step."""

@@ -25,7 +25,7 @@ from fasaco_edge.mission.map.map_state import MapState
 # Timeout of poses at rest, if longer than ``lost_pose_s``; timeout of the first map and pose [s].
 REST_S = 30.0
 # Time at a place that is impossible by the map, after which that is a trouble [s].
-INSIDE_S = 20.0
+IMPOSSIBLE_S = 20.0
 
 # States of a robot that drives, or soon will.
 DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
@@ -84,7 +84,7 @@ class Troubles:
     found: tuple[Trouble, ...] = field(default=(), init=False)
     _current: DockCurrent = field(init=False)
     # The last time that the robot was at a possible place, or at rest [s].
-    _inside_since: float = field(default=math.inf, init=False)
+    _possible_at: float = field(default=math.inf, init=False)
 
     def __post_init__(self) -> None:
         self._current = DockCurrent(self.charging.gauge)
@@ -159,10 +159,10 @@ class Troubles:
         """Return what shuts the robot in, or why its place has long been impossible; else ""."""
         why = self.way_out.why
         if self.map.area is not None or not why:
-            self._inside_since = now
+            self._possible_at = now
             return why
-        self._inside_since = min(self._inside_since, now)
-        return f"{why}: pose or map is off" if now - self._inside_since > INSIDE_S else ""
+        self._possible_at = min(self._possible_at, now)
+        return f"{why}: pose or map is off" if now - self._possible_at > IMPOSSIBLE_S else ""
 
     def stands(self, _: State, now: float) -> str:
         """Return the evidence that the robot is stuck; "" for none, as without poses."""

@@ -33,7 +33,7 @@ LEAST_LEFT_M2 = 0.04
 # this much [s]; width of the rim [m]; number of kept cells that are checked when the robot passes a
 # cell. The robot does not return to them: for four robots that took a tenth more time, for 0.1 % of
 # the floor.
-WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
+WORTH_S, RIM_M, CHECKED_CELLS = 4.0, 0.1, 24
 # The robot returns for missed floor if that is more than this share of the floor asked for: a base
 # that drives beside its line misses more, and so do poses at a low rate. To return for less took an
 # eighth more time, for 0.3 % of the floor, on the map of a real scan matcher.
@@ -188,7 +188,7 @@ class FloorLeft:
         assert floor is not None
         for row, col in passed.tolist():
             kept.note((row, col))
-        for cell in kept.next(LOOKED_AT) if len(passed) else ():
+        for cell in kept.next(CHECKED_CELLS) if len(passed) else ():
             if tally.open_in_m2(floor.box_of(cell, RIM_M)) < self._worth_m2:
                 kept.drop(cell)
 

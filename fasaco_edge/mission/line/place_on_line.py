@@ -32,7 +32,7 @@ LOOK_AHEAD_M = 0.8
 ARRIVED_M, STANDING_POSES = 0.05, 10
 # Cosine of the largest angle between the edge and the heading of a robot that cannot turn on the
 # spot: its curve may cross itself within the searched distance.
-ALONG = math.cos(math.radians(40.0))
+LEAST_COSINE = math.cos(math.radians(40.0))
 
 # Spacing of the samples of the offset, their least distance from corners, and the distance between
 # two poses that is a jump [m].
@@ -134,7 +134,9 @@ class PlaceOnLine:
             share = float(np.dot(self.here - points[number], edge)) / length**2
             share = min(max(share, low), high)
             apart = math.hypot(*(points[number] + share * edge - self.here))
-            is_across = along is not None and abs(float(np.dot(edge, along))) < ALONG * length
+            is_across = (
+                along is not None and abs(float(np.dot(edge, along))) < LEAST_COSINE * length
+            )
             if apart < nearest - 1e-6 and (number == 0 or not is_across):
                 nearest, at = apart, (number, share)
             look -= (high - low) * length

@@ -31,7 +31,7 @@ DUE_M, DUE_S, PATIENCE_S = 2.0, 1.0, 1.0
 # Length of the published line ahead of the robot that is no longer polished [m].
 HELD_M = 4.0
 # Number of points compared; they reach farther than HELD_M.
-SEEN_POINTS = 128
+COMPARED_POINTS = 128
 # Points within this distance are the same [m]: a change of the raster rounds their coordinates.
 SAME_M = 1e-3
 NONE: NDArray[np.float64] = np.empty((0, 2))
@@ -57,15 +57,15 @@ class PublishedLine:
         self._due_since = math.inf
 
     def look(self, xy: Points) -> None:
-        """Compare the line from the robot on, float64 (n, 2): x, y [m]; its first ``SEEN_POINTS``
-        points suffice."""
-        ahead, known = xy[1:SEEN_POINTS], self._xy[self._next :]
+        """Compare the line from the robot on, float64 (n, 2): x, y [m]; its first
+        ``COMPARED_POINTS`` points suffice."""
+        ahead, known = xy[1:COMPARED_POINTS], self._xy[self._next :]
         self._common, self.differs_m = 0, 0.0
         if len(xy) and len(self._xy) and not len(ahead) and not len(known):
             self.differs_m = math.inf  # both end where the robot is
         if not len(ahead) or not len(known):
             return
-        at = np.flatnonzero(_are_same(known[:SEEN_POINTS], ahead[0]))
+        at = np.flatnonzero(_are_same(known[:COMPARED_POINTS], ahead[0]))
         if not len(at):
             return
         self._next += int(at[0])
@@ -73,7 +73,7 @@ class PublishedLine:
         most = min(len(known), len(ahead))
         same = _are_same(known[:most], ahead[:most])
         self._common = most if same.all() else int(np.argmin(same))
-        ends_alike = len(known) == len(ahead) or len(xy) > SEEN_POINTS
+        ends_alike = len(known) == len(ahead) or len(xy) > COMPARED_POINTS
         if self._common == len(ahead) and ends_alike:
             self.differs_m = math.inf
         else:
@@ -109,14 +109,14 @@ class PublishedLine:
 
     def _near(self) -> Points:
         """Return the points of the next metre of the published line."""
-        rest = self._xy[self._next :][:SEEN_POINTS]
+        rest = self._xy[self._next :][:COMPARED_POINTS]
         ways = np.hypot(*np.diff(rest, axis=0).T) if len(rest) > 1 else np.empty(0)
         return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 2]
 
     def take(self, xy: Points, polished: int) -> None:
         """Note that a line is published, and the number of its polished points."""
         self._xy, self._next, self._due_since = xy, 1, math.inf
-        ways = np.hypot(*np.diff(xy[:SEEN_POINTS], axis=0).T) if len(xy) > 1 else np.empty(0)
+        ways = np.hypot(*np.diff(xy[:COMPARED_POINTS], axis=0).T) if len(xy) > 1 else np.empty(0)
         held = int(np.searchsorted(np.cumsum(ways), HELD_M)) + 1
         self._last_held = min(held, polished - 1)
         self._common, self.differs_m = max(len(xy) - 1, 0), math.inf
@@ -154,7 +154,7 @@ class Publication:
 
     def look(self, ahead: LineAhead) -> int:
         """Compare the line with the published one; return how many of its points are held."""
-        self._line.look(ahead.next_xy(SEEN_POINTS))
+        self._line.look(ahead.next_xy(COMPARED_POINTS))
         return self._line.held
 
     @property

@@ -28,7 +28,7 @@ from fasaco_edge.mission.line.polyline import Points
 
 # A straight part of a way leads at most this many points ahead: corners of the walk, so that it can
 # cross a hall.
-MOST_SKIPPED = 40
+MOST_SPANNED = 40
 # Margin of a detour around its ends [m]; greatest distance from an end to a free pixel [pixels].
 DETOUR_M, BESIDE_PX = 2.0, 2.0
 # A robot nearer to an obstacle than this share of its radius has a wrong pose.
@@ -36,7 +36,7 @@ LEAST_SHARE = 0.5
 # A lead-out ends at one of this many nearest places where the disc fits.
 NEAREST_PLACES = 64
 # Precision of a radius [pixels].
-RADIUS_PX = 0.125
+RADIUS_ERROR_PX = 0.125
 
 
 def is_clear_between(floor: FloorMap, a: Points, b: Points, radius: float | None = None) -> bool:
@@ -113,7 +113,7 @@ def shortened(
     kept, last = [0], len(points) - 1
     while kept[-1] < last:
         at = kept[-1]
-        farthest = min(at + MOST_SKIPPED, last)
+        farthest = min(at + MOST_SPANNED, last)
         while farthest > at + 1 and not may_skip(points[at], points[farthest]):
             farthest -= 1
         kept.append(farthest)
@@ -204,7 +204,7 @@ def fitting_radius(floor: FloorMap, here: Points) -> float:
     if is_clear_between(floor, here, here):
         return most
     fits, too_large = 0.0, most
-    while too_large - fits > RADIUS_PX:
+    while too_large - fits > RADIUS_ERROR_PX:
         middle = (fits + too_large) / 2
         if is_clear_between(floor, here, here, middle):
             fits = middle

@@ -92,7 +92,7 @@ def decode_json(payload: bytes) -> dict[str, object]:
 
 
 def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
-    """Return the JSON object in ``payload`` as values of ``kind``.
+    """Return the JSON object in ``payload`` as a struct of type ``kind``.
 
     Raises:
         MalformedMessage: it is no JSON object, or a member is missing or of another type.
@@ -120,8 +120,8 @@ def tolerant(document: Mapping[str, object], kind: type[Struct]) -> Struct:
     Raises:
         TypeError: a member without a default is missing, or does not fit.
     """
-    # Nearly all documents fit as a whole, which is much faster than member by member. Only unknown
-    # members are nested too deeply for that.
+    # Nearly all documents fit as a whole, which is much faster than member by member. A document
+    # may be nested too deeply for that, in unknown members.
     with suppress(msgspec.ValidationError, RecursionError):
         if _is_within_bounds(document):
             return msgspec.convert(document, kind)
