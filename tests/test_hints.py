@@ -105,7 +105,7 @@ def vector(name):
 @pytest.mark.parametrize(
     ("decode", "name", "hint"),
     [
-        (decode_battery, "battery_in_percent", "0 to 1: of a driver that gives percent"),
+        (decode_battery, "battery_in_percent", "0 to 1: divide a driver's percentage by 100"),
         (decode_occupancy_grid, "grid_resolution_kilometre", "in metres"),
         (decode_occupancy_grid, "grid_origin_far", "in metres"),
         (decode_occupancy_grid, "grid_origin_no_turn", "quaternion"),

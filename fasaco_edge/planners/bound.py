@@ -25,7 +25,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 GLANCE, THOROUGH = 80_000, 400_000
 FEWEST, MOST = 8, 300
 
-# On larger lattices turns are left out of the bound: prices take about 100 bytes per cell.
+# Largest lattice [cells] whose bound includes turns: prices take about 100 bytes per cell.
 MOST_CELLS = 250_000
 
 # Exponent of the decay of a price's step size, which begins at a quarter-turn's cost.

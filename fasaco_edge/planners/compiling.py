@@ -1,14 +1,13 @@
-"""The kernel compiler: a process that compiles what is missing, and goes on in a fresh one.
+"""Kernel compiler: a process that compiles missing kernels, and restarts once it has grown.
 
-A compiler keeps all that it has loaded, up to a gigabyte. So a process that needs kernels starts
-this process, waits for it, and loads the compiled kernels. This process holds the lock of the
-folder; once it has grown, it notes what is compiled and begins again as a fresh process. Kernels
-that are damaged, or that others could have written, count as missing.
+Compiling takes up to a gigabyte of memory that is never released. So a process that needs kernels
+starts this process, waits for it, and loads the compiled kernels. This process holds the lock of
+the folder; once it has grown, it records the compiled stages and continues as a fresh process.
+Kernels that are damaged, or that other users could have written, count as missing.
 
-A second process compiles stages that share few kernels with the others at the same time, in a
-folder of its own. One process alone writes the folder of the kernels, as numba's index of a
-function goes wrong where two write it: so the first moves the files of functions that it has not
-compiled itself, and compiles what is still missing.
+A second process compiles stages that share few kernels with the others at the same time, in its own
+folder, as two writers would damage numba's index of a function. When it has ended, the first
+process moves the files of functions that it has not compiled itself, and compiles the rest.
 """
 
 from __future__ import annotations
@@ -46,16 +45,15 @@ from fasaco_edge.planners.stages import APART, STAGES
 LOG = logging.getLogger(__name__)
 
 MODULE = "fasaco_edge.planners.compiling"
-# Memory at which it begins again if memory is short: with the daemon's 45 MB it fits the unit's
-# limit (MemoryHigh=); a fifth of it are pages of libraries, which are shared or which the system
-# reclaims. With plenty of memory it does not begin again, which would take a third of the time.
+# Memory of the process at which it restarts [MB], unless this much is available [MB]: restarts take
+# a third of the time. With the daemon's 45 MB it fits the unit's limit (MemoryHigh=), as a fifth of
+# it are pages of libraries, which are shared or reclaimed by the system.
 MOST_MB, PLENTY_MB = 270.0, 2000.0
-# Limit on fresh starts, of which 25 were measured: a disk that corrupts each file must not go on
-# for ever.
+# Limit on restarts, of which 25 are usual, for a disk that corrupts every file.
 MOST_RESTARTS = 300
-# Available memory from which two compilers run: each takes up to a gigabyte [MB].
+# Least available memory for two compilers, of up to a gigabyte each [MB].
 TWO_MB = 4000.0
-# In place of the count of restarts: a second compiler.
+# Argument in place of the count of restarts that starts a second compiler.
 APART_WORD = "apart"
 # Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"
@@ -64,7 +62,7 @@ REASON, STAGE, WARNING = "reason", "stage", "warning"
 def compile_missing(
     report: Callable[[str], None] = lambda _: None, stages: Collection[str] = STAGES
 ) -> None:
-    """Compile what is missing of some stages in another process, and wait for it.
+    """Compile the missing kernels of some stages in another process, and wait for it.
 
     Args:
         report: called with each stage's name before it begins.
@@ -89,14 +87,14 @@ def compile_missing(
 def warm_up(
     report: Callable[[str], None] = lambda _: None, stages: Collection[str] = STAGES
 ) -> None:
-    """Compile what is missing in a process of its own, then load kernels into this one.
+    """Compile missing kernels in another process, then load all kernels of stages into this one.
 
     Args:
         report: called with each stage's name before it begins.
-        stages: those whose kernels are needed.
+        stages: names of stages.
     """
     compile_missing(report, stages)
-    # After that: kernels come from the folder that was chosen when they are imported.
+    # Imported only now, as the import chooses the folder of the kernels.
     from fasaco_edge.kernels.jit import pack_loaded  # noqa: PLC0415
     from fasaco_edge.planners.warmup import TinyRoom, run_stage  # noqa: PLC0415
 
@@ -121,7 +119,7 @@ class CompilerProcess:
 
     @classmethod
     def start(cls, stages: Collection[str] = STAGES) -> CompilerProcess | None:
-        """Start it; None if nothing is missing, or if kernels would be lost, which is logged."""
+        """Start it; None if nothing is missing, or if no folder can keep kernels (logged)."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
             return None  # kernels are not compiled
         folder, why = chosen_folder(stages)
@@ -172,7 +170,7 @@ def _ended(code: int) -> str:
 
 
 def main() -> None:
-    """Compile what is missing into a folder: its path, how often this has begun, and the stages."""
+    """Compile missing kernels; arguments: the folder, the number of restarts, and the stages."""
     place, restarts, *stages = sys.argv[1:]
     folder = Path(place)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -276,9 +274,9 @@ class SecondCompiler:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def hand_over(self) -> None:
-        """Wait for its end, and move what it has compiled and the first compiler has not.
+        """Wait for its end, and move the files of functions that only it has compiled.
 
-        If it failed, nothing is moved: the first compiler compiles all.
+        If it failed, nothing is moved, and the first compiler compiles all functions.
 
         Raises:
             OSError: a file cannot be moved.
@@ -289,7 +287,7 @@ class SecondCompiler:
         there = {file.stem for file in self._target.glob("*.nbi")}
         for index in self._folder.glob("*.nbi"):
             if index.stem not in there:
-                # Code before the index that lists it.
+                # The code is moved before the index that lists it.
                 for file in (*self._folder.glob(f"{index.stem}.*.nbc"), index):
                     file.replace(self._target / file.name)
 

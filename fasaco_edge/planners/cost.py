@@ -1,8 +1,7 @@
 """Cost of a walk, in seconds for steps and quarter-turns; and counts of a search's work.
 
-A search that prefers lanes in one direction adds a price to each step across them, and one that
-prefers to finish a room to each step into another: walks then cost more than their seconds, and
-``seconds`` is the cost without these prices.
+A search may add a price to each step across preferred lanes, and to each step into another room.
+Walks then cost more than their seconds; ``seconds`` is the cost without these prices.
 """
 
 from __future__ import annotations
@@ -19,8 +18,8 @@ if TYPE_CHECKING:
     from typing import Self
 
 MICROSECONDS = 1_000_000
-# A step below a millisecond would lose precision in whole microseconds; the cost of a walk of 10^8
-# steps of an hour each still fits into 64 bits of microseconds.
+# Limits on times: whole microseconds are too coarse for a shorter step; the cost of a walk of 10^8
+# steps of an hour each fits into 64 bits.
 SHORTEST_STEP_S, LONGEST_S = 1e-3, 3600.0
 
 # Lanes along the rows of the lattice, along its columns, or in any direction.
@@ -99,12 +98,12 @@ class CoverageCost:
 
     @property
     def is_priced(self) -> bool:
-        """Whether steps cost more than their seconds."""
+        """Whether some steps cost more than their seconds."""
         return self.has_lanes or self.room_s > 0.0
 
     @property
     def room_us(self) -> int:
-        """What is added to a step into another room, in whole microseconds."""
+        """Price added to a step into another room, in whole microseconds."""
         return round(self.room_s * MICROSECONDS)
 
     @property
@@ -119,12 +118,12 @@ class CoverageCost:
 
     @property
     def row_us(self) -> int:
-        """What is added to a step along a row, in whole microseconds."""
+        """Price added to a step along a row, in whole microseconds."""
         return round(self.row_s * MICROSECONDS)
 
     @property
     def col_us(self) -> int:
-        """What is added to a step along a column, in whole microseconds."""
+        """Price added to a step along a column, in whole microseconds."""
         return round(self.col_s * MICROSECONDS)
 
     def quality(self, cells: int, cost_us: int) -> float:
@@ -180,7 +179,7 @@ class SearchWork:
     The wire contract calls perturbations ``kicks``.
 
     Attributes:
-        ants: number of ants that walked, and of sweeps that a search begins with.
+        ants: number of ants that walked, including the first walks of a search.
         perturbations: changes by which a local search left a local optimum, and windows that
             were solved again.
         proposals: moves that a local search tried.

@@ -1,4 +1,4 @@
-"""Driving of a robot with a turning radius; needs no compiler, so that configurations load fast."""
+"""Parameters of a robot with a turning radius; imports no numba, to load configurations fast."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ class CurveConfig:
 
     Attributes:
         radius_m: of its tightest arcs, above 0 [m].
-        reverses: whether it drives backward, too.
+        reverses: whether it can drive backward.
         speed_m_s, arc_m_s: on straights and on arcs [m/s].
         stop_s: additional time of a change between forward and backward [s].
         price_s_m2: value of sweeping a square metre [s/m2].

@@ -1,8 +1,8 @@
-"""Curve along a line: what a robot drives that cannot turn on the spot.
+"""Curve along a line, for a robot that cannot turn on the spot.
 
-The lanes of the line stay; what lies between two places on them is replaced by arcs and straights
-that keep to the robot's places, see ``kernels.floor.words``. Lanes are shortened, and short ones
-left out, where that is worth less than the time which it saves (``kernels.floor.curves``).
+The lanes of the line stay. Between two places on them, arcs and straights on free floor replace the
+line, see ``kernels.floor.words``. Lanes are shortened, and short ones left out, if their floor is
+worth less than the saved time (``kernels.floor.curves``).
 """
 
 from __future__ import annotations
@@ -27,31 +27,31 @@ from fasaco_edge.planners.line import NEAR_SHARE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-# Arcs are wider than the robot's tightest ones: its follower can steer back onto them.
+# Radius of the arcs [tightest radii]: larger, so that the follower can steer back onto them.
 MARGIN = 1.1
 # Distance of the places on a lane where arcs may begin and end [radii].
 SPACING = 0.2
-# How much of the line a word may replace, forward only and with reversing [radii], beside two of
-# the tool's widths; where no word fits, this many times as much.
+# Length of the line that a word may replace, forward only and with reversing [radii], in addition
+# to two of the tool's widths; factors of this length if no word fits.
 AHEAD_WINDOW, BOTH_WINDOW, WIDER = 6.0, 4.5, (2.0, 4.0, 8.0)
-# A turn on the spot counts as much as this [s]: no robot with a radius can drive it.
+# Cost of a turn on the spot [s], which a robot with a turning radius cannot drive.
 SPOT_S = 1000.0
-# Driving backward counts this many times its seconds.
+# Factor on the seconds of driving backward.
 BACKWARD = 2.0
-# A pixel is swept again if that is at least this further along the line [tool's widths].
+# Least distance along the line after which a pixel counts as swept again [tool's widths].
 AGAIN = 2.5
-# Directions in which a robot may start whose heading is not known.
+# Number of start directions of a robot whose heading is not known.
 HEADINGS = 8
 # Largest distance of the points of an arc [m].
 STEP_M = 0.05
-# A bend between two lanes up to this is steered; a larger one is an arc or, at worst, a turn on the
-# spot [rad].
+# Largest bend between two lanes that the robot steers; a larger bend becomes an arc or, at worst, a
+# turn on the spot [rad].
 STEERED_RAD = 0.02
-# Headings that differ by less are those of one straight [rad].
+# Largest difference of the headings along a straight [rad].
 TURNED_RAD = 1e-9
 # Poses of a curve are at least this far apart [m].
 LEAST_M = 1e-3
-# Decimals of points [m] and headings [rad]: those of another computer's sine are the same.
+# Decimals of points [m] and headings [rad], to which the sines of all computers agree.
 DECIMALS = 6
 
 
@@ -61,10 +61,10 @@ class Curve:
 
     Attributes:
         poses: float64 (n, 3), n >= 1: x, y [m] in the map frame, and the robot's heading [rad];
-            straight from one to the next.
-        is_backward: bool (n - 1,): which of these ways are driven backward.
-        legs: int64 (n,): number of the line's point before a pose on a straight of the line; below
-            0 for poses beside it.
+            straight segments join them.
+        is_backward: bool (n - 1,): whether each segment is driven backward.
+        legs: int64 (n,): index of the line's point before a pose on a straight of the line; below
+            0 for poses beside the line.
         spots: number of turns that do not fit, and stay on the spot.
     """
 
@@ -90,7 +90,7 @@ class Curve:
 
 
 class Ground(Protocol):
-    """Where the robot can be: a part of ``Floor``."""
+    """Places where the robot's disc fits: a part of ``Floor``."""
 
     @property
     def geometry(self) -> GridGeometry: ...
@@ -116,7 +116,7 @@ def curve_along(
     Args:
         line_xy: float64 (n, 2), n >= 1: x, y in the map frame [m], at places of the ground.
         ground: where the robot can be.
-        to_sweep: bool (rows, cols) of the ground's raster: the floor that is worth sweeping.
+        to_sweep: bool (rows, cols) of the ground's raster: the floor to sweep.
         config: the robot.
         start_yaw: its heading at the line's first point [rad]; None for any.
         is_end_fixed: whether the curve must end where the line does.
@@ -213,7 +213,7 @@ class _Search:
         )
 
     def _worth_s(self, points: Floats, way: Floats) -> Floats:
-        """Return the price of what the line sweeps from each point to the next one [s]."""
+        """Return the price of the floor that the line sweeps from each point to the next [s]."""
         if not len(points):
             return np.zeros(0)
         width, unit = self._base.width, self._floor.geometry.resolution
@@ -286,7 +286,7 @@ class _Search:
                     poses += points
                     legs += [-1] * len(points)
                     at = points[-1]
-            # Without rounding errors, and with the heading after a turn on the spot.
+            # The exact pose, with the heading after a turn on the spot.
             poses[-1], legs[-1] = self._pose(state), int(self._line.leg[state >> 1])
         drawn, is_backward = np.array(poses), np.array(backward, np.bool_)
         kept = _needed(drawn, is_backward, LEAST_M / self._floor.geometry.resolution)
@@ -297,8 +297,8 @@ class _Search:
     def _along(
         self, at: tuple[float, float, float], side: int, length: float
     ) -> list[tuple[float, float, float]]:
-        """Return the poses along a piece of a word, ``length`` [radii]; those of a straight are its
-        end alone."""
+        """Return the poses along a piece of a word, ``length`` [radii]; of a straight only its
+        end."""
         x, y, yaw = at
         step = STEP_M / self._floor.geometry.resolution
         parts = math.ceil(abs(length) * self._radius / step) if side else 1
@@ -325,7 +325,7 @@ class _Search:
 def _needed(poses: Floats, is_backward: NDArray[np.bool_], least: float) -> Ints:
     """Return the indices of poses that a curve needs, int64 (m,).
 
-    All but those within a straight, and those less than ``least`` from the one before.
+    Poses within a straight are left out, and those closer than ``least`` to the previous one.
     """
     turned = np.abs(np.remainder(np.diff(poses[:, 2]) + np.pi, 2.0 * np.pi) - np.pi) > TURNED_RAD
     is_bend = turned[:-1] | turned[1:] | (is_backward[:-1] != is_backward[1:])

@@ -1,4 +1,4 @@
-"""Input grids of planners, by name or file; start cells of walks and of simulated robots."""
+"""Grids for planners, by name or file; start cells of walks and of simulated robots."""
 
 from __future__ import annotations
 
@@ -19,11 +19,10 @@ def start_cell(lattice: CoverageLattice, map_file: Path, grid: OccupancyGrid | N
     """Return the default start of a plan.
 
     A built-in map has its own; otherwise it is the cell of the largest connected area that is
-    nearest to the map frame's origin. ``grid`` is the map below the lattice; None for a coverage
-    grid.
+    nearest to the map frame's origin. ``grid`` is the map of the lattice; None for a coverage grid.
 
     Raises:
-        NothingToCover: no cell is coverable; the error says whether the map or the robot is why.
+        NothingToCover: no cell is coverable, because of the map or of the robot.
         StartBlocked: a built-in map's own start is not on the lattice.
     """
     suggested = suggested_start(map_file)

@@ -30,28 +30,27 @@ from fasaco_edge.kernels.floor.sweeps import (
 )
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 
-# Floor farther from an edge than this causes no detour of that edge [m].
+# Greatest distance from an edge to floor for which the edge makes a detour [m].
 FARTHEST_M = 1.0
 # Least connected unswept area that counts as a patch [m2].
 PATCH_M2 = 0.04
-# Shares of all moves: descent comes first, with long moves that gain much; patches have moves of
-# their own.
+# Numbers of moves as shares of all moves: of the first descent, by long moves that gain much; of
+# patches, in addition.
 DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 # Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000
-# Temperatures of the first stage, and of each later one: a line that was cooled once keeps its
-# overall shape. Stages that double give the same results as one stage of their total length.
+# Temperatures of the first stage, and of each later one, at which a line keeps its overall shape.
+# Stages of doubled length give the same results as one stage of their total length.
 COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
-# Factors of the price of floor, if a share of it is asked for: after a line that sweeps too little,
-# after one that sweeps enough, and the limit of their product. There are few stages, as each takes
-# twice as long as the one before.
+# Factors of the price of floor if a share to sweep is asked for: after a line that sweeps too
+# little, after one that sweeps enough; limit of their product. They are large for few stages.
 RAISED, LOWERED, MOST_RAISED = 4.0, 0.7, 100.0
 # Moves per point of the line after which its parts are reordered once.
 MOVES_A_POINT = 48
 # Limit on the moves between two pauses: about a quarter of a second.
 MOVES_AT_ONCE = 1 << 17
-# Clearance is given up for a strip of floor that is wider than this share of the tool's width. In a
-# niche or a passage that strip is as wide as the tool; along a wall it is as wide as the clearance.
+# The line gives up its clearance for a strip of floor wider than this share of the tool's width.
+# The strip is as wide as the tool in a niche or a passage, and as the clearance along a wall.
 NEAR_SHARE = 0.2
 # Default turn durations.
 TURNING = proportional_turning(1.5)
@@ -124,17 +123,17 @@ class DrivenLine:
         self.xy.flags.writeable = False
 
     def cost_s(self, price_s_m2: float) -> float:
-        """Return what is minimised [s]: time to drive, and ``price_s_m2`` for floor left."""
+        """Return the objective [s]: driving time, and ``price_s_m2`` for unswept floor."""
         return self.seconds + price_s_m2 * (self.reachable_m2 - self.swept_m2)
 
 
 class LineSearch:
     """A running search for the line along a walk, in stages; the first is always completed.
 
-    Each later stage anneals the line again, twice as long as the one before. The line of the least
-    cost is kept, so along one walk a longer search is never worse than a shorter one. If a share of
-    the floor is asked for, that is the fastest line that sweeps it, or else the one that sweeps
-    most; the price of floor rises and falls from stage to stage accordingly.
+    Each later stage anneals the line again, twice as long as the previous one. The line of the
+    least cost is kept, so along one walk a longer search is never worse than a shorter one. If a
+    share of the floor is asked for, the kept line is the fastest that sweeps it, or else the line
+    that sweeps most; the price of floor is adapted from stage to stage.
 
     Attributes:
         best: the line kept; None until the first stage is over.
@@ -225,13 +224,13 @@ class LineSearch:
         return self._floor.reachable_m2 - int(np.count_nonzero(self._sweeps.counts == 0)) * unit**2
 
     def _missing_m2(self, swept_m2: float) -> float:
-        """Return how much floor a line sweeps too little [m2]; 0 if no share is asked for."""
+        """Return the floor missing from the share asked for [m2]; 0 if none is asked for."""
         least = self._config.swept or 0.0
         return max(least * self._floor.reachable_m2 - swept_m2, 0.0)
 
     @property
     def rank(self) -> tuple[float, float]:
-        """What is minimised: floor missing from the share asked for [m2], then the cost [s]."""
+        """The objective: floor missing from the share asked for [m2], then the cost [s]."""
         assert self.best is not None
         return self._rank(self.best)
 

@@ -1,7 +1,7 @@
 """Living trail: pheromone on every step of the lattice, kept during a whole mission.
 
-The ants of each plan and of each attempt in spare time start from it, and leave it as they have
-changed it to the next ones. The equations are those of Carr and Wang 2022:
+The ants of each plan, and of each attempt in spare time, start from it and change it for the next
+ones. The equations are those of Carr and Wang 2022:
 
 * equation (7), local update: by each ant (``kernels.ants``), and where the map has changed; a
   driven step loses half at once;
@@ -11,9 +11,10 @@ changed it to the next ones. The equations are those of Carr and Wang 2022:
 Delta phi = (distinct cells x step cost) / path cost, about 1 at best, as in
 ``planners.paper.fasaco``; a step that a path takes twice is strengthened once.
 
-A trail spans a window of cells of the map frame that follows the lattice's; new steps begin at
-tau0, removed steps vanish. The cost of an update depends on the path or the change. All is float32,
-value by value, so it is equal on every machine. Imports no numba, as the ledger holds a trail.
+A trail spans the lattice's window of cells; new steps begin at tau0, removed steps vanish. The time
+of an update depends on the length of the path or the size of the change. Values are float32 and
+computed one by one, so they are equal on every machine. Imports no numba, as the ledger holds a
+trail.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 
-# Pull of a driven step towards tau0: as much as equation (7) of about seven ants.
+# Pull of a driven step towards tau0: as much as equation (7) by about seven ants.
 DRIVEN = 0.5
 # A direction is within reach of the strongest if its pheromone is at least this share of the range
 # above the weakest: lambda of the mean branching factor (Gambardella and Dorigo 1995).

@@ -1,7 +1,7 @@
-"""Passes over a floor: which cells each one covers, and in which direction its lanes run.
+"""Passes over a floor: the cells that each covers, and the direction of its lanes.
 
-A direction is an angle of the lattice, and lanes along its rows or its columns: lanes across those
-of the pass before need no other lattice.
+The direction is the angle of the lattice, with lanes along its rows or its columns, so that lanes
+across those of the previous pass need no other lattice.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.planners.cost import ANY_LANES, COLUMNS, ROWS, Lanes
 
-# All cells; those along walls and furniture; the others.
+# All cells; the cells along walls and furniture; the other cells.
 Covers = Literal["all", "edge", "rest"]
-# Lanes as they are cheapest; across those of the pass before.
+# Lanes in the cheapest direction; across the lanes of the previous pass.
 Direction = Literal["auto", "cross"]
 MOST_PASSES = 100
 MOST_ANGLE_DEG = 360
@@ -49,7 +49,7 @@ class Pass:
 
     @property
     def name(self) -> str:
-        """What is special about it, as text; "" for nothing."""
+        """How it differs from a usual pass, as text; "" if it does not."""
         angle = "cross" if self.lanes == "cross" else ""
         if self.angle_deg is not None:
             angle = f"{self.angle_deg:g} degrees"
@@ -78,8 +78,8 @@ class Laid(NamedTuple):
 def lane_and_tool_m(tool_m: float, usual_lane_m: float, overlap: float) -> tuple[float, float]:
     """Return the distance of lanes that overlap, and the width of the tool to plan them with [m].
 
-    Where lanes are closer than usual, the tool is narrower as well: a line leaves out floor that is
-    swept already, so lanes of the same tool would be as far apart as usual.
+    If lanes are closer than usual, the planned tool is narrower as well: with the full width a line
+    would skip swept floor, and its lanes would be as far apart as usual.
 
     Args:
         tool_m: width of the tool [m].
@@ -93,7 +93,7 @@ def lane_and_tool_m(tool_m: float, usual_lane_m: float, overlap: float) -> tuple
 def laid(passes: Sequence[Pass]) -> list[Laid]:
     """Return passes on lattices.
 
-    Lanes that others are to cross run along the rows; an edge has no lanes to cross.
+    Lanes that a later pass crosses run along the rows; an edge has no lanes.
 
     Raises:
         BadConfiguration: see ``check_passes``.
@@ -116,16 +116,16 @@ def laid(passes: Sequence[Pass]) -> list[Laid]:
 
 
 def _is_crossed(after: Iterable[Pass]) -> bool:
-    """Return whether the first of some passes that has lanes crosses those before."""
+    """Return whether the first of some passes that has lanes crosses the previous lanes."""
     return next((each.lanes == "cross" for each in after if each.covers != "edge"), False)
 
 
 def check_passes(passes: Sequence[Pass], name: str = "passes") -> None:
-    """Check what a pass takes from those before it.
+    """Check passes against the previous ones.
 
     Raises:
-        BadConfiguration: there is no pass that it could cross, or leave cells to it; or the passes
-            are edges alone.
+        BadConfiguration: a cross pass has no lanes before it, or a rest pass no edge; options of a
+            pass exclude each other; or all passes are edges.
     """
     if not 1 <= len(passes) <= MOST_PASSES:
         raise BadConfiguration(f"{name} must be 1 to {MOST_PASSES}, got {len(passes)}")

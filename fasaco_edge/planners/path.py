@@ -18,12 +18,12 @@ FIRST_PIECE = 256
 
 
 class Saved(NamedTuple):
-    """Savings of a search against the walk that it began with [s].
+    """Savings of a search against its first walk [s].
 
     Attributes:
         ants: by walks of ants, including local search on these.
         local_search: by local search on the first walk, or on the rest of the previous walk.
-        by_velocity: what ``ants`` is the sum of: velocity of a cohort, and its savings.
+        by_velocity: ``ants`` by cohort: the velocity of each, and its savings.
     """
 
     ants: float = 0.0
@@ -62,9 +62,8 @@ class CoveragePath:
             unknown.
         lower_bound_cost_s: lower bound on the cost [s]; 0 if unknown.
         saved: savings of ants and of local search against the first walk.
-        trail: pheromone where ants have walked; None for planners without ants, or if none has.
-        first_walk_s: time to the first complete walk [s]: measured, so the only value that is
-            not reproduced.
+        trail: pheromone where ants have walked; None if no ant has walked.
+        first_walk_s: time to the first complete walk [s]; measured, so that it is not reproduced.
     """
 
     cells: NDArray[np.int32]
@@ -101,9 +100,8 @@ class WalkFigures:
         steps: steps, each to a neighbouring cell.
         revisits: ``steps + 1 - cells``, visits beyond each cell's first.
         recovered_cells: distinct cells visited at least twice (the definition in the paper's text).
-        n_r_paper: revisits of the walk closed by the shortest path home, nearest to the count of
-            Table I (entries less distinct cells, start to start); for comparison with that table
-            only.
+        n_r_paper: revisits of the walk with the shortest path home; only for comparison with Table
+            I, which counts entries minus distinct cells, from start to start.
         turns_90: quarter-turns between two steps.
         turns_180: reversals.
     """

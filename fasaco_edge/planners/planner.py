@@ -68,7 +68,7 @@ class TimeBudget:
 
 @dataclass(frozen=True, slots=True)
 class WorkLimit:
-    """Stops after the work of an earlier search, which reproduces its path."""
+    """Stops after the work of an earlier search, so that its path is reproduced."""
 
     work: SearchWork
 
@@ -88,10 +88,10 @@ class Interrupt:
 
 @dataclass(slots=True)
 class StopRecorder:
-    """Stops with another criterion, and records at which calls; ``StopAt`` reproduces that.
+    """Stops with another criterion, and records the calls that stop; ``StopAt`` repeats them.
 
-    The work of the path would not suffice: a stopped repair with little gain is followed by a
-    search, whose stops are recorded, too.
+    The work of a path does not suffice for that: after a stopped repair a search may follow, and be
+    stopped, too.
 
     Attributes:
         criterion: the other criterion.
@@ -112,7 +112,7 @@ class StopRecorder:
 
 @dataclass(slots=True)
 class StopAt:
-    """Stops at the calls that a ``StopRecorder`` recorded, which reproduces its path."""
+    """Stops at the calls that a ``StopRecorder`` recorded, so that the path is reproduced."""
 
     stops: Sequence[int]
     _calls: int = 0

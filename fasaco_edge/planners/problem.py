@@ -45,13 +45,12 @@ class CoverageProblem:
         cost: the cost to minimise.
         before: int32 (n, 2), the undriven rest of the previous walk; a repair keeps its valid
             parts. None for none.
-        is_full: whether to search everything, starting from ``before``, not only to repair.
-        attempt: number of an attempt to improve a valid ``before``, from 1: each looks at other
+        is_full: whether to search the whole walk, starting from ``before``, not only to repair it.
+        attempt: number of an attempt to improve a valid ``before``, from 1: each tries other
             places. 0 for a needed plan.
         trail: the mission's living trail, for planners whose ants start from it; None for none.
-        whole: the problem that this one is the end of, see ``after``: a path that solves this
-            one begins with the lead, and its figures are those of the whole. None for a problem
-            that is whole itself.
+        whole: the problem whose rest this one is, see ``after``; its path begins with the lead,
+            and has the figures of the whole problem. None for a whole problem.
         rooms: uint16 (rows, cols), the room of each cell, 0 for none; None without a price for
             steps from one room into another.
     """
@@ -177,7 +176,7 @@ class CoverageProblem:
         return np.column_stack((rows + window.row0, cols + window.col0)).astype(np.int32)
 
     def cost_us(self, walk: NDArray[np.int32], framed: FramedGround | None = None) -> int:
-        """Return the price of a walk [us], int32 (n,) of flat indices, or of ``framed`` ones."""
+        """Return the price [us] of a walk, int32 (n,), flat indices; framed ones if ``framed``."""
         cost = self.cost
         price_us = int(walk_cost(walk, cost.step_us, cost.quarter_turn_us)) + self._added_us(walk)
         if self.rooms is not None:
@@ -190,7 +189,7 @@ class CoverageProblem:
         return self.cost.of_walk_us(cells) + self._rooms_us(cells)
 
     def _rooms_us(self, cells: NDArray[np.int32]) -> int:
-        """Return what is added to the price of a walk's steps into other rooms [us]."""
+        """Return the prices added to a walk's steps into other rooms [us]."""
         if self.rooms is None:
             return 0
         rooms = self.lattice.window.values_at(self.rooms, cells, 0)
@@ -211,7 +210,7 @@ class CoverageProblem:
         return steps | (into & steps) << np.uint8(ROOM_BIT)
 
     def _added_us(self, walk: NDArray[np.int32]) -> int:
-        """Return what is added to the price of a walk's steps by their direction [us]."""
+        """Return the prices added to a walk's steps by their direction [us]."""
         cost, steps = self.cost, walk.size - 1
         if not cost.has_lanes:
             return 0

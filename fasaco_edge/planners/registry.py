@@ -1,8 +1,7 @@
 """Registry of planners, the only list of their names.
 
-A new planner is a factory in a module here, a row of ``PLANNERS`` and a test; configuration and
-command line take the names from here. Factories are imported on use, so that reading the names does
-not load numba.
+Configuration and command line take the names from here. Factories are imported on use, so that
+reading the names does not load numba.
 """
 
 from __future__ import annotations

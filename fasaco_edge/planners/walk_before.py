@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.local_search.repair import keep_legal, put_in_new
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 
-# Number of cells just ahead of the robot: about 5 m at usual tool widths.
+# Number of cells just ahead of the robot that are held: about 5 m at usual tool widths.
 HELD_CELLS = 18
 
 

@@ -1,4 +1,4 @@
-"""Warm-up: runs every kernel of a mission once on a tiny map, stage by stage."""
+"""Warm-up: one run of every kernel of a mission on a tiny map, stage by stage."""
 
 from __future__ import annotations
 

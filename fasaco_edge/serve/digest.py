@@ -14,11 +14,9 @@ from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.robot_state import RobotState
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.serve import plain
-from fasaco_edge.wire.documents.replies import (
-    FloorReport,
-    MissionReport,
-)
-from fasaco_edge.wire.documents.settings import Corners, KnownSettings, RobotSettings
+from fasaco_edge.wire.documents.json_text import Corners
+from fasaco_edge.wire.documents.replies import FloorReport, MissionReport
+from fasaco_edge.wire.documents.settings import KnownSettings, RobotSettings
 from fasaco_edge.wire.documents.status import DriveReport, FleetReport, Status
 from fasaco_edge.wire.reasons import plain as plain_words
 

@@ -20,13 +20,13 @@ MAX_RESOLUTION_M: Final = geometry.MAX_RESOLUTION_M
 """Edge of a grid's pixel, and of the cells of a fleet's robot [m]."""
 
 QUATERNION_TOLERANCE: Final = 0.01
-"""How far the norm of a quaternion may be from 1."""
+"""Largest deviation of a quaternion's norm from 1."""
 
 MAX_GRID_TILT: Final = 0.01
-"""Largest magnitude of the x and y of a grid's orientation: a map lies in the plane."""
+"""Largest magnitude of x and y in a grid's quaternion: a map lies in the plane."""
 
 MAX_TRANSFORM_TILT: Final = 0.2
-"""Largest magnitude of the x and y of the rotation between map and robot: a ramp of 23 degrees."""
+"""Largest magnitude of x and y in the quaternion between map and robot: a ramp of 23 degrees."""
 
 MAX_GRID_CELLS: Final = 64_000_000
 MAX_PATH_POSES: Final = 1_000_000
@@ -43,11 +43,11 @@ MAX_SCAN_SPAN_RAD: Final = 6.5
 
 MAX_JSON_BYTES: Final = 1_048_576
 MAX_JSON_DEPTH: Final = 32
-"""Levels of objects and arrays in a JSON document, the document itself one of them."""
+"""Levels of objects and arrays in a JSON document, including the document itself."""
 MAX_JSON_INTEGER: Final = 2**63 - 1
 """Largest magnitude of an integer in a JSON document."""
 MAX_JSON_NUMBER: Final = 1e15
-"""Largest magnitude of any other number in it."""
+"""Largest magnitude of any other number in a JSON document."""
 
 MAX_FLEET_TILES: Final = 24
 """Limit on the tiles of 64 x 64 cells in one progress message of a fleet's robot (17 kB), and in
@@ -63,4 +63,4 @@ MAX_BLOCKED_BYTES: Final = 16_384
 MAX_BLOCKED_POINTS: Final = 64
 """Limit on the points ahead of a robot in its report that it is blocked."""
 MAX_PRIORITY_BYTES: Final = 1_048_576
-"""Longest grid of priorities, of a byte a pixel: 250 m by 250 m of floor at 0.25 m."""
+"""Longest grid of priorities, one byte per pixel: 250 m by 250 m of floor at 0.25 m."""

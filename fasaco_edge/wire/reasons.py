@@ -1,6 +1,6 @@
-"""Plain words for reasons that a daemon publishes in words of its own.
+"""Plain words for the reasons in a daemon's published texts.
 
-The published texts stay as they are: a replay compares them with those of old recordings.
+The published texts do not change, as a replay compares them with those of old recordings.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ WORDS = {
 }
 # The recorder's word for a daemon that sends nothing.
 SILENT = "the planner is silent"
-# A mission's ending has it, too; where the swept floor is shown in full, ``possible`` says it.
+# Part of a mission's ending, left out: where the swept floor is shown, ``possible`` adds it.
 _POSSIBLE = re.compile(r", or of [\d.]+ m2 if walls are a pixel thinner than on the map")
 
 
-# "Every cell" beside "47 of 49 m2" would contradict itself: a cell counts by its centre.
+# "Every cell" would contradict "47 of 49 m2" beside it: a cell counts by its centre.
 _ALL_COVERED = re.compile(r"every reachable cell( of the zones)? is covered")
 
 
@@ -31,5 +31,5 @@ def plain(text: str) -> str:
 
 
 def possible(area: str) -> str:
-    """Return what could be reachable at most: ``area``, of floor."""
+    """Return a remark that the floor may have up to ``area``."""
     return f" (of {area} if the map shows walls too thick)"

@@ -8,8 +8,8 @@ eclipse-zenoh/zenoh-plugin-ros2dds at commit ebdb1e0 (``route_subscriber.rs``).
 Humble has no type hashes: it writes ``TypeHashNotSupported``, and does not match endpoints that
 send a type hash.
 
-An action is three services and two topics below ``<action>/_action``; rmw_zenoh and
-zenoh-bridge-ros2dds have no other notion of one. Sources: rcl_action of Jazzy (names),
+An action is three services and two topics below ``<action>/_action``, also for rmw_zenoh and
+zenoh-bridge-ros2dds. Sources: rcl_action of Jazzy (names),
 rmw_zenoh_cpp at commit 028bbe3 (``rmw_service_data.cpp``: attachment of a request; sequence numbers
 must not repeat), nav2_msgs of Humble, Iron, Jazzy and Lyrical. Hashes follow REP 2016; that of
 CancelGoal is also published.
@@ -42,13 +42,13 @@ TYPE_HASHES = {
     schemas.DIAGNOSTIC_ARRAY: "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
     schemas.PATH: "1957a5bb3cee5da65c4e52e52b65a93df227efce4c20f8458b36e73066ca334b",
 }
-"""For each type the hash of its definition, in hexadecimal, version 1 (REP 2016)."""
+"""Hash of each type's definition, in hexadecimal, version 1 (REP 2016)."""
 
 TRIGGER: Final = "std_srvs/srv/Trigger"
 SERVICE_HASHES = {
     TRIGGER: "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
 }
-"""The hashes of services: of request, response and event together."""
+"""Hash of each service, over request, response and event."""
 
 GID_BYTES = 16
 
@@ -113,13 +113,13 @@ class RosNode:
 
     @property
     def token(self) -> str:
-        """Liveliness token of the node: it is number 0 of its session."""
+        """Liveliness token of the node, number 0 of its session."""
         return f"{self._prefix(0)}/NN/{self._name}"
 
     def endpoint_token(self, number: int, kind: Endpoint, topic: RosTopic) -> str:
         """Return the liveliness token of a publisher (MP), a subscriber (MS) or a service (SS).
 
-        ``number`` is its own among those of the node, from 1 on.
+        ``number`` counts the node's endpoints, from 1.
         """
         what = f"{mangled(topic.name)}/{dds_type(topic.schema)}/{_type_hash(topic.schema)}"
         return f"{self._prefix(number)}/{kind}/{self._name}/{what}/{topic.qos}"
@@ -129,7 +129,7 @@ class RosNode:
 
     @property
     def _name(self) -> str:
-        """No security enclave, the namespace, the name."""
+        """Security enclave (none), namespace and name."""
         return f"{mangled('/')}/{mangled(self.namespace)}/{self.name}"
 
 
@@ -141,8 +141,8 @@ def graph_key(domain: int) -> str:
 def gid_of(token: str) -> bytes:
     """Return ``GID_BYTES`` bytes that are unique to a publisher's token.
 
-    rmw_zenoh uses XXH3 for that, and identifies publishers by it. A lookup of a sample's publisher
-    in the graph by gid does not find ours.
+    rmw_zenoh identifies publishers by the XXH3 of their tokens, so it does not find ours in the
+    graph by the gid of a sample.
     """
     # This module loads OpenSSL: three megabytes that a follower without ROS does not need.
     from hashlib import blake2b  # noqa: PLC0415
@@ -151,7 +151,7 @@ def gid_of(token: str) -> bytes:
 
 
 def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
-    """Return the attachment that rmw_zenoh demands with each sample.
+    """Return the attachment that rmw_zenoh requires with each sample.
 
     Args:
         sequence: number of the sample, from 1 on.

@@ -1,4 +1,4 @@
-"""Row types of the topic table, and quality of service."""
+"""Row types of the table of topics, and quality of service."""
 
 from __future__ import annotations
 
@@ -57,9 +57,8 @@ VOLATILE = Qos()
 class Queues(NamedTuple):
     """Queue lengths of a topic at each receiver of this package.
 
-    NEWEST: a newer sample replaces the one before. EVERY: as many as the receiver's memory holds;
-    the recorder keeps all until it is behind, then only the newest if it has NEWEST. None: that
-    receiver does not subscribe.
+    NEWEST: a newer sample replaces the previous one; the recorder drops samples so only when it is
+    behind. EVERY: limited only by the receiver's memory. None: that receiver does not subscribe.
     """
 
     daemon: int | None = None
@@ -146,9 +145,9 @@ class Query:
         json: JSON Schema of the reply; "" for none.
         payload: JSON Schema of the query's payload; "" for none.
         parameters: allowed parameters after ``?``.
-        answered: ``at once`` with the newest sample; by the ``loop`` once it has decided.
+        answered: ``at once``: with the newest sample; ``loop``: by the loop, with its decision.
         timeout_s: timeout of the reply [s].
-        errors: codes of errors beside ``bad_query``.
+        errors: codes of its errors, besides ``bad_query``.
     """
 
     name: str
@@ -178,7 +177,7 @@ class RosRow(NamedTuple):
 
     Attributes:
         name: its key under ``ros2.topics`` of the configuration.
-        topic: name it has in the daemon and in recordings.
+        topic: its name in the daemon and in recordings.
         direction: as seen by the planner.
         schemas: allowed message types.
         latched: transient local.

@@ -76,8 +76,8 @@ BATTERY = Topic(
 KEEP_OUT_MASK = Topic(
     name="keep_out_mask",
     direction="in",
-    when="areas that the robot must not touch are new, or have changed; only where the "
-    "configuration says `mission.keep_out_topic`",
+    when="the areas that the robot must not touch have changed; only if the configuration has "
+    "`mission.keep_out_topic`",
     speaker="mapper",
     listeners=("robot",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -130,7 +130,7 @@ PATH = Topic(
 COVERAGE = Topic(
     name="coverage",
     direction="out",
-    when="what is covered has changed, twice a second at most",
+    when="the coverage has changed, twice a second at most",
     speaker="robot",
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
@@ -224,8 +224,8 @@ COMMAND = Topic(
 TURNS = Topic(
     name="turns",
     direction="out",
-    when="the loop has run, twice a second at most; only while a subscriber gets it from the first "
-    "cycle on",
+    when="the loop has run, twice a second at most; only for a subscriber that gets it from the "
+    "first cycle on",
     speaker="robot",
     listeners=("recorder",),
     json="turns.json",
@@ -239,7 +239,7 @@ FLEET = Topic(
     direction="out",
     when="once a second, on change, and four times a second near another robot; only in a fleet",
     speaker="robot",
-    # Robots share an area by these messages; it is also received from the keys of other robots.
+    # Robots share an area by these messages: each subscribes to the keys of the others.
     listeners=("fleet", "viewer"),
     json="fleet.json",
     qos=Qos("data_low", why="the next one repeats all of it, within a second"),
@@ -329,13 +329,13 @@ DRIVER = Topic(
 
 TOPICS = tuple(each for each in tuple(globals().values()) if isinstance(each, Topic))
 """All rows, in the order of this file."""
-# The turn log last: once the daemon sees that subscriber, the recorder receives all else, too.
+# The turn log is last: once the daemon sees its subscriber, the recorder receives all others, too.
 RECORDED = (
     *(each for each in TOPICS if each.queues.recorder is not None and each is not TURNS),
     TURNS,
 )
-"""What a recorder subscribes to, in this order."""
-# Samples of these topics keep the order of their publisher: an update changes the map before it.
+"""Topics that a recorder subscribes to, in this order."""
+# Samples of these topics keep their publisher's order: an update changes the previous map.
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
@@ -412,7 +412,7 @@ def _queue_lengths() -> dict[str, int]:
 
 
 QUEUE_LENGTHS = _queue_lengths()
-"""Lengths of the daemon's queues of samples, in the order in which its loop takes these; commands
+"""Lengths of the daemon's queues, in the order in which its loop takes samples from them; commands
 come as queries."""
 
 RECORDED_INPUTS = (*(topic.name for topic in TOPICS if topic.is_input), TF_STATIC)

@@ -6,7 +6,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.config import BatteryPolicy, Dock
-from fasaco_edge.mission.core.charging import ALL_AFTER_S, BatteryGauge
+from fasaco_edge.mission.core.charging import FULL_AFTER_S, BatteryGauge
 from fasaco_edge.mission.core.events import BatteryReceived, PoseReceived, State
 from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
 from tests.mission.battery import AT_DOCK, WALLED, Battery
@@ -389,7 +389,7 @@ def test_a_battery_that_takes_no_more_is_enough():
     for _ in range(20):
         drive.go()
     assert drive.mission.state is State.CHARGING
-    drive.tell(pose_at(*drive.cell), after=ALL_AFTER_S + 10.0)
+    drive.tell(pose_at(*drive.cell), after=FULL_AFTER_S + 10.0)
     drive.go()
     assert drive.mission.state is not State.CHARGING
 

@@ -1,8 +1,8 @@
 """Charging: the accepted battery level, the drain per second of driving, and when to charge.
 
-A level that jumps is accepted only after consistent reports for ``HOLD_S``: one wrong message must
-not send the robot to its dock, nor away from it. The drain is the median over the last stretches of
-driving, so outliers (a steep first percent, a jump of the gauge) have no effect.
+A level that jumps is accepted only after consistent reports for ``HOLD_S``, so that one wrong
+message does not send the robot to its dock or away from it. The drain is the median over the last
+stretches of driving, so outliers (a steep first percent, a jump of the gauge) have no effect.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from fasaco_edge.mission.config import BatteryPolicy, MissionConfig
 from fasaco_edge.mission.core.events import BatteryReceived
 from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.time_limit import LOOK_EVERY_S, SPARE, Lapse, seconds_back
+from fasaco_edge.mission.core.time_limit import LINE_FACTOR, LOOK_EVERY_S, Lapse, seconds_back
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.orders.sequencer import Sequencer
@@ -29,17 +29,17 @@ COARSE = 0.2
 STEP, LEAST_S = 0.01, 10.0
 # The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
-# Least difference between the levels of turning back and of resuming.
-BETWEEN = 0.1
-# Number of unknown cells assumed per cell at the border of the map, in the estimate of the rest.
+# Least difference between the level at which the robot turns back and the one at which it resumes.
+HYSTERESIS = 0.1
+# Number of unknown cells assumed beyond each cell at the border of the map, to estimate the rest.
 BEYOND_CELLS = 20
-# A robot near its dock may go to charge this much above the level of turning back; number of places
-# on its path ahead that are compared.
+# A robot near its dock may go to charge up to this much above the level at which it turns back;
+# number of places on its path ahead that are compared.
 EARLY, PLACES_AHEAD = 0.2, 8
-# On lattices larger than this the comparison would take too long [cells].
+# Largest lattice on which these places are compared [cells]: it takes too long on larger ones.
 MOST_CELLS = 200_000
 # The battery counts as full once its level has risen by less than RISE for this long [s].
-RISE, ALL_AFTER_S = 0.005, 1800.0
+RISE, FULL_AFTER_S = 0.005, 1800.0
 
 
 class BatteryGauge:
@@ -55,7 +55,7 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.received_at = float("-inf")
-        # Times of the last message and of the last accepted level; at first, when one became due.
+        # Time of the last message; time since which no level was accepted.
         self._noted_at = float("-inf")
         self._accepted_at: float | None = None
         # A level not accepted yet, and the time of its first report.
@@ -74,11 +74,11 @@ class BatteryGauge:
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return the time since a level was last accepted, or since the beginning [s]."""
+        """Return the time since the last accepted level, at first since the beginning [s]."""
         return 0.0 if self._accepted_at is None else now - self._accepted_at
 
     def why_silent(self, since: float) -> str:
-        """Return why no level has been accepted since then [s], as the end of a sentence."""
+        """Return why no level was accepted after ``since`` [s], as the end of a sentence."""
         if self.received_at >= since:
             return ", it jumps to and fro"
         return ", its messages give none" if self._noted_at >= since else ""
@@ -95,8 +95,8 @@ class BatteryGauge:
         self.received_at = now
         if self.level is None or abs(event.level - self.level) > JUMP:
             claim, level = self._claim, self.level
-            # The level may drain meanwhile, or come in coarse steps: only the direction of the jump
-            # counts.
+            # Reports are consistent if they jump in the same direction, as the level may drain
+            # meanwhile, or come in coarse steps.
             is_new = claim is None or (
                 abs(event.level - claim[0]) > COARSE
                 if level is None
@@ -129,7 +129,7 @@ class Charging:
     orders: Sequencer
     route: Route
     gauge: BatteryGauge = field(default_factory=BatteryGauge)
-    # Time to the dock, time for the rest of the order where known [s], and how old both are.
+    # Time to the dock; time for the rest of the order, None if unknown [s]; the age of both.
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked: Lapse = field(init=False)
@@ -137,16 +137,16 @@ class Charging:
     _is_best_here: bool = field(default=False, init=False)
     # The highest level since the robot entered its dock, and its time; None outside the dock.
     _best: tuple[float, float] | None = field(default=None, init=False)
-    # The level of turning back when the robot went to charge. The level at which the battery last
-    # stopped charging, if below the level at which to resume; None for none.
+    # ``turns_back_at`` when the robot last went to charge.
     _turned_at: float = field(default=0.0, init=False)
+    # The level at which the battery last stopped charging; None if it sufficed to resume.
     _most: float | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         self._looked = Lapse(self.map)
 
     def succeed(self, before: Charging) -> None:
-        """Take over a predecessor's gauge, and its state of this battery."""
+        """Take over a predecessor's gauge and charging state."""
         self.gauge.succeed(before.gauge)
         self._best, self._turned_at, self._most = before._best, before._turned_at, before._most
 
@@ -189,7 +189,7 @@ class Charging:
     def is_due(self, now: float) -> bool:
         """Return whether the robot has to go and charge now.
 
-        A robot stopped by a command, or by a cancelled order, does not start to drive by itself.
+        A robot that was stopped by a command, or whose order was cancelled, stays where it is.
         """
         order, level = self.orders.order_state, self.gauge.level
         if self.policy is None or level is None or self.silence(now):
@@ -208,7 +208,7 @@ class Charging:
         self._turned_at = self.turns_back_at
 
     def why_due(self) -> str:
-        """Return why the robot goes and charges, as the end of a path's reason."""
+        """Return why the robot goes to charge, as the end of a path's reason."""
         if self.gauge.level is None:
             return ""
         near = ", the dock is near" if self._is_best_here else ""
@@ -221,8 +221,8 @@ class Charging:
         low, drain = self.policy.low, self.gauge.drain_per_s
         if drain is None:
             return low
-        needed = self.policy.reserve + drain * SPARE * self._to_dock_s
-        return min(max(low, needed), self.policy.enough - BETWEEN)
+        needed = self.policy.reserve + drain * LINE_FACTOR * self._to_dock_s
+        return min(max(low, needed), self.policy.enough - HYSTERESIS)
 
     @property
     def goes_on_at(self) -> float:
@@ -231,12 +231,12 @@ class Charging:
         policy, drain = self.policy, self.gauge.drain_per_s
         if drain is None or self._rest_s is None:
             return policy.enough
-        needed = max(policy.low, policy.reserve) + drain * SPARE * self._rest_s
-        return min(policy.enough, max(needed, policy.low + BETWEEN))
+        needed = max(policy.low, policy.reserve) + drain * LINE_FACTOR * self._rest_s
+        return min(policy.enough, max(needed, policy.low + HYSTERESIS))
 
     @property
     def may_work_s(self) -> float:
-        """How long the robot may go on from here until it has to go and charge [s]."""
+        """How long the robot may work from here until it has to go to charge [s]."""
         level, drain = self.gauge.level, self.gauge.drain_per_s
         if self.policy is None or level is None or not drain:
             return float("inf")
@@ -254,12 +254,12 @@ class Charging:
             self._best = level, now
         # Some batteries report full, others only stop rising.
         power, waited_s = self.gauge.power, now - self._best[1]
-        is_all = power == "full" or (power != "discharging" and waited_s >= ALL_AFTER_S)
+        is_full = power == "full" or (power != "discharging" and waited_s >= FULL_AFTER_S)
         is_charged = level >= self.goes_on_at
-        # With a lower level it would soon return.
-        least = max(self.policy.low, self._turned_at) + BETWEEN
-        self._most = level if is_all and not is_charged else None
-        return is_charged or (is_all and level >= least)
+        # From a lower level it would soon return.
+        least = max(self.policy.low, self._turned_at) + HYSTERESIS
+        self._most = level if is_full and not is_charged else None
+        return is_charged or (is_full and level >= least)
 
     def why(self, now: float) -> str:
         """Return why a robot waits in its dock."""
@@ -272,12 +272,11 @@ class Charging:
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
 
     def _finds_nothing_better(self) -> bool:
-        """Return whether to leave for the dock here: charging is due soon, no later place is
-        better.
+        """Return whether charging is due soon, and no later place is better to leave for the dock.
 
-        The best place on its path, up to the level of turning back, has the shortest way to the
-        dock relative to the drive between two charges. A path that ends before that level gives no
-        answer: it may be the last one.
+        The best place on the path, up to the level of turning back, has the shortest way to the
+        dock relative to the drive between two charges. The result is False for a path that ends
+        before that level, as it may be the last one.
         """
         level, drain, area = self.gauge.level, self.gauge.drain_per_s, self.map.area
         goal = self.orders.goal("charge")

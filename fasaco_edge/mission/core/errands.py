@@ -19,8 +19,8 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# An errand ends once the robot was in the last cell for this long [s]: its path leads to the centre
-# and ends with a turn.
+# An errand ends once the robot has been in the last cell for this long [s], to drive to the centre
+# and turn there.
 ARRIVAL_S = 2.0
 NO_WAY = "no way {}: waits for a map that shows one"
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
@@ -54,7 +54,7 @@ class Errands:
 
         Args:
             cell: the robot's cell.
-            update: the path that this step has made up to now.
+            update: the path that this step has made so far.
             now: time [s].
         """
         route, orders, area, path = self.route, self.orders, self.map.area, self.route.path

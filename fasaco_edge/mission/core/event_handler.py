@@ -1,4 +1,4 @@
-"""Event handler: applies each event to the mission's state, before anything is decided."""
+"""Event handler: application of events to the mission's state, before it decides."""
 
 from __future__ import annotations
 
@@ -135,10 +135,9 @@ class EventHandler:
             self._map_changed(self.monitor.map_at)
 
     def _take_priorities(self, grid: OccupancyGrid) -> None:
-        """Take a map of priorities; of one before the first map ``_note_frame`` checks the frame.
+        """Take a map of priorities; raise WrongFrame if it is in another frame than the map.
 
-        Raises:
-            WrongFrame: they are in another frame than the map.
+        If there is no map yet, ``_note_frame`` checks the frame later.
         """
         used = self.map.grid
         if used is not None and grid.frame != used.frame:
@@ -147,7 +146,7 @@ class EventHandler:
             self.route.want(OTHERS_FIRST)
 
     def _open_floor(self) -> None:
-        """Reopen floor that was closed for long enough, as long as there is work."""
+        """Reopen closed floor whose time is up, if the robot has work."""
         order = self.orders.order_state
         is_at_work = order.is_open or bool(order.errand)
         if is_at_work and self.map.grid is not None and self.map.obstacles.open_due(self._now):
@@ -177,7 +176,7 @@ class EventHandler:
         self._change_building(self.ledger.check(free, frame) if shows_floor else None)
 
     def _compare_buildings(self) -> Pose2D | None:
-        """Compare the newest map with earlier ones; return the robot's pose on these."""
+        """Compare the newest map with earlier ones; return the robot's pose on the earlier ones."""
         if self.map.plain is None or self.map.free is None:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose
@@ -189,7 +188,7 @@ class EventHandler:
         return self.map.building.note_map(plain, pose, self._now, contradicts)
 
     def _note_frame(self) -> None:
-        """Bind places without a map to the map in use; drop what is in another frame."""
+        """Assign the map's frame to places and orders without one; drop those in another frame."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
             return
@@ -217,7 +216,7 @@ class EventHandler:
         self._change_building(misfit)
 
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
-        """Continue on a new map; without the places of the previous building if it is another."""
+        """Continue on a new map; if it shows another building, without the places of the last."""
         if misfit is not None:
             self.map.building.accept(self._now)
             self.map.places.leave_building(self.ledger.current.frame)
@@ -241,7 +240,7 @@ class EventHandler:
         before = self.ledger.current.frame
         misfit = self.ledger.move_to(frame)
         if before not in ("", frame):
-            # The ledger forgets the cells that they swept there, too.
+            # The ledger also forgets the cells that other robots swept there.
             self.company.forget_ground()
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
@@ -295,7 +294,7 @@ class EventHandler:
                 self._record(driven)
         self.line.note_pose(stamped.pose, self.monitor.on_line_m)
         if has_jumped and self.line.is_followed:
-            self.monitor.clear_doubt()  # it has driven on unseen
+            self.monitor.clear_doubt()  # the robot has driven on between two poses
         cell = self.map.robot_cell()
         if cell is None:
             return
@@ -310,7 +309,7 @@ class EventHandler:
         self.trail.note_drive()
 
     def _record_again(self) -> None:
-        """Record the floor under the tool on another map."""
+        """Record the floor under the tool again, on a new map."""
         if self.map.pose is not None and not self.monitor.driven.holds:
             self._record(Driven(self.map.pose.pose, self.monitor.farthest_m))
 
@@ -327,7 +326,7 @@ class EventHandler:
                 self._faults.append(full)
 
     def _take_plan(self, event: PlanReady | PlanBroken) -> None:
-        """Take a plan; raise why there is none."""
+        """Take a plan; raise PlanFailed if the planner failed."""
         if isinstance(event, PlanBroken):
             self.route.fail(event, self._now)
             raise event.why
@@ -349,7 +348,7 @@ class EventHandler:
         self._path = self.changes.change_to(after, self._now) or self._path
 
     def _reset(self) -> None:
-        """Forget all coverage except under the tool, and deselect the active frame."""
+        """Forget all coverage except under the tool, and the choice of a frame."""
         self._is_forgotten = True
         self.map.places.begin_anew()
         self.map.frames.reset()

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class MapReceived:
-    """A full map; ``at``: its time of arrival [s] if an earlier mission received it, else None."""
+    """A full map; ``at``: time of arrival [s] if a previous mission received it, else None."""
 
     grid: OccupancyGrid
     at: float | None = None
@@ -46,7 +46,7 @@ class PatchReceived:
 
 @dataclass(frozen=True, slots=True)
 class PriorityReceived:
-    """Priorities of floor in the frame of the map, from 0 to 100; -1 for that of its room."""
+    """Priorities of floor in the frame of the map, from 0 to 100; -1 for the room's priority."""
 
     grid: OccupancyGrid
 
@@ -130,7 +130,7 @@ class Part:
 
 
 SAME_LATTICE = Pose2D(0.0, 0.0)
-"""Pose of another robot's lattice in this robot's, where both have one map."""
+"""Pose of another robot's lattice in this robot's, if both have the same map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ class MemberReceived:
         radius_m: radius of its disc [m].
         ahead: points (x, y) of its next metres [m].
         waits_for: name of the robot that it waits for; "" for none.
-        kept: as ``tiles``, the cells among them that it swept before this epoch; None if not known.
+        kept: as ``tiles``: cells of these that it swept before this epoch; None if not known.
         lattice: pose of its lattice in this robot's [m], by which its cells were placed.
     """
 
@@ -267,7 +267,8 @@ class PathUpdate:
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
         yaw: float64 (m,), the robot's headings at ``xy`` [rad]; None for those along the line.
-        may_wait: whether the robot can drive on along the previous path as long as both are equal.
+        may_wait: whether it may be published later: the robot can follow the previous path up to
+            the first difference.
         speed_m_s: speed to drive it at [m/s]; None for the robot's usual one.
     """
 
@@ -286,8 +287,8 @@ class PathUpdate:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer to command ``number``: why it was refused, None if it was carried out; for
-    ``replan`` the number of the coming plan."""
+    """The answer to command ``number``: its error, None if it was carried out; for ``replan`` the
+    number of the coming plan."""
 
     number: int
     error: FasacoError | None = None
@@ -339,7 +340,7 @@ class Doing(NamedTuple):
 
     Attributes:
         state: of the mission.
-        reason: why; "" for the number of the path.
+        reason: its reason; "" to report the number of the path.
         path: a path to publish.
         plan: a plan to make.
     """

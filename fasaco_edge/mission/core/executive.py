@@ -1,4 +1,4 @@
-"""Executive: the rules by which a mission decides what the robot does next, in their order."""
+"""Executive: the rules by which a mission decides what the robot does next."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Executive:
     _checks: PathChecks = field(init=False)
     _errands: Errands = field(init=False)
     _work: OrderWork = field(init=False)
-    # State of this step: the time [s], the robot's cell once known, the path made up to now.
+    # State of this step: the time [s], the robot's cell once known, the path made so far.
     _now: float = field(default=0.0, init=False)
     _cell: Cell = field(default=(0, 0), init=False)
     _update: PathUpdate | None = field(default=None, init=False)
@@ -106,7 +106,7 @@ class Executive:
         return State.RETURNING if self._state is State.DONE and makes_way else self._state
 
     def decide(self, now: float) -> Decision:
-        """Return the decision at ``now`` [s]: that of the first rule that has an answer."""
+        """Return the decision at ``now`` [s], by the first rule that gives an activity."""
         self._now, self._update = now, None
         self.way_out.end()
         doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
@@ -150,7 +150,7 @@ class Executive:
         return Doing(*resting, self._update)
 
     def _why_rest(self) -> tuple[State, str] | None:
-        """Return state and reason of a robot that has nothing to decide; else None."""
+        """Return state and reason of a robot that has to rest; else None."""
         order = self.orders.order_state
         doubt = self.map.building.why if order.order is not None or order.errand else ""
         if order.paused or doubt:
@@ -167,10 +167,7 @@ class Executive:
         return (State.BLOCKED, no_mask) if no_mask else None
 
     def _why_no_mask(self) -> str:
-        """Return why the keep-out zones of this map are missing; "" if they are not.
-
-        The zones of another map would close other places.
-        """
+        """Return why the keep-out zones of this map are missing; "" if they are known."""
         if why := self.map.places.why_no_keep_out:
             return why
         grid = self.map.grid
@@ -184,7 +181,8 @@ class Executive:
     def _why_in_dock(self) -> tuple[State, str] | None:
         """Return state and reason of a robot that is, or may be, in its dock; else None.
 
-        After a restart it may be there until the first battery message: no path may lead it out.
+        After a restart a robot near its dock waits for the first battery message, so that no path
+        leads it out of the dock.
         """
         if self.dock.holds(is_charging=self._state is State.CHARGING):
             return State.CHARGING, self.charging.why(self._now)
@@ -271,7 +269,7 @@ class Executive:
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
 
 
-# The policy. A rule returns the mission's activity, or None: then the next rule decides.
+# The rules, in order. A rule returns the mission's activity, or None: then the next rule decides.
 RULES: tuple[Callable[[Executive], Doing | None], ...] = (
     Executive._charge_in_time,
     Executive._end_in_time,

@@ -1,7 +1,7 @@
 """In dock: whether the robot is in its dock, and whether its battery charges there.
 
-Levels rise slowly and in coarse steps, some batteries report the wrong power supply status, and a
-bad contact is intermittent: no single message decides.
+No single message decides: levels rise slowly and in coarse steps, some batteries report the wrong
+power supply status, and a bad contact is intermittent.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from fasaco_edge.mission.map.map_state import MapState
 
 # Tolerances to the dock's pose, and to the pose in front of the dock [m].
 DOCKED_M, NEAR_M = 0.1, 0.5
-# Largest difference between a docked robot's heading and the dock's [rad]: contacts allow less, the
-# error of a localiser is about ten degrees; a robot that passes the dock or turns differs by more.
+# Largest difference between a docked robot's heading and the dock's [rad]: more than the tolerance
+# of contacts and the error of a localiser, about ten degrees; less than that of a passing robot.
 DOCKED_RAD = math.radians(30.0)
 
 
@@ -27,9 +27,9 @@ class InDock:
     gauge: BatteryGauge
 
     def holds(self, *, is_charging: bool) -> bool:
-        """Return whether the robot is in its dock, also after its base drove it in.
+        """Return whether the robot is in its dock, where its base may have driven it.
 
-        The cell there need not be coverable.
+        The cell there may not be coverable.
 
         Args:
             is_charging: whether the mission already counts it as docked.
@@ -53,10 +53,11 @@ class InDock:
         return math.hypot(pose.x - stand.x, pose.y - stand.y) <= reach_m
 
 
-# The level of a battery that does not report charging has to rise within this time [s], that of any
-# other within FLAT_S: in steps of 1 %, most charge faster than a step in ten minutes.
+# The level of a docked battery has to rise within FLAT_S [s], as most charge by 1 % in less than
+# ten minutes; without a report of charging it has to rise within PATIENCE_S [s].
 PATIENCE_S, FLAT_S = 45.0, 600.0
-# A level that falls by more than this is not charged: one step of a coarse gauge is noise.
+# A battery whose level falls by more than this does not charge: a step of 1 % of a coarse gauge is
+# noise.
 FALL = 0.0125
 CHARGES = ("charging", "full")
 
@@ -66,12 +67,13 @@ class DockCurrent:
 
     def __init__(self, gauge: BatteryGauge) -> None:
         self._gauge = gauge
-        # Start of docking, and start of the time without a message that it charges.
+        # Time of docking, and the time since which no message reports charging.
         self._docked_at: float | None = None
         self._unclaimed_at: float | None = None
-        # The level where it last turned: the highest while it rises, the lowest while it falls.
-        self._turn: float | None = None
+        # The last extreme of the level: the highest while it rises, the lowest while it falls.
+        self._extreme: float | None = None
         self._falls = False
+        # The level from which it falls.
         self._from = 0.0
         self._rose_at: float | None = None
 
@@ -87,7 +89,7 @@ class DockCurrent:
     def look(self, now: float, *, is_docked: bool) -> None:
         """Note level and power supply at ``now``; to be called in each step."""
         if not is_docked:
-            self._docked_at = self._unclaimed_at = self._turn = self._rose_at = None
+            self._docked_at = self._unclaimed_at = self._extreme = self._rose_at = None
             self._falls = False
             return
         self._docked_at = now if self._docked_at is None else self._docked_at
@@ -99,15 +101,15 @@ class DockCurrent:
             self._note_level(level, now)
 
     def _note_level(self, level: float, now: float) -> None:
-        turn = self._turn
-        if turn is None:
-            self._turn = level
-        elif level > turn + (FALL if self._falls else RISE):
-            self._turn, self._falls, self._rose_at = level, False, now
+        extreme = self._extreme
+        if extreme is None:
+            self._extreme = level
+        elif level > extreme + (FALL if self._falls else RISE):
+            self._extreme, self._falls, self._rose_at = level, False, now
         elif self._falls:
-            self._turn = min(level, turn)
-        elif level < turn - FALL:
-            self._turn, self._falls, self._from = level, True, turn
+            self._extreme = min(level, extreme)
+        elif level < extreme - FALL:
+            self._extreme, self._falls, self._from = level, True, extreme
 
     def why_none(self, now: float) -> str:
         """Return the evidence that the battery does not charge; "" if it does, or is not docked."""

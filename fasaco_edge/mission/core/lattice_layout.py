@@ -1,14 +1,14 @@
 """Lattice layout: angle of the cells' rows to the map frame, edge of a cell, and their changes.
 
 Without a configured angle, rows are parallel to the axes of the map frame at first, and to the
-walls once their direction is certain; to the axes again if a map does not fit otherwise. For a
-pass whose lanes have an angle they are at that angle, until another pass begins; for one with an
-overlap of its own the cells are narrower or wider.
+walls once their direction is certain. They return to the axes if a map does not fit otherwise. A
+pass whose lanes have an angle gets rows at that angle, and a pass with its own overlap narrower or
+wider cells, until the next pass begins.
 
-The wall direction is estimated once and then fixes the lattice's rotation. The map frame's axes
-come from the robot's initial heading, so walls are rotated against them. In six buildings rotated
-by 30 degrees, LEAST_WALL_M of parallel walls were seen after 1 to 14 m, and gave the angle to 0.6
-degrees. The decision is final: a lattice re-rotated with each map would lose coverage.
+The map frame's axes come from the robot's initial heading, so walls are rotated against them. Their
+direction is estimated once, as a lattice rotated with each map would lose coverage. In six
+buildings rotated by 30 degrees, LEAST_WALL_M of parallel walls were seen after 1 to 14 m, and gave
+the angle to 0.6 degrees.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from fasaco_edge.planners.passes import Laid, lane_and_tool_m
 
 # Evidence required: length of parallel walls [m], and their share of all walls.
 LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
-# Two estimates must agree within the first [deg]; with this length of walls [m] one suffices.
+# Two estimates must agree within this angle [deg]; one suffices with this length of walls [m].
 SAME_DEG, PLENTY_M = 1.5, 15.0
-# A smaller rotation is not worth the stop that it costs [deg].
+# The least rotation that is worth a stop of the robot [deg].
 LEAST_ROTATION_DEG = 2.0
-# Distance driven between estimates [m]; the limit on estimates.
+# Distance driven between estimates [m]; limit on the number of estimates.
 BETWEEN_M, MOST_LOOKS = 1.0, 40
-# Poses farther apart than the first are a jump [m]; maps with more pixels take too long.
+# Distance between poses that is a jump [m]; limit on a map's pixels, as estimates take long.
 JUMP_M, MOST_PIXELS = 1.0, 4_000_000
 
 
@@ -95,7 +95,7 @@ def _certain(grid: OccupancyGrid) -> WallDirection | None:
 
 
 def _agree(before: WallDirection | None, seen: WallDirection) -> bool:
-    # Lattices are equal after a quarter-turn.
+    # A lattice is the same after a quarter-turn.
     return before is not None and (
         abs(math.remainder(before.angle_deg - seen.angle_deg, 90.0)) <= SAME_DEG
     )
@@ -111,7 +111,7 @@ class LatticeLayout:
 
     def __init__(self, config: MissionConfig) -> None:
         self.deg = self._usual_deg = config.lattice_deg or 0.0
-        # That of a ledger from before a restart.
+        # The angle of a ledger from before a restart.
         self._resumed_deg: float | None = None
         self._is_given = config.lattice_deg is not None
         self.cell_m = self._usual_cell_m = config.footprint.cell_m
@@ -142,10 +142,11 @@ class LatticeLayout:
         return True
 
     def changes_for_pass(self, lay: Laid, grid: OccupancyGrid) -> bool:
-        """Return whether angle or edge change to those of the lanes of a pass on the newest map."""
+        """Change angle and edge to those of a pass's lanes, if they fit the newest map; return
+        whether that changes any."""
         deg = lay.angle_deg
         if self._resumed_deg is not None and self._resumed_deg == deg:
-            # It was that of the pass: the usual one is not known.
+            # The ledger's angle was that of the pass; the usual one is not known.
             self._usual_deg = 0.0
             self._walls.begin()
         self._resumed_deg = None
@@ -155,7 +156,7 @@ class LatticeLayout:
             cell_m, tool_m = lane_and_tool_m(tool_m, cell_m, lay.overlap)
         if (wanted, cell_m) == (self.deg, self.cell_m):
             return False
-        # As for walls: the map may grow.
+        # The map may grow.
         if not self._fits(grid, wanted, cell_m, share=0.5):
             return False
         self.deg, self.cell_m, self._tool_m = wanted, cell_m, tool_m

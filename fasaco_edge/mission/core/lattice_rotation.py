@@ -53,7 +53,7 @@ class LatticeRotation:
     deg: float = 0.0
 
     def config(self, config: MissionConfig) -> MissionConfig:
-        """Return a mission's configuration on this lattice; standing zones stay as configured."""
+        """Return a mission's configuration in the mission's frame; ``given`` stays in the map's."""
         policy = config.policy
         if self.deg:
             polygons = policy.keep_out + mask_polygons(policy.keep_out_mask)
@@ -91,7 +91,7 @@ class LatticeRotation:
         Args:
             state: the order; its polygons may be rotated already.
             rotated_by_deg: rotation of the lattice since home was noted [deg].
-            scale: present edge of a cell, as a multiple of that when home was noted.
+            scale: edge of a cell, as a multiple of the edge when home was noted.
         """
         order = None if state.order is None else rotated_order(state.order, -self.deg)
         home, reached = state.home, state.reached

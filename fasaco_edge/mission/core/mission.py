@@ -91,10 +91,10 @@ class Mission:
     def _lay_cells(self) -> None:
         """Start a mission on a lattice at the decided angle, with cells of the decided edge."""
         self._rotation = LatticeRotation(self._layout.deg)
-        # Rotation of the lattice against that of the restored ledger [deg], and edge of its cells
-        # as a multiple of the ledger's.
+        # Rotation of the lattice against the restored ledger's [deg]; edge of its cells as a
+        # multiple of the ledger's.
         self._rotated_by_deg, self._scaled_by = 0.0, 1.0
-        # The newest map in the lattice's frame, and the same in the map frame.
+        # The newest map in the lattice's frame, and the same map in the map frame.
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
         config = self._rotation.config(self._layout.sized(self._config))
@@ -136,8 +136,8 @@ class Mission:
         """Continue a ledger from before a restart, unless the map contradicts it.
 
         To be called before the first step, and before ``restore_order``. A contradiction, see
-        ``coverage.fit``, is reported as a fault (LedgerMismatchError) with the map that
-        shows it; coverage begins from zero then.
+        ``coverage.fit``, is reported as a fault (LedgerMismatchError) with the map that shows it,
+        and coverage starts from zero.
         """
         if self._layout.resume(before.lattice_deg):
             self._lay_cells()
@@ -165,14 +165,14 @@ class Mission:
         self.state, self.reason = self._executive.status()
 
     def restore_rooms(self, book: RoomBook) -> None:
-        """Go on with the rooms of a book, which the mission changes; to be called before
+        """Continue with the rooms of a book, which the mission changes; to be called before
         ``restore_order``."""
         self._rooms.book = book
 
     def succeed(self, before: Mission) -> None:
-        """Take over another mission's state of robot and inputs, and its doubt about the building.
+        """Take over a predecessor's state of robot and inputs, and its doubt about the building.
 
-        To be called before the first step, which gets the events of its ``held``.
+        To be called before the first step, whose events are those of the predecessor's ``held``.
         """
         self._executive.succeed(before._executive)
         if before.rotation != self.rotation or before._layout.cell_m != self._layout.cell_m:
@@ -223,8 +223,8 @@ class Mission:
         return replace(happened, plan=plan, path=path)
 
     def _look_for_rooms(self, happened: Decision, now: float) -> Decision:
-        """Look for rooms if that is due, and let the order follow them; return the decision, with
-        the fault if that fails: the robot sweeps on without."""
+        """Find rooms if due, and let the order follow them; return the decision, with a fault if
+        that fails, as the robot can sweep without rooms."""
         if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
             self._rooms.leave_building()
         try:
@@ -239,12 +239,12 @@ class Mission:
         return self._handler.handle(map(self._rotation.event, events), now)
 
     def _align(self, happened: Decision, now: float) -> Decision:
-        """Lay the lattice for a pass's lanes, or along the walls once these are certain; return
-        the combined decision."""
+        """Lay the lattice along a pass's lanes, or along the walls once their direction is certain;
+        return the combined decision."""
         state, layout, grid, pose = self.order_state, self._layout, self.grid, self.pose
         layout.note_faults(happened.faults)
-        # A path kept for an errand is given in present cells; a building in doubt may soon be
-        # replaced by another.
+        # A path kept during an errand is in present cells; while the building is in doubt, the map
+        # may soon be another.
         if state.errand or self.is_in_doubt or grid is None or pose is None:
             return happened
         sweeps = state.current_zone is not None
@@ -320,7 +320,7 @@ class Mission:
 
     @property
     def rotation(self) -> LatticeRotation:
-        """The lattice rotation, which converts places on the lattice to the map frame."""
+        """The lattice rotation, which converts the mission's places to the map frame."""
         return self._rotation
 
     @property
@@ -336,7 +336,7 @@ class Mission:
 
     @property
     def home(self) -> Cell | None:
-        """The cell (row, col) the robot returns to; None for none."""
+        """The cell (row, col) to which the robot returns; None for none."""
         return self.orders.goal()
 
     @property

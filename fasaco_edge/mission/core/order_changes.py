@@ -1,4 +1,4 @@
-"""Order changes: begins another order, and carries out commands, on map, orders and route."""
+"""Order changes: new orders and commands, applied to map, orders and route."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class OrderChanges:
     route: Route
     line: LineLayer
     rooms: RoomWatch
-    # Whether there is no fleet, whose robots share cells.
+    # Whether the robot is in no fleet: robots of a fleet share cells.
     is_alone: bool
     # Keep-out polygons of every order.
     _standing: tuple[Polygon, ...] = field(default=(), init=False)
-    # Version of the rooms, and the order, that were compared last.
+    # The version of the rooms and the order at the last comparison.
     _followed: tuple[int, MissionOrder | None] = field(default=(-1, None), init=False)
 
     def __post_init__(self) -> None:
@@ -61,7 +61,7 @@ class OrderChanges:
         self.update_area()
 
     def _keep_out(self, order: OrderState) -> None:
-        """Keep out of all areas under an order."""
+        """Apply the keep-outs of the configuration and of an order."""
         ordered = order.order.keep_out if order.order else ()
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:
@@ -159,13 +159,13 @@ class OrderChanges:
         self._followed = book.version, order
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
-        """Apply other keep-outs under the same order; stop a robot inside one of them."""
+        """Apply changed keep-outs to the same order; stop a robot inside one of them."""
         self._keep_out(order)
         self.route.forget_failure()
         self.update_area()
         if not self.map.is_kept_out:
             return None
-        # The border may be near enough to continue from there, but not along this path.
+        # From near the border the robot may continue, but not along this path.
         self.map.follow_path(None)
         return self.route.stop("robot is in a keep-out zone", now)
 

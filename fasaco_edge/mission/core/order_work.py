@@ -39,12 +39,12 @@ class OrderWork:
         Args:
             cell: the robot's cell.
             update: the path that this step has made so far.
-            state: of the mission so far.
+            state: state of the mission so far.
             now: time [s].
         """
         route, orders = self.route, self.orders
         orders.reopen()
-        # A robot that stands while others sweep, or for a map, gets no new reason in each step.
+        # A robot that stands by, for others or for a map, needs no new division in each step.
         stands = state is State.COVERING and not len(route.path.cells)
         self.share(cell, now, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:
@@ -63,10 +63,10 @@ class OrderWork:
         return self._return_home(cell, update, now)
 
     def _go_on_elsewhere(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
-        """Find work for a robot that can reach none; None once there may be some.
+        """Find other work for a robot without reachable cells to cover; None to plan again.
 
         In this order: a way out if it is shut in, a viewpoint, a wait for others, floor that the
-        line has missed, cells that it cannot reach; then the next stage of the order.
+        line has missed, giving up unreachable cells, the next stage of the order.
         """
         route, orders, area = self.route, self.orders, self.map.area
         if area is not None and (why := self.way_out.why_shut_in(area)):
@@ -106,7 +106,7 @@ class OrderWork:
         return Doing(State.BLOCKED, orders.waiting_reason(), update)
 
     def wait_for_room(self, name: str, update: PathUpdate | None, now: float) -> Doing:
-        """Stand until there is a room of a name."""
+        """Stand until a room has the name ``name``."""
         reason = f"waits for a room {name!r}: no room on the map has this name yet"
         update = self.route.stop(reason, now) or update
         self.route.drop()

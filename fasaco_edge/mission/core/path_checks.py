@@ -1,4 +1,4 @@
-"""Checks of the path: whether the robot is still on it, and whether it leads to anything."""
+"""Path checks: whether the robot is still on its path, and whether the path is worth driving."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# Period of checks whether a path leads to anything [s].
+# Period of checks whether a path is worth driving [s].
 WORTH_S = 1.0
-# If poses are too far apart, a path that has covered nothing new for this long is over [s].
+# While poses are too far apart, a path ends after this long without a newly covered cell [s].
 VAIN_S = 60.0
 FAR_APART = "poses are too far apart"
 
@@ -75,11 +75,11 @@ class PathChecks:
             self._route.want("cells left over")
 
     def _drives_in_vain(self, now: float) -> bool:
-        """Return whether poses are too far apart to cover new cells: no path would end."""
+        """Return whether poses are too far apart to cover new cells, so that no path would end."""
         if not self._monitor.are_poses_far_apart:
             self._progress = None
             return False
-        # Time at rest, as after a pause, is no drive.
+        # Time at rest, as in a pause, does not count.
         if (
             self._progress is not None
             and now - max(self._progress[1], self._route.begun_at) < VAIN_S
@@ -90,7 +90,7 @@ class PathChecks:
         return before is not None and covered <= before[0]
 
     def _sum_up(self) -> str:
-        """Return what else to say at the end of an order, as text that follows another."""
+        """Return figures for the end of an order, as the end of a sentence; "" for none."""
         floor = self._line.left.sum_up()
         if not self._monitor.are_poses_far_apart:
             return floor
@@ -107,8 +107,8 @@ class PathChecks:
             route.want("others have swept what lay ahead")
 
     def check_time(self, now: float) -> None:
-        """Want a new plan if time or battery do not allow all of the path: the most worthwhile
-        floor comes first."""
+        """Want a new plan with the most worthwhile floor first if time or battery do not suffice
+        for the path."""
         orders, route, may_work_s = self._orders, self._route, self._orders.scope.worth.may_work_s
         is_due = may_work_s < float("inf") and now - self._timed_at >= WORTH_S
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:

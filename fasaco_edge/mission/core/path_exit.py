@@ -1,8 +1,8 @@
-"""The path exit: the only way for a path to be published, and the owner of the published path.
+"""Path exit: the owner of the published path, and the only place where paths are published.
 
-It outlives the missions of a daemon. A path is in force while the mission that made it drives: when
-that mission comes to rest or ends, the exit replaces the path by an empty one, which stops the
-robot. This gives two invariants, for any end, replacement or failure:
+It outlives the missions of a daemon. When the mission of a path comes to rest or ends, the exit
+replaces the path by an empty one, which stops the robot. This gives two invariants, also if a
+mission is replaced or fails:
 
 - the last path of a mission at rest is empty;
 - a path that is not empty belongs to the mission in force.
@@ -37,8 +37,8 @@ class PublishedPath:
     Attributes:
         frame: the map frame.
         reason: why it replaces the previous one.
-        revision: counts the paths of a mission, from 1; the path that withdraws a mission's last
-            one has the next number. 0 if there was no mission.
+        revision: counts the paths of a mission, from 1, including the empty path at its end; 0 if
+            there was no mission.
         xy: float64 (n, 2), x, y [m]; n = 0 stops the robot.
         steps: steps from cell to cell.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
@@ -90,7 +90,7 @@ class PublishedPath:
 
     @property
     def stops(self) -> bool:
-        """Whether it is empty, and stops the robot."""
+        """Whether the path is empty, and stops the robot."""
         return not len(self.xy)
 
     def withdrawn(self, reason: str) -> PublishedPath:
@@ -108,17 +108,17 @@ class PathExit:
     """Decides which path is published next, and keeps it until it is sent."""
 
     def __init__(self) -> None:
-        # The path sent last, None if unknown; the path to send next, None for none.
+        # The path that was sent last, None if unknown; the path to send next, None for none.
         self._sent: PublishedPath | None = None
         self._due: PublishedPath | None = None
 
     @property
     def newest(self) -> PublishedPath | None:
-        """The path to send, or else the one sent last; None before there was one."""
+        """The path to send, or else the last one sent; None before the first."""
         return self._due or self._sent
 
     def follow(self, mission: Mission, update: PathUpdate | None) -> None:
-        """Take the path of a mission's step, if any; withdraw its path if it is at rest."""
+        """Take the path of a mission's step, if any; withdraw it if the mission is at rest."""
         if update is not None:
             self._due = PublishedPath.of(mission, update)
         if mission.state.is_at_rest:

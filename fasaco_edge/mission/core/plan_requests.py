@@ -1,6 +1,4 @@
-"""Plan requests: why a plan is wanted, which one is pending, and how the last one failed; attempts
-at a better path in spare time, while the current one holds.
-"""
+"""Plan requests: needed plans, one at a time, and attempts at a better path in spare time."""
 
 from __future__ import annotations
 
@@ -20,18 +18,17 @@ from fasaco_edge.planners.walk_before import HELD_CELLS
 # Retry period after a failed plan [s].
 BROKEN_S = 30.0
 # Reason of a request for a better path.
-SPARE = "spare time"
+SPARE_TIME = "spare time"
 # Longest time of an attempt: by repairs, and by a search of the whole rest [s].
 REPAIR_S, SEARCH_S = 0.05, 0.3
 # A path is replaced only if that saves this many steps and this share of the rest.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# The same share for a new walk, whose line has to be made and polished again. A larger one while
-# the map still grows was within the scatter.
+# The same share for a walk from a full search, whose line has to be made and polished again.
 NEW_WALK_SHARE = 0.01
 # The share of time is halved at most this many times.
 MOST_VAIN = 4
-# Pause after an attempt that found nothing to improve [s]: it takes a search of the whole lattice,
-# and the answer rarely changes between poses.
+# Pause after an attempt that could not begin [s]: this check may search the whole lattice, and its
+# result rarely changes between poses.
 SKIPPED_S = 1.0
 
 
@@ -49,9 +46,9 @@ class SpareTime:
     def __init__(self, share: float) -> None:
         self._share = share
         self._resting_until = 0.0
-        # The walk of the last attempt, the number of vain attempts at it, and the duration [s] and
-        # end [s] of the last one.
+        # The walk of the last attempt, and the number of vain attempts at it.
         self._walk = self._vain = 0
+        # Duration and end of the last attempt [s].
         self._last = 0.0, 0.0
 
     def is_available(self, now: float, walk: int) -> bool:
@@ -155,16 +152,16 @@ class PlanRequests:
         self.pending: PlanRequest | None = None
         # The attempt that the pending plan belongs to; None for a needed plan.
         self._attempt: Attempt | None = None
-        # Whether the pending plan is for an order that no longer counts.
+        # Whether the result of the pending plan is to be discarded.
         self._is_abandoned = False
         # Why a full plan is wanted; "" where none is.
         self._full = ""
-        # What changed since the last request; and whether that change is the reason for the plan.
+        # Window of the cells that changed since the last request; whether they are its reason.
         self._changed: Window | None = None
         self._is_by_map = False
-        # How the last plan failed, and when; "" where it did not. How many have failed in a row,
-        # and whether another map has come since the last.
+        # Why the last plan failed, "" if it did not, and when [s].
         self._failure = "", 0.0
+        # Number of plans that failed in a row; whether a map has come since the last of them.
         self._failures = 0
         self._has_map = False
 
@@ -206,7 +203,7 @@ class PlanRequests:
         self.discard_pending()
 
     def pause(self) -> None:
-        """Discard the pending plan; it is requested again, with its reason, on continuing."""
+        """Discard the pending plan; it is requested again, with its reason, after the pause."""
         if self.pending is not None and self.is_planning and not self._is_abandoned:
             if self.pending.problem.is_full:
                 self._full = self.pending.reason
@@ -223,7 +220,7 @@ class PlanRequests:
 
     def _request_attempt(self, attempt: Attempt) -> PlanRequest:
         self._attempt = attempt
-        return self._request(attempt.problem, SPARE)
+        return self._request(attempt.problem, SPARE_TIME)
 
     def _request(
         self, problem: CoverageProblem, reason: str, changed: Window | None = None
@@ -257,7 +254,7 @@ class PlanRequests:
     def why_not_yet(self, now: float) -> str:
         """Return why no plan may be requested yet; "" if one may be."""
         why, since = self._failure
-        # Each map is another problem; a planner that fails with every map gets requests less often.
+        # A new map is a new problem, but the pause grows if the planner fails with every map.
         pause_s = min(2.0 ** (self._failures - 1) - 1.0, BROKEN_S)
         if not why or now - since >= (pause_s if self._has_map else BROKEN_S):
             return ""

@@ -41,12 +41,12 @@ class Route(PlanRequests):
         unchanged, outdated: count the plans that were not published because they equal the current
             path, or because they no longer hold.
         published_at: when a path was last published or confirmed by a plan.
-        aside: the rest of the path at the start of an errand, int32 (n, 2); None without one.
+        aside: the rest of the path, int32 (n, 2), kept during an errand; None without an errand.
         is_way_out: whether the published path is a way out, along no cells.
-        begun_at: when a path with something to drive last followed one without.
+        begun_at: when the robot last got a path to drive after a time without one.
         beside: other robots that the path's line keeps clear of, float64 (k, 3): x, y, least
-            distance [m]; if the line begins nearer to a robot than that, it comes no nearer. None
-            for any line.
+            distance [m]; a line that begins nearer to a robot comes no nearer to it. None for no
+            such limit.
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
@@ -57,12 +57,12 @@ class Route(PlanRequests):
         self.aside: NDArray[np.int32] | None = None
         # Heading at the end of the path [rad]; None for that of the last segment.
         self._end_yaw: float | None = None
-        # The path over a map that has moved, until the first pose on the moved map shows the
+        # The path before a motion of the map, until the first pose on the moved map shows the
         # motion.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Counts of cell numberings, and of walks (paths over other cells); the last walk searched
-        # as a whole.
+        # Number of the path, whose cells are counted from 0; number of the walk, which a path over
+        # the same cells keeps; the last walk that was searched as a whole.
         self._numberings = self._walks = self._searched = 0
         self.unchanged = self.outdated = 0
         self.published_at = self.begun_at = 0.0
@@ -84,8 +84,7 @@ class Route(PlanRequests):
     def path_to_keep(self) -> NDArray[np.int32]:
         """The part of the path that the next plan should keep, int32 (n, 2).
 
-        It includes the part that a block cut off, and the rest after a stop, as most of these is
-        still valid.
+        It includes the part beyond a block, or the rest after a stop: most of it is still valid.
         """
         return np.concatenate((self.path.ahead, self._kept.ahead))
 
@@ -105,7 +104,7 @@ class Route(PlanRequests):
         self._kept, self._before_motion, self.aside = PathProgress(NO_CELLS), None, None
 
     def set_aside(self) -> bool:
-        """Keep the path for after an errand; return whether it was not kept before."""
+        """Keep the path during an errand; return False if it was kept before."""
         if self.aside is not None:
             return False
         self.pause()
@@ -124,7 +123,7 @@ class Route(PlanRequests):
     def _from_nearer_end(self, cells: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return a kept path, reversed if its end is nearer to the robot than its start.
 
-        A path that has to end at home is not reversed, as the way saved now would be driven later.
+        A path that has to end at home is not reversed: the saved way would be driven at the end.
         """
         area, cell = self._map.area, self._map.robot_cell()
         if area is None or cell is None or not len(cells) or self._orders.ends_home:
@@ -180,9 +179,9 @@ class Route(PlanRequests):
         if not self._spare.is_available(now, self._walks):
             return None
         number = self.attempts + 1
-        # A walk that grows with the map, or is cut to a part, becomes worse as a whole: it has up
-        # to a third more turns than a new search would find. So every other attempt searches the
-        # whole rest, once for each walk.
+        # A walk that was extended with the map, or cut to a part, has up to a third more turns
+        # than a new search would find. So every other attempt searches the whole rest, once for
+        # each walk.
         is_full = number % 2 == 1 and self._searched != self._walks
         attempt = Attempt.at(self.path, self._numberings, self._orders, number, is_full=is_full)
         if attempt is None:
@@ -245,8 +244,8 @@ class Route(PlanRequests):
     ) -> NDArray[np.int32]:
         """Return a new plan without the cells that were covered while it was made.
 
-        The robot drove on meanwhile, so it joins the plan at the first cell that still needs a
-        visit. The result is empty if no path leads there, because the robot was carried elsewhere.
+        The robot joins it at the first cell that still needs a visit. The result is empty if no
+        path leads there, as after the robot was carried elsewhere.
         """
         first = self._first_open(cells, area.lattice.window)
         to = int(cells[first, 0]), int(cells[first, 1])
@@ -254,7 +253,7 @@ class Route(PlanRequests):
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:
-        """Return the index of the first cell that needs a visit; that of the last if none does."""
+        """Return the index of the first cell that needs a visit; the last index if none does."""
         found = window.values_at(self._orders.cells.open_cells(window), cells, True)
         return int(np.argmax(found)) if found.any() else len(cells) - 1
 

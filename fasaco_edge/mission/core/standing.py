@@ -1,9 +1,8 @@
-"""Standing: how long the robot has been in its cell, and in one place with a path to drive; and
-what its follower reports to hold it.
+"""Standing: the time the robot has been in its cell, and in one place with a path to drive; the
+obstructions that its follower reports.
 
-A new path alone does not reset the count of a standing robot: only a motion does, or a rest by
-command or at the end of an order. Time without a path, for instance while the map flickers ahead of
-the robot, does not count. Times are [s].
+Time in one place counts only with a path. Motion resets it, and so does a rest by command or at the
+end of an order, but not a new path. Times are [s].
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from fasaco_edge.mission.map.map_state import MapState
 # flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
 # A robot that stands for this long on its path gets the path again: the follower may have lost it,
-# or stopped for an obstacle that is gone. Not sooner: it may be waiting for a person to pass, or
-# driving out of a corner, which another path would interrupt. The time is that of the robot's
-# clock, as a simulation may run at twenty times the real speed.
+# or stopped for an obstacle that is gone. A shorter time would interrupt a robot that waits for a
+# person to pass, or drives out of a corner. The time is by the robot's clock, as a simulation may
+# run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
 # Number of times that a standing robot gets its path again before its mission is degraded.
 TRIES = 2
@@ -34,26 +33,27 @@ BESIDE_S = 2.0
 
 
 class Standing:
-    """Measures how long the robot stands; gets its cell in each step."""
+    """Measures how long the robot stands."""
 
     def __init__(self, map_state: MapState, route: Route) -> None:
         self._map, self._route = map_state, route
         self._now = 0.0
         self._cell: Cell | None = None
         self._entered_at = 0.0
-        # The robot's position, to within STANDING_M, and since when it has had a path there, or got
-        # it again: by our clock, and by the robot's [ns]; shifted by any time without a path.
+        # The robot's position, to within STANDING_M.
         self._place = math.inf, math.inf
+        # When it got a path there, or got it again, by our clock, and by the robot's [ns]; moved on
+        # by any time without a path.
         self._since = 0.0, 0
-        # When it was last seen there with a path to drive, by both clocks.
+        # The last time that it had a path to drive there, by both clocks.
         self._had_path = 0.0, 0
-        # Number of times that it got its path again in that place.
+        # Number of times that it got its path again there.
         self._tries = 0
         # The robot's yaw when it last turned [rad], and the time of that turn.
         self._yaw, self._turned_at = 0.0, -math.inf
 
     def succeed(self, before: Standing) -> None:
-        """Take over the count of a predecessor, whose path was the robot's last one."""
+        """Take over a predecessor's count of the time and of the tries."""
         self._place, self._since, self._tries = before._place, before._since, before._tries
         self._had_path = before._had_path
 
@@ -62,7 +62,7 @@ class Standing:
         self._place = math.inf, math.inf
 
     def look(self, cell: Cell, now: float) -> None:
-        """Note the robot's cell, and its place."""
+        """Note the robot's cell and place; to be called in each step."""
         self._now = now
         self._note_place()
         self._note_yaw()
@@ -87,7 +87,7 @@ class Standing:
     def is_at(self, last: Cell | None) -> bool:
         """Return whether the robot stands in the last cell of a path that it did not complete.
 
-        It missed a cell, so its index on the path is before the last.
+        It has missed a cell, so that its index on the path is not the last one.
         """
         if self._cell != last or last == tuple(self._route.path.ahead[0].tolist()):
             return False
@@ -95,7 +95,7 @@ class Standing:
 
     @property
     def is_beside_path(self) -> bool:
-        """Whether the robot stands in another cell than its index on the path."""
+        """Whether the robot stands in a cell that is not its place on the path."""
         ahead = self._route.path.ahead
         is_beside = len(ahead) > 1 and self._cell != tuple(ahead[0].tolist())
         has_path_s = self._now - self._route.published_at
@@ -152,35 +152,35 @@ class Standing:
     def _in_place_s(self) -> float:
         """Return how long the robot has stood in one place with a path to drive.
 
-        This is the longer time of our clock and the robot's, as stamps may stand still.
+        It is the longer of the times by our clock and by the robot's, as stamps may stand still.
         """
         assert self._map.pose is not None
         since, since_ns = self._since
         return max(self._now - since, (self._map.pose.stamp_ns - since_ns) * 1e-9)
 
 
-# A follower repeats its report once a second; a report not repeated for this long is over.
-SHOWN_S = 3.0
+# A report is valid for this long, as the follower repeats it once a second.
+VALID_S = 3.0
 # Period of new paths for a follower that cannot join its path, or is blocked at an unknown place.
 AGAIN_S = 5.0
 
 
 class BlockedFollower:
-    """Keeps the newest report."""
+    """Keeps the follower's newest report of what keeps the robot from driving."""
 
     def __init__(self) -> None:
         self._newest: FollowerBlocked | None = None
         self._at = self._asked_at = -math.inf
 
     def take(self, event: FollowerBlocked, map_state: MapState, revision: int, now: float) -> bool:
-        """Take in a report on a path, and close floor for a while on which an obstacle is reported;
-        return whether that changes the map.
+        """Take in a report, and close floor with a reported obstacle for a while; return whether
+        that changes the map.
 
         Raises:
             WrongFrame: the report is in another frame than the map's.
         """
         grid = map_state.grid
-        # A follower that has a newer path by now repeats the report if it still applies.
+        # A report on an earlier path is ignored; the follower repeats it if it still applies.
         if grid is None or event.revision not in (0, revision):
             return False
         if event.frame != grid.frame:
@@ -208,4 +208,4 @@ class BlockedFollower:
         return f"the robot cannot follow it: {report.detail}"
 
     def _report(self, now: float) -> FollowerBlocked | None:
-        return self._newest if now - self._at <= SHOWN_S else None
+        return self._newest if now - self._at <= VALID_S else None

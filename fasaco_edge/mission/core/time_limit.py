@@ -1,7 +1,7 @@
-"""Time limit: how long the robot may go on with its order, and when it has to turn home.
+"""Time limit: the time within which an order has to end, with the robot at home.
 
-The time is the robot's, from the order's beginning on; charging and pauses count, as the robot has
-to be home by then. Time during which no daemon runs does not.
+The time starts with the order, and is measured by the robot's clock. Charging and pauses count;
+time without a running daemon does not.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 # Period of estimates [s].
 LOOK_EVERY_S = 5.0
 # Factor on estimated times, as lines are longer than walks over cells.
-SPARE = 1.2
-# Simulated robots run at some 20 times our clock; where stamps run faster, their clock was set.
-FASTEST = 30.0
+LINE_FACTOR = 1.2
+# Largest ratio of simulated time to ours; if stamps advance faster, their clock was set.
+MOST_SPEED_UP = 30.0
 
 
 class Lapse:
-    """Measures time since a look: the longer one by our clock and by the robot's.
+    """Time since a look: the longer of the times by our clock and by the robot's stamps.
 
-    Simulated time may run faster than ours, up to ``FASTEST``, and stamps may stand still.
+    Simulated time may run ``MOST_SPEED_UP`` times as fast as ours, and stamps may stand still.
     """
 
     def __init__(self, map_state: MapState) -> None:
         self._map = map_state
-        # Our time [s] and the stamp of the pose [ns], 0 without one, at the last look; None before
-        # the first.
+        # At the last look: our time [s], and the stamp of the pose [ns], 0 without one; None before
+        # the first look.
         self._since: tuple[float, int] | None = None
 
     @property
@@ -51,7 +51,7 @@ class Lapse:
         at, stamp_ns = self._since
         ours_s, newest_ns = now - at, self._stamp_ns
         theirs_s = 1e-9 * (newest_ns - stamp_ns) if stamp_ns and newest_ns else 0.0
-        return theirs_s if ours_s < theirs_s <= FASTEST * ours_s else ours_s
+        return theirs_s if ours_s < theirs_s <= MOST_SPEED_UP * ours_s else ours_s
 
     @property
     def _stamp_ns(self) -> int:
@@ -87,7 +87,7 @@ class TimeLimit:
 
     @property
     def minutes(self) -> float:
-        """The limit of the order, by itself or by the configuration; 0 for none [min]."""
+        """The time limit, of the order or else of the configuration; 0 for none [min]."""
         order = self.orders.order_state.order
         if order is None:
             return 0.0
@@ -103,11 +103,11 @@ class TimeLimit:
         return max(60.0 * self.minutes - state.spent_s, 0.0)
 
     def may_work_s(self, now: float) -> float:
-        """Return how long it may go on from here until it has to turn home [s]."""
+        """Return how long the robot may work from here until it has to turn home [s]."""
         left_s = self.left_s
         if left_s is None:
             return float("inf")
-        return left_s - self._looked.seconds(now) - SPARE * self._to_home_s
+        return left_s - self._looked.seconds(now) - LINE_FACTOR * self._to_home_s
 
     def is_due(self, now: float) -> bool:
         """Return whether the robot has to turn home at ``now``; to be called in each step."""

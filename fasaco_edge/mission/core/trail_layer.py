@@ -1,4 +1,4 @@
-"""Trail layer: the living trail, changed by ants, maps, paths and driving."""
+"""Trail layer: the living trail of a mission, updated by ants, maps, paths and driving."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class TrailLayer:
         return replace(request, problem=replace(request.problem, trail=self.snapshot()))
 
     def take(self, plan: CoveragePath) -> None:
-        """Take over what the ants of a plan have left, whether it is driven or not."""
+        """Take over the trail that the ants of a plan have left, whether it is driven or not."""
         self._follow_map()
         if plan.trail is not None:
             self._trail.take(plan.trail, plan.work.ants)

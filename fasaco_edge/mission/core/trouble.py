@@ -1,7 +1,7 @@
 """Troubles: faults of robot and inputs, in any state of the mission.
 
-The state gives the mission's activity, troubles give the faults at that time. A mission that drives
-with a trouble is ``degraded``; a state at rest stays as it is.
+A state names the mission's activity, troubles name the faults at the same time. A mission that
+drives with a trouble is ``degraded``; a state at rest does not change.
 """
 
 from __future__ import annotations
@@ -22,11 +22,10 @@ from fasaco_edge.mission.line.place_on_line import Offset
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 
-# Longest time between poses of a robot at rest, which may exceed ``lost_pose_s``; also the time to
-# wait for the first map and pose [s].
+# Timeout of poses at rest, if longer than ``lost_pose_s``; timeout of the first map and pose [s].
 REST_S = 30.0
-# How long a robot may stand where the map says it cannot be before that is a trouble [s].
-INSIDE_S = 20.0
+# Time at a place that is impossible by the map, after which that is a trouble [s].
+IMPOSSIBLE_S = 20.0
 
 # States of a robot that drives, or soon will.
 DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
@@ -85,7 +84,7 @@ class Troubles:
     found: tuple[Trouble, ...] = field(default=(), init=False)
     _current: DockCurrent = field(init=False)
     # The last time that the robot was at a possible place, or at rest [s].
-    _inside_since: float = field(default=math.inf, init=False)
+    _possible_at: float = field(default=math.inf, init=False)
 
     def __post_init__(self) -> None:
         self._current = DockCurrent(self.charging.gauge)
@@ -96,7 +95,7 @@ class Troubles:
         return self.charging.config.policy
 
     def succeed(self, before: Troubles) -> None:
-        """Go on with what another mission has found and counted: no limit begins anew."""
+        """Take over the findings and counts of a predecessor, so that no timeout starts again."""
         self.found = before.found
         self.monitor.succeed(before.monitor)
         self.charging.succeed(before.charging)
@@ -106,7 +105,7 @@ class Troubles:
         self.offset.succeed(before.offset)
 
     def look(self, state: State, now: float) -> None:
-        """Find the troubles at ``now`` [s] of a mission that is in a state; once in each step."""
+        """Find the troubles at ``now`` [s] in a state; to be called once in each step."""
         self.monitor.begin(now)
         is_docked = state is State.CHARGING or (
             state.is_at_rest and self.dock.holds(is_charging=self._current.is_docked)
@@ -157,16 +156,16 @@ class Troubles:
         return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
 
     def shut_in(self, _: State, now: float) -> str:
-        """Return what shuts the robot in, or that it has stood long at an impossible place."""
+        """Return what shuts the robot in, or why its place has long been impossible; else ""."""
         why = self.way_out.why
         if self.map.area is not None or not why:
-            self._inside_since = now
+            self._possible_at = now
             return why
-        self._inside_since = min(self._inside_since, now)
-        return f"{why}: pose or map is off" if now - self._inside_since > INSIDE_S else ""
+        self._possible_at = min(self._possible_at, now)
+        return f"{why}: pose or map is off" if now - self._possible_at > IMPOSSIBLE_S else ""
 
     def stands(self, _: State, now: float) -> str:
-        """Return the evidence that the robot is stuck; "" without poses: then it is not known."""
+        """Return the evidence that the robot is stuck; "" for none, as without poses."""
         if self.monitor.is_pose_lost(now):
             return ""
         return self.giving_way.why_stuck(now) or self.standing.why_stuck

@@ -1,8 +1,8 @@
 """Way out: back along the driven track, for a robot that the map has shut in.
 
-The hull fits wherever it has stood. Walls get thicker by a pixel from map to map, and legs of
-chairs come and go: a gap that the robot has just driven through may be too narrow on the next map.
-The robot then drives back along its track, with a smaller margin.
+On the next map a gap that the robot has just driven through may be too narrow: a wall is a pixel
+thicker there, or a chair has moved. The robot fits wherever it has stood, so it drives back along
+its track, with a smaller margin.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ TRACK_M, SPACING_M = 40.0, 0.05
 # On the way out the robot may come this much nearer to walls [pixels of the map]: a wall may be a
 # pixel thicker on the map than it is, and the pose off by half a pixel.
 SQUEEZE_PX = 1.5
-# A robot that has not come this far [m] on its way out after this time [s] cannot drive it. It
-# tries again after as long, then after twice as long each time, until it has come that far.
+# A robot that has not moved this far [m] on its way out after this time [s] cannot drive it. It
+# tries again after the same time, which doubles with each failure.
 STANDING_M, STANDING_S = 0.1, 15.0
-# The way out continues over this many points of the track past the place where the robot can go on.
+# Number of points of the track by which the way out leads past the first place where the robot can
+# continue.
 INTO_POINTS = 4
-# Longest loops that are left out first [points of the track].
+# Lengths of loops that are left out, the longest first [points of the track].
 LEAPS = (256, 128, 64, 32, 16, 8, 4, 2)
 NO_WAY: NDArray[np.float64] = np.empty((0, 2))
 
@@ -55,7 +56,7 @@ class WayOut:
         # Where the way out leads to, and the floor on which it was found.
         self._to: Point | None = None
         self._seen: tuple[FloorMap | None, int] = None, 0
-        # Where the robot stands, since when [s], and how often it could not drive a way from there.
+        # Where the robot stands, since when [s], and the number of ways that it could not drive.
         self._place: Point = math.inf, math.inf
         self._since = -math.inf
         self._tries = 0
@@ -67,7 +68,7 @@ class WayOut:
             self._track.append(here)
 
     def succeed(self, before: WayOut) -> None:
-        """Go on with the track that another mission has kept."""
+        """Continue with the track of a predecessor."""
         self._track = before._track
 
     def end(self) -> None:
@@ -88,8 +89,7 @@ class WayOut:
 
         Args:
             why: what shuts it in.
-            update: the path that this step has made up to now: an empty path is not withdrawn
-                again.
+            update: the path that this step has made so far; returned without a new one.
             now: time [s].
             goal: destination; None for the nearest work.
         """
@@ -118,7 +118,7 @@ class WayOut:
     def _lead(
         self, leads_on: Callable[[ReachableArea], bool], why: str, now: float
     ) -> NDArray[np.float64] | None:
-        """Return the way to publish, float64 (n, 2): x, y [m]; None to go on as before."""
+        """Return the way to publish, float64 (n, 2): x, y [m]; None to continue as before."""
         self.why = why
         floor, stamped, drives = self._map.floor, self._map.pose, self._route.is_way_out
         assert stamped is not None
@@ -145,9 +145,9 @@ class WayOut:
         return way
 
     def _find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
-        """Return the way from the robot back to where it can go on, float64 (n, 2): x, y [m].
+        """Return the way from the robot back to where it can continue, float64 (n, 2): x, y [m].
 
-        (0, 2) if there is none, or cells are counted.
+        It is empty, (0, 2), if there is none, or if only cells are counted.
         """
         floor, lattice, stamped = self._map.floor, self._map.lattice, self._map.pose
         if floor is None or lattice is None or stamped is None or self._map.grid is None:
@@ -161,7 +161,7 @@ class WayOut:
         radius = min(radius, fitting_radius(floor, raster[0]))
         if radius < LEAST_SHARE * full_px:
             return NO_WAY
-        # Areas in which the robot cannot go on, with its own area.
+        # Cells of areas in which the robot cannot continue, its own among them.
         seen = np.zeros(lattice.states.shape, bool)
         for index, (a, b) in enumerate(pairwise(raster), start=1):
             if not is_clear_between(floor, a, b, radius):
@@ -196,7 +196,7 @@ class WayOut:
 
 
 def _without_loops(floor: FloorMap, track: list[NDArray[np.float64]]) -> list[int]:
-    """Return the numbers of the points of a track that remain where it leaves out loops.
+    """Return the indices of a track's points that remain without its loops.
 
     Loops are left out only where the robot's whole disc fits; elsewhere the way keeps to the track.
     """

@@ -1,8 +1,8 @@
-"""Curver: makes a curve of the line just ahead of a robot that cannot turn on the spot.
+"""Curver: converts the line just ahead of a robot that cannot turn on the spot into curves.
 
 The line further ahead may still change, and becomes a curve when the robot comes near. A curve
-begins where the last one ends, with the heading there; after a change at the robot, with the
-robot's own pose. What is a curve is not polished any more.
+begins at the end of the last one, with the heading there; after a change at the robot, it begins at
+the robot's pose. Curves are not polished.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import Curve, curve_along
 
-# Once less than this of the line ahead is a curve, a piece of this length becomes one [m], and
-# longer by some turning radii.
+# Once the curve ahead is shorter than this, the next piece of the line becomes a curve; its length
+# is the sum of a distance and a number of turning radii [m], [m], [turning radii].
 AHEAD_M, PIECE_M, PIECE_RADII = 6.0, 6.0, 6.0
-# The last part of a piece is not kept: what follows decides how it is best driven.
+# Share of a piece's curve that is kept; the rest is made again together with the next piece.
 KEPT_SHARE = 0.6
-# If a turn does not fit at the end of the curve, it is made anew from this far ahead; the way to
-# the end of a shorter curve has no certain direction [m].
+# If a turn does not fit at the end of the curve, the curve is made anew from this distance ahead of
+# the robot; the end of a curve shorter than the second value has no certain direction [m].
 AGAIN_M, LEAST_M = 0.5, 0.1
-# A robot that is farther off the direction of its curve, or beside it, has left it [rad], [m]. The
-# curve is made anew from its pose, once until it has moved so far [m].
+# A robot whose heading or position is farther off its curve has left it [rad], [m]. The curve is
+# made anew from its pose, and again only after it has moved this far [m].
 ASTRAY_RAD, ASTRAY_M, MOVED_M = math.radians(35.0), 0.1, 0.05
-# Ways of the published line that are shorter have no direction of their own [m].
+# Segments of the published line shorter than this have no direction of their own [m].
 SHORT_M = 2e-3
-# A robot that drives backward, too, changes its direction at a sharper bend [rad].
+# A robot that can drive backward changes between forward and backward at a sharper bend [rad].
 REVERSAL_RAD = math.radians(120.0)
-# A curve keeps within this distance of its line [turning radii], and this more [m].
+# A curve keeps within the sum of these distances of its line [turning radii], [m].
 BESIDE_RADII, BESIDE_M = 5.0, 1.0
-# A robot that stands where its disc does not fit, as by an error of its pose, may leave by places
-# within this distance where the largest disc fits that fits at its own [m].
+# A robot that stands where its disc does not fit, as by an error of its pose, leaves with the
+# largest disc that fits there, within this distance [m].
 LEAVES_M = 0.5
 
 
@@ -63,7 +63,7 @@ class _Part:
     ) -> _Part:
         """Return the part around points, float64 (n, 2): y, x [pixels].
 
-        ``leaves``: whether the first one is the robot's, who may leave it.
+        ``leaves``: whether the first point is the robot's place, at which its disc may not fit.
         """
         whole = floor.geometry
         (row0, col0), (row1, col1) = points.min(axis=0) - margin, points.max(axis=0) + margin
@@ -87,7 +87,7 @@ class _Part:
 
 
 class Curver:
-    """Replaces pieces of the line.
+    """Replaces pieces of the line by curves.
 
     Args:
         config: the robot.
@@ -95,7 +95,7 @@ class Curver:
 
     def __init__(self, config: CurveConfig) -> None:
         self._config = config
-        # Where the robot was when it had left its curve, x, y [m].
+        # The robot's place when it last left its curve, x, y [m].
         self._astray_at = (math.inf, math.inf)
 
     def curve(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
@@ -146,7 +146,7 @@ class Curver:
             return np.full(len(xy), pose.yaw)
         ways = np.diff(xy, axis=0)
         along = np.arctan2(ways[:, 1], ways[:, 0])
-        # Short ways get the direction of the next one.
+        # Short segments get the direction of the next one.
         numbers = np.where(np.hypot(*ways.T) < SHORT_M, len(ways) - 1, np.arange(len(ways)))
         along = along[np.minimum.accumulate(numbers[::-1])[::-1]]
         is_back = np.zeros(len(ways), np.bool_)
@@ -159,7 +159,7 @@ class Curver:
         return np.append(yaw, yaw[-1])
 
     def _has_left(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
-        """Return whether the robot is not on its curve any more, and no curve was made since."""
+        """Return whether the robot has left its curve, and no curve was made anew since."""
         beside, here = ahead.beside, (pose.x, pose.y)
         edge_m = math.dist(*ahead.line.points[:2]) * floor.geometry.resolution
         if beside is None or edge_m < SHORT_M or math.dist(here, self._astray_at) < MOVED_M:
@@ -181,7 +181,7 @@ class Curver:
         xy = raster_to_map(floor.geometry, points)
         yaw = pose.yaw
         if first:
-            # Of the last way before it: the line may bend there.
+            # The heading of the segment before it, as the line may bend there.
             yaw = float(self.yaw(xy[: first + 1], pose)[-1])
         margin = (BESIDE_RADII * self._config.radius_m + BESIDE_M) / floor.geometry.resolution
         part = _Part.around(points[first:], floor, ahead, margin, leaves=not first)
@@ -199,6 +199,6 @@ class Curver:
             late = on_line[:1] if not len(early) else early[-1:]
             if len(late):
                 kept = int(late[0]) + 1
-                # The rest of the straight on which the last kept pose lies.
+                # Keep the rest of the segment on which the last kept pose lies.
                 end = first + int(curve.legs[kept - 1]) + 1
         ahead.put_curve(first, end, curve.xy[:kept])

@@ -1,8 +1,7 @@
-"""Floor left: the floor that the line ahead has to sweep, and what of it is credited, missed, or
-out of the tool's reach.
+"""Floor left: the unswept floor of an order, and how much of it the line ahead sweeps.
 
-The sequencer says which cells are asked for, the ledger which floor is swept; the tally of the line
-counts by pixel what the line sweeps of the rest.
+The sequencer gives the cells to cover, and the ledger the swept floor; the tally counts for each
+pixel of the rest how often the line sweeps it.
 """
 
 from __future__ import annotations
@@ -30,17 +29,17 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # The robot does not drive to a cell with less unswept floor than this [m2].
 LEAST_LEFT_M2 = 0.04
-# A passed cell is kept while the floor left in it, and in a rim of this width around it, is worth
-# this much [s], [m]; number of kept cells that are checked each time that the robot passes one. The
-# robot does not go back to them: at the end of a mission that took four robots a tenth more time,
-# for 0.1 % of the floor.
-WORTH_S, RIM_M, LOOKED_AT = 4.0, 0.1, 24
-# Nor does it go back for floor that was missed here and there, up to this share of all floor: on
-# the map of a real scan matcher that took an eighth more time, for 0.3 % of the floor. A base that
-# drives beside its line misses more, and poses that come seldom leave more unknown.
+# A passed cell is kept in the ledger while the unswept floor in it and in a rim around it is worth
+# this much [s]; width of the rim [m]; number of kept cells that are checked when the robot passes a
+# cell. The robot does not return to them: for four robots that took a tenth more time, for 0.1 % of
+# the floor.
+WORTH_S, RIM_M, CHECKED_CELLS = 4.0, 0.1, 24
+# The robot returns for missed floor if that is more than this share of the floor asked for: a base
+# that drives beside its line misses more, and so do poses at a low rate. To return for less took an
+# eighth more time, for 0.3 % of the floor, on the map of a real scan matcher.
 LEAST_MISSED = 0.05
 # Least unswept floor that is reported at the end [m2]: less would be rounded to 0.
-LEAST_TOLD_M2 = 0.05
+LEAST_REPORTED_M2 = 0.05
 
 
 class FloorToSweep(NamedTuple):
@@ -67,8 +66,8 @@ class FloorToSweep(NamedTuple):
 
 
 class FloorLeft:
-    """Keeps the tally of the line up to date with map, order and ledger; inactive where cells are
-    counted: there is no floor then."""
+    """Keeps the tally of the line up to date with map, order and ledger; inactive without a floor,
+    when only cells are counted."""
 
     def __init__(
         self,
@@ -84,7 +83,7 @@ class FloorLeft:
         self._tally: SweepTally | None = None
         # Window in which causes of unreachable floor may be outdated.
         self._unexplained: Window | None = None
-        # The newest reachable area, and the cells of it whose floor counts as reachable.
+        # The newest reachable area, and its cells whose floor counts as reachable.
         self._reach: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
         # Window of the last update, with its asked-for and its reachable cells.
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
@@ -92,11 +91,11 @@ class FloorLeft:
         # pixels.
         self._swept: tuple[SweptFloor | None, int] = None, 0
         self._forgotten = 0
-        # Floor of an order that is over which may be reachable [m2].
+        # Floor of a finished order that would be reachable if walls were thinner [m2].
         self._possible_m2: float | None = None
 
     def follow(self, floor: FloorMap, tally: SweepTally) -> bool:
-        """Follow another map; return whether its raster is another, so that all may differ."""
+        """Follow the newest map; return whether it has a new raster, on which all may differ."""
         is_other, self._tally = tally is not self._tally, tally
         if is_other:
             self._unexplained = self._asked = None
@@ -106,7 +105,7 @@ class FloorLeft:
 
     @property
     def has_forgotten(self) -> bool:
-        """Whether swept floor was forgotten since the last update: it is to be opened first."""
+        """Whether the ledger has forgotten swept floor since the last update, to be swept again."""
         return self._ledger.floor.forgotten != self._forgotten
 
     @property
@@ -130,10 +129,7 @@ class FloorLeft:
         return tally is not None and tally.open_m2 - tally.left_m2 >= self._worth_m2
 
     def sum_up(self) -> str:
-        """Return at the end of an order how much floor was swept, as text that follows another.
-
-        "" if hardly any floor is left.
-        """
+        """Return how much floor an order has swept, as the end of a sentence; "" if nearly all."""
         floor, grid, stamped = self._map.floor, self._map.grid, self._map.pose
         self._possible_m2 = None
         if floor is None or grid is None or stamped is None or self._map.area is None:
@@ -141,7 +137,7 @@ class FloorLeft:
         asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
         cut_off = self._orders.known(self._map.area.lattice) & ~self._map.area.reachable
         if self._tally is not None:
-            # Of the whole order, not of its last part.
+            # For the whole order, not only for its last part.
             self.update()
         thinner_m = grid.geometry.resolution
         self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, cut_off)
@@ -150,10 +146,10 @@ class FloorLeft:
             return ""
         possible = max(self._possible_m2 or 0.0, found.asked_m2)
         left_m2 = found.ahead_m2 + found.left_m2 + found.passed_m2
-        if left_m2 + possible - found.asked_m2 < LEAST_TOLD_M2:
+        if left_m2 + possible - found.asked_m2 < LEAST_REPORTED_M2:
             return ""
         swept = f"; {found.asked_m2 - left_m2:.1f} of {found.asked_m2:.1f} m2 of floor swept"
-        if possible - found.asked_m2 < LEAST_TOLD_M2:
+        if possible - found.asked_m2 < LEAST_REPORTED_M2:
             return swept
         return f"{swept}, or of {possible:.1f} m2 if walls are a pixel thinner than on the map"
 
@@ -166,8 +162,8 @@ class FloorLeft:
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Count passed cells as covered if hardly any of their floor is left.
 
-        A polished line need not pass the stand of a cell. Cells in which no floor is asked for, as
-        those of another robot's part, need a visit although no floor seems left in them.
+        A polished line may skip the stand of a cell. A cell without floor asked for, as in another
+        robot's part, seems swept but still needs a visit.
         """
         tally, floor, covered = self._tally, self._map.floor, self._ledger.current
         assert tally is not None
@@ -192,15 +188,14 @@ class FloorLeft:
         assert floor is not None
         for row, col in passed.tolist():
             kept.note((row, col))
-        for cell in kept.next(LOOKED_AT) if len(passed) else ():
+        for cell in kept.next(CHECKED_CELLS) if len(passed) else ():
             if tally.open_in_m2(floor.box_of(cell, RIM_M)) < self._worth_m2:
                 kept.drop(cell)
 
     def open_missed(self) -> bool:
-        """Open cells again whose floor left is worth driving through them; return whether there are
-        any.
+        """Reopen covered cells whose missed floor is worth the drive; return whether there are any.
 
-        To be called at the end of a path: the robot may have driven beside its line.
+        To be called at the end of a path, as the robot may have driven beside its line.
         """
         tally, floor, lattice = self._tally, self._map.floor, self._map.lattice
         if tally is None or floor is None or lattice is None or self._map.pose is None:
@@ -238,14 +233,13 @@ class FloorLeft:
             tally.set_causes(strip, causes_of(floor, free, self._asked[2], strip))
 
     def update(self, touched: Window | None = None) -> None:
-        """Update the tally where the floor to sweep may have changed; also in a window of it."""
+        """Update the tally where order or ledger have changed, and in a window of the raster."""
         tally, floor = self._tally, self._map.floor
         assert tally is not None
         assert floor is not None
         swept = self._ledger.floor
         whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-        # After a reset the floor is another object, and changed everywhere; likewise after
-        # forgetting.
+        # A reset makes another object, and forgetting may change any pixel.
         known, since = self._swept
         news = swept.changed_since(since) if known is swept else ANYWHERE
         if known is not swept or self.has_forgotten:
@@ -260,7 +254,7 @@ class FloorLeft:
             for strip in strips(part):
                 wanted = floor.reached(self._asked[1], strip)
                 if self._orders.cells.is_at_edge:
-                    # The tool also reaches floor of the cells within, which is not asked for.
+                    # Along the edge the tool reaches into inner cells, which are not asked for.
                     within = self._asked[2] & ~self._asked[1]
                     wanted &= ~floor.lying_in(within, strip)
                 tally.set_open(strip, wanted, swept.swept_on(floor.geometry, strip))
@@ -273,7 +267,7 @@ class FloorLeft:
     def _asked_part(self, floor: FloorMap) -> Window | None:
         """Update the asked-for cells; return the window of pixels where they changed."""
         area = self._map.area
-        # Without a reachable area nothing is known; once there is one, everything is updated.
+        # The first update with a reachable area covers the whole raster.
         if area is None or area.lattice.window != floor.stands.lattice.window:
             return None
         window, reachable = area.lattice.window, self._reachable(area)
@@ -289,8 +283,8 @@ class FloorLeft:
     def _reachable(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells whose floor counts as reachable, bool (rows, cols) of an area.
 
-        Those of the area; if the robot is shut in, all that have been reachable: else nearly all
-        floor would seem swept while it waits in a corner.
+        These are the area's reachable cells. For a robot that is shut in, they are all cells that
+        were reachable before: nearly all floor would seem swept while it waits in a corner.
         """
         if self._reach[0] is not area:
             reachable = area.reachable

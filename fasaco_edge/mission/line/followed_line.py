@@ -39,28 +39,28 @@ from fasaco_edge.mission.line.way import (
     is_clear_between,
 )
 
-# Number of nearest cells tried for one that the robot can drive to straight.
-TRIED = 8
+# The nearest cell is the first of this many to whose stand the robot can drive straight.
+NEAREST_CELLS = 8
 
 
 class FollowedLine:
-    """Owns the line, which begins at the last point behind the robot, and its sweeps.
+    """The line, which begins at the last point behind the robot.
 
     Attributes:
-        tally: counts of its sweeps.
+        tally: how often the line sweeps each pixel.
         cell: index of the robot's cell in the walk.
 
     Args:
         floor: the floor under it.
-        is_curved: whether the robot cannot turn on the spot, so that it is along the line.
+        is_curved: whether the robot cannot turn on the spot, and so is aligned with its line.
     """
 
     def __init__(self, floor: FloorMap, *, is_curved: bool = False) -> None:
         self.tally = SweepTally(floor)
         self.cell = 0
         self._floor, self._geometry, self._is_curved = floor, floor.geometry, is_curved
-        # The walk and its line; if a map has cut the walk off, with all beyond: the next walk
-        # mostly leads there again. And how many of the walk's cells come before the cut.
+        # The walk and its line, including the part that a map has cut off, as the next walk mostly
+        # leads there again; the number of the walk's cells before the cut.
         self._walk: Walk = np.empty((0, 2), np.int32)
         self._whole, self._until = Line(), 0
         self._place = PlaceOnLine()
@@ -103,7 +103,7 @@ class FollowedLine:
     def _carry(self, before: GridGeometry) -> None:
         """Convert to the floor's raster, which has another size or is shifted by part of a pixel.
 
-        If a mapper's map begins at the farthest point seen, all its pixels move with that point.
+        The maps of some mappers begin at the farthest point seen, and their pixels shift with it.
         """
         carried = partial(raster_to_raster, before, self._geometry)
         self._whole = self._whole.at(carried(self._whole.points))
@@ -125,14 +125,14 @@ class FollowedLine:
         self._place.here = self._place.here + np.array(by)
 
     def stop(self) -> None:
-        """Leave the line for a path that is kept while the robot stands, as in a pause."""
+        """Number the walk's cells from the robot's on: the path is kept while the robot stands."""
         self._whole = self._whole.renumbered(-self.cell)
         self._walk, self._until, self.cell = self._walk[self.cell :], self._until - self.cell, 0
 
     def drive(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
-        """Note the robot's pose; the driven part is dropped.
+        """Note the robot's pose; drop the driven part of the line.
 
-        ``farthest_m``: how far it can have driven since the pose before; 0 if not known [m].
+        ``farthest_m``: the farthest it may have driven since the previous pose; 0 if unknown [m].
         """
         self._see(pose)
         look_m = max(LOOK_AHEAD_M, farthest_m)
@@ -147,7 +147,7 @@ class FollowedLine:
             self.tally.pass_line(self.line.points[: number + 1])
             self.tally.exchange(edges_between(self.line.points[: number + 1]), NO_EDGES)
             self._whole = self._whole.part(number)
-        # At the last cell the robot has arrived, which is checked below.
+        # Being in the last cell means arrival, which is checked below.
         first, second = self.line.cells[:2].tolist()
         nearest = self._nearest(max(first, self.cell), second + 1)
         self.cell = max(self.cell, min(nearest, self._until - 2))
@@ -157,7 +157,7 @@ class FollowedLine:
 
     @property
     def is_followed(self) -> bool:
-        """Whether the robot is on the line, within half the tool."""
+        """Whether the robot is on the line, within half the tool's width."""
         return self._place.is_on(self.line.points, self._tool)
 
     @property
@@ -173,7 +173,7 @@ class FollowedLine:
 
     @property
     def beside(self) -> Beside | None:
-        """The robot's place beside the line; None if it does not follow one."""
+        """The robot's offset from the line; None if it does not follow one."""
         return self._place.beside(self.line.points, self.tally.unit_m) if self.is_followed else None
 
     @property
@@ -198,7 +198,7 @@ class FollowedLine:
     def put(self, first: int, end: int, points: Points) -> None:
         """Replace the points from ``first`` to ``end`` by polished ones, and update the counts.
 
-        The first and the last one stay, and keep their cells.
+        The first and the last point stay, and keep their cells.
         """
         line = self._whole
         begin, last = int(line.cells[first]), int(line.cells[end - 1])
@@ -210,7 +210,7 @@ class FollowedLine:
     def put_curve(self, first: int, end: int, xy: Points) -> None:
         """Replace the points from ``first`` to ``end`` by a curve, float64 (n, 2): x, y [m].
 
-        From the first point on the curve begins at the robot.
+        If ``first`` is 0, the curve begins at the robot.
         """
         line, geometry = self._whole, self._floor.geometry
         points = np.array([map_to_raster(geometry, x, y) for x, y in xy.tolist()])
@@ -230,10 +230,11 @@ class FollowedLine:
     def _nearest(self, begin: int, end: int) -> int:
         """Return the nearest cell of the walk from ``begin`` to ``end``.
 
-        It has to have a stand that the robot can drive to straight, as the next walk begins there.
+        The next walk begins there, so cells count first to whose stand the robot can drive
+        straight.
         """
         stands, here = self._stands(begin, end), self._place.here
-        nearest: list[int] = by_distance(here, stands)[:TRIED].tolist()
+        nearest: list[int] = by_distance(here, stands)[:NEAREST_CELLS].tolist()
         seen = (number for number in nearest if self._is_clear(here, stands[number]))
         return begin + next(seen, nearest[0])
 
@@ -248,7 +249,7 @@ class FollowedLine:
     def lengths(self, within_m: float = math.inf) -> NDArray[np.float64]:
         """Return the distance along the line to each point, float64 (n,) [m]; the first is 0.
 
-        Only for the first points, up to one that is farther than ``within_m`` [m], if there is one.
+        The result may end at the first point that is farther than ``within_m`` [m].
         """
         unit_m = self.tally.unit_m
         return lengths(self.line.points, within_m / unit_m, self._place.along) * unit_m

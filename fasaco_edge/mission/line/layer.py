@@ -45,11 +45,11 @@ class AheadFigures(NamedTuple):
 
 
 class LineLayer:
-    """Owns the line; inactive where cells are counted.
+    """Owns the line; inactive when only cells are counted.
 
     Attributes:
         left: the floor that the line has to sweep.
-        offset: whether the robot drives beside the line all the time.
+        offset: the robot's constant offset from the line.
     """
 
     def __init__(
@@ -68,8 +68,8 @@ class LineLayer:
         self._curver = Curver(sweeping.curves) if sweeping and sweeping.curves else None
         self._publication = Publication(route, sweeping.line.speed_m_s if sweeping else 0.0)
         self._ahead: LineAhead | None = None
-        # Window of map and floor that may have changed since the last update, and since the line
-        # was checked: not while the robot is stopped.
+        # Windows of map and floor that may have changed since the last update, and since the last
+        # check of the line, which waits while the robot is stopped.
         self._touched: Window | None = None
         self._unchecked: Window | None = None
         self._is_dropped = self._is_settled = False
@@ -77,7 +77,7 @@ class LineLayer:
         self._seen: tuple[FloorMap | None, int] = None, 0
 
     def note_map(self) -> None:
-        """Follow the newest map; to be called with each."""
+        """Follow the newest map; to be called with each map."""
         floor = self._map.floor
         if floor is None or (floor is self._seen[0] and floor.revision == self._seen[1]):
             return
@@ -99,12 +99,12 @@ class LineLayer:
     def note_pose(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
         """Note the robot's pose, which may be on its line.
 
-        ``farthest_m``: how far it can have driven since the pose before; 0 if not known [m].
+        ``farthest_m``: the farthest it may have driven since the previous pose; 0 if unknown [m].
         """
         ahead = self._ahead
         if ahead is None:
             return
-        # Forgotten floor is opened before more is passed.
+        # Forgotten floor is reopened before the robot passes more.
         if self.left.has_forgotten:
             self.left.update()
         before = self._route.held.index
@@ -141,7 +141,7 @@ class LineLayer:
                 why = "map on another raster" if self._is_dropped else "robot further on its path"
                 update = replace(self._route.publish_anew(why, now), may_wait=True)
         if ahead.is_cut and not self._route.is_cut:
-            ahead.end_at_cut()  # so does the next plan, or the path was given up
+            ahead.end_at_cut()  # the next plan ends there, too, or the path was given up
         self._is_dropped = False
         is_driven = len(self._route.path.cells) > 0
         if is_driven and self._unchecked is not None:
@@ -149,13 +149,13 @@ class LineLayer:
             self._unchecked = self._unchecked if ahead.is_cut else None
         if touched is not None:
             self._is_settled = not self._orders.cells.is_exploring
-        # Urgent updates are published first. With a map or a plan only a change is polished that
-        # is due; the rest comes with the next pose.
+        # Urgent updates are published unpolished. In a step with a map or a plan only a change that
+        # is due is polished; other polishing comes with the next pose.
         held = self._publication.look(ahead)
         may_change = (update is None or update.may_wait) and not reason and not is_further
         is_new = update is not None or touched is not None
         may_change = may_change and not (is_new and (ahead.is_cut or not self._publication.is_near))
-        # On such a way the robot sweeps nothing beside its path.
+        # A way is not polished, as the robot sweeps nothing beside it.
         if may_change and is_driven and not self._is_way:
             held = max(held, ahead.line.first_below(CURVED)) if self._curver else held
             self._polisher.polish(ahead, self._map.floor, held, is_settled=self._is_settled)
@@ -169,10 +169,7 @@ class LineLayer:
         return replace(update, yaw=self._curver.yaw(update.xy, stamped.pose))
 
     def _curve(self, curver: Curver, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> str:
-        """Make a curve of the line where it is due; return why to publish a way, or "".
-
-        On a way nothing waits for the robot to come near.
-        """
+        """Make the next curve if it is due; return why to publish a way at once, or ""."""
         if not curver.curve(ahead, floor, pose):
             return ""
         self._publication.look(ahead)
@@ -193,14 +190,15 @@ class LineLayer:
         ahead.lay(cells, pose, is_cut=is_cut, keeps=not self._is_way, beside=beside)
 
     def unswept(self) -> tuple[GridGeometry, NDArray[np.uint8]] | None:
-        """Return the raster, and why its pixels are not swept, see ``Unswept``."""
+        """Return the raster, and why its pixels are not swept, uint8 (rows, cols) of ``Unswept``;
+        None without a floor."""
         floor = self._map.floor
         if floor is None or self._ahead is None or self.left.areas is None:
             return None
         return floor.geometry, self._ahead.tally.unswept()
 
     def ahead(self) -> AheadFigures | None:
-        """Return figures of the line ahead; None where cells are counted, or without a line."""
+        """Return figures of the line ahead; None when only cells are counted, or without a line."""
         to_sweep, floor = self.left.areas, self._map.floor
         if self._ahead is None or self._config is None or to_sweep is None or floor is None:
             return None

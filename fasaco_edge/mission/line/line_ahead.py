@@ -54,12 +54,12 @@ class LineAhead(FollowedLine):
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
             is_cut: whether the walk ends where a map has cut off the previous one.
-            keeps: False for a walk that is only a way, see ``way``: a polished line reaches its
-                cells in another order, and by far longer ways.
+            keeps: whether to keep parts of the line; False for a way, see ``way``, as a polished
+                line leads to the same cells by far longer ways.
             beside: discs that such a way keeps clear of, as ``Route.beside``.
         """
         self._see(pose)
-        # A plan's cells are read-only; for those kernels would be compiled again, in the loop.
+        # A plan's cells are read-only: for that type numba would compile the kernels again.
         walk = walk.copy()
         # Any line ends before a cell that is off the lattice.
         lattice = self._floor.stands.lattice
@@ -87,7 +87,7 @@ class LineAhead(FollowedLine):
             self._take([Piece(way.only(shortened(way.points, self._floor, beside)), -1)])
 
     def _past(self, discs: Points) -> Line:
-        """Return the line with a corner by which the robot comes no nearer to discs, if it can."""
+        """Return the line with a corner that keeps the robot off discs, if possible."""
         line = self.line
         if not len(discs) or len(line) < 2:
             return line
@@ -140,7 +140,7 @@ class LineAhead(FollowedLine):
             if not self._is_clear(line.points[number], line.points[number + 1])
         ]
         if blocked[:1] == [0] and self.is_followed:
-            # The step that leads a robot out is never clear; do not add one with each map.
+            # A lead-out is never clear; do not add another one with each map.
             blocked = blocked[leads_out(self._floor, self._place.here, line.points[1]) :]
         if not blocked:
             return False
@@ -152,7 +152,8 @@ class LineAhead(FollowedLine):
     def xy(self) -> Points:
         """Return the line from the robot on, float64 (n, 2): x, y in the map frame [m].
 
-        A robot beside its line begins at its place on it, unless its disc does not fit at its pose.
+        It begins at the robot's place on the line; if the disc does not fit at the robot's pose, it
+        begins at that pose.
         """
         points, here = self._from_place(), self._place.here
         if len(points) > 1:

@@ -1,4 +1,4 @@
-"""Pieces of a line, and how they are joined to a line.
+"""Pieces of a line, and the joining of pieces to a line.
 
 A line along a new walk reuses the pieces of the previous line that lead along the same cells,
 forward or backward; between them it goes over stands.
@@ -27,7 +27,7 @@ class Piece:
 
     Attributes:
         line: the piece, as in the new line.
-        begin: index of its first point in the previous line, or of its last point if ``backward``.
+        begin: lowest index of its points in the previous line.
         backward: whether the direction is reversed.
     """
 
@@ -61,7 +61,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
             turned = Line(part.points[::-1], cells, part.state[::-1])
             pieces.append(Piece(turned, first, backward=True))
         else:
-            # If both begin together, include the point behind the robot.
+            # If both walks begin with this run, include the point behind the robot.
             first = 0 if begin == origin == 0 else line.before(origin + 1)
             last = line.before(origin + steps)
             pieces.append(Piece(line.part(first, last).renumbered(begin - origin), first))
@@ -71,7 +71,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
 def exchanged(line: Line, pieces: list[Piece]) -> tuple[Line, Edges, Edges]:
     """Return the line that consists of pieces, with the edges removed and the edges added.
 
-    Points where the line differs, and where an old piece meets a new one, are to be polished again.
+    Points of new pieces, and those at joints of old pieces, are RAW, to be polished again.
 
     Args:
         line: the previous line.
@@ -100,7 +100,7 @@ class Joiner:
     """Joins pieces to a line, with stands between them.
 
     Attributes:
-        here: the robot's position, where the line begins without a piece.
+        here: the robot's position, at which the line begins unless a piece begins there.
         walk: int32 (n, 2), the walk of the new line.
         begin: index of the robot's cell in the walk.
         stand: returns the stand of a cell, float64 (2,).
@@ -156,8 +156,8 @@ class Joiner:
             if last is None:
                 self._append(self.begin, until)
                 return
-            # After a moved point its own cell's stand can be skipped; after the robot's position,
-            # too, if the floor there is swept.
+            # The stand of the last point's own cell can be skipped; at the robot's position only if
+            # the floor there is swept.
             at = max(int(self._done[-1].line.cells[-1]), self.begin)
             is_here = self._is_here()
             starts = [at]
@@ -172,9 +172,9 @@ class Joiner:
             self._drop_last()
 
     def _lead_in(self, at: int) -> bool:
-        """Lead from the robot's position to a cell whose stand it does not see, if there is a way.
+        """Append a way round obstacles from the robot to a cell's stand; return whether it exists.
 
-        A polished line passes places from which no stand can be seen.
+        A polished line passes places without a clear straight way to any stand.
         """
         stand = self.stand(self.walk[at])
         corners = self.way(self.here.points[-1], stand)
@@ -186,9 +186,8 @@ class Joiner:
     def _append(self, first: int, until: int) -> bool:
         """Append the stands of cells up to ``until``, excluding it; return whether that is clear.
 
-        A stand that nearly coincides with the last point is left out. The segment from the stand
-        to the next one is clear, but from that point it may just be blocked: then nothing is
-        appended.
+        A stand that nearly coincides with the last point is left out. Nothing is appended if the
+        segment from that point to the next stand is then blocked.
         """
         if first >= until:
             return True
@@ -217,7 +216,7 @@ class Joiner:
         return len(self._done) == 1 and self._done[0].line is self.here
 
     def _drop_last(self) -> None:
-        """Drop the last point; of the robot's edge both points, or none."""
+        """Drop the last point; the two points of the robot's edge are dropped together."""
         if self._is_here():
             self._done = []
             return

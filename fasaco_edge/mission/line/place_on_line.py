@@ -1,15 +1,14 @@
-"""Place on line: where on its line the robot is, in which cells, and whether always beside it.
+"""Place on line: the robot's place on its line, the cells of the line's points, and the offset.
 
 Lengths are in pixels of the fine raster, as the line's points, float64 (n, 2).
 
-Alignment of a line with its walk: the cell of the walk that each point stands for.
+Alignment: assigns a cell of the walk to each point of the line. The polisher moves, removes and
+inserts points, so their cells are found again by distance (dynamic time warping, Sakoe and Chiba
+1978).
 
-The polisher moves, removes and inserts points, and its lanes may differ from those of the walk; so
-the cells are found again by place (dynamic time warping, Sakoe and Chiba 1978).
-
-Offset: a robot strays from its line at corners and after a push, to either side. A robot that stays
-on one side by the same distance, metre after metre, has a fault that it cannot detect: its pose is
-not that of the point that its base leads along the line, or the base pulls to a side.
+Offset: tracking errors at corners and after a push are to either side. A constant offset has a
+cause that the robot cannot detect: the pose is not that of the point that the base steers along the
+line, or the base pulls to a side.
 """
 
 from __future__ import annotations
@@ -25,37 +24,37 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.mission.line.polyline import Numbers, Points
 
-# The robot is searched for this far ahead on its line, or as far as it can have driven [m]: farther
-# ahead, another lane may be as near.
+# The robot's place is searched this far ahead on its line, or as far as it may have driven [m]:
+# beyond, another lane may be as near.
 LOOK_AHEAD_M = 0.8
-# Distance to the end of its line at which a robot has arrived [m]; it has also arrived if the tool
-# covers the end and this many poses come no nearer, as a robot may drive beside its line.
+# A robot has arrived within this distance of the end of its line [m]. A robot beside its line has
+# arrived once its tool covers the end, and this many poses in a row come no nearer.
 ARRIVED_M, STANDING_POSES = 0.05, 10
-# Cosine of the largest angle between a robot that cannot turn on the spot and the edge it is on:
-# its curve crosses itself within the distance in which it is searched for.
-ALONG = math.cos(math.radians(40.0))
+# Cosine of the largest angle between the edge and the heading of a robot that cannot turn on the
+# spot: its curve may cross itself within the searched distance.
+LEAST_COSINE = math.cos(math.radians(40.0))
 
-# Offsets are taken this far apart, at this distance from corners; farther apart two poses are a
-# jump [m].
+# Spacing of the samples of the offset, their least distance from corners, and the distance between
+# two poses that is a jump [m].
 STEP_M, CORNER_M, JUMP_M = 0.05, 0.25, 1.0
 # A bend of more than this is a corner [rad].
 BEND_RAD = math.radians(10.0)
-# Number of samples used, of the last 10 m; and least number, of 5 m.
-MOST, LEAST = 200, 100
-# The least offset that counts: a share of the tool's width, and a distance that no follower can
-# keep more exactly [m].
+# Greatest and least number of samples: of the last 10 m, and of 5 m.
+MOST_SAMPLES, LEAST_SAMPLES = 200, 100
+# The least offset that counts is the larger of a share of the tool's width and the accuracy of a
+# follower [m].
 TOOL_SHARE, LEAST_M = 0.1, 0.03
-# Share of the offsets that must be on that side.
+# Least share of the samples on one side.
 ONE_SIDE = 0.8
 
 
 class Beside(NamedTuple):
-    """Where a robot is beside its line.
+    """A robot's offset from its line.
 
     Attributes:
-        left_m: how far left of the line, negative to its right [m].
+        left_m: distance to the left of the line, negative to its right [m].
         heading: direction of the line there [rad].
-        bend: angle between that and the way to a point ``CORNER_M`` ahead [rad].
+        bend: angle from this direction to a point on the line ``CORNER_M`` ahead [rad].
     """
 
     left_m: float
@@ -84,11 +83,11 @@ class PlaceOnLine:
         return place
 
     def is_on(self, points: Points, tool: float) -> bool:
-        """Return whether the robot is on the line, within half the tool."""
+        """Return whether the robot is on the line, within ``tool``, half the tool's width."""
         return len(points) > 1 and math.hypot(*(self.on(points) - self.here)) <= tool
 
     def beside(self, points: Points, unit_m: float) -> Beside | None:
-        """Return where the robot is beside its line; None at its end.
+        """Return the robot's offset from its line; None at the end of the line.
 
         ``points`` is as for ``find``; ``unit_m``: edge of a pixel [m].
         """
@@ -119,11 +118,12 @@ class PlaceOnLine:
         Args:
             points: points of the line.
             tool: half of the tool's width, the greatest distance from the line.
-            look: how far ahead it is searched for.
-            along: unit vector of its heading, (2,), if it is only on edges along that, either way.
+            look: the distance ahead that is searched.
+            along: unit vector of the robot's heading, (2,), to search only edges along it, in
+                either direction; None for all edges.
 
         Returns:
-            The index of the nearest edge; None if none is within that distance.
+            The index of the nearest edge; None if no edge is within ``tool``.
         """
         nearest, at = tool, None
         for number in range(len(points) - 1):
@@ -134,7 +134,9 @@ class PlaceOnLine:
             share = float(np.dot(self.here - points[number], edge)) / length**2
             share = min(max(share, low), high)
             apart = math.hypot(*(points[number] + share * edge - self.here))
-            is_across = along is not None and abs(float(np.dot(edge, along))) < ALONG * length
+            is_across = (
+                along is not None and abs(float(np.dot(edge, along))) < LEAST_COSINE * length
+            )
             if apart < nearest - 1e-6 and (number == 0 or not is_across):
                 nearest, at = apart, (number, share)
             look -= (high - low) * length
@@ -171,9 +173,9 @@ class Offset:
     def __init__(self, tool_m: float) -> None:
         """Begin; ``tool_m``: width of the tool [m]."""
         self._limit_m = max(TOOL_SHARE * tool_m, LEAST_M)
-        self._left_m: deque[float] = deque(maxlen=MOST)
-        # The last pose, the line's heading there, and how far it was driven since a corner and
-        # since the last offset.
+        self._left_m: deque[float] = deque(maxlen=MOST_SAMPLES)
+        # The last position, and the line's heading there; distance driven since the last corner,
+        # and since the last sample.
         self._last: tuple[Point, float] | None = None
         self._straight_m = self._since_m = 0.0
 
@@ -200,8 +202,8 @@ class Offset:
 
     @property
     def why(self) -> str:
-        """How far beside its line the robot drives; "" if it does not."""
-        if len(self._left_m) < LEAST:
+        """The robot's constant offset from its line, in words; "" for none."""
+        if len(self._left_m) < LEAST_SAMPLES:
             return ""
         middle_m = median(self._left_m)
         same = sum(left_m * middle_m > 0.0 for left_m in self._left_m)
@@ -216,9 +218,9 @@ NOWHERE_PX2 = 1e12
 
 
 def aligned(points: Points, stands: Points) -> Numbers:
-    """Return the index of each point's stand, ascending; ends belong to ends.
+    """Return the index of each point's stand, ascending, from the first stand to the last.
 
-    The sum of the squared distances between points and their stands is the least.
+    Minimises the sum of the squared distances between points and their stands.
 
     Args:
         points: float64 (n, 2): y, x [pixels], n of 2 or more.

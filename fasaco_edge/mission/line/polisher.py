@@ -1,4 +1,4 @@
-"""Polisher: polishes the line ahead of the robot, a piece at a time.
+"""Polisher: local search and annealing of the line ahead of the robot, a piece at a time.
 
 The line just ahead of the robot stays as it is published; farther ahead it may still change.
 """
@@ -42,7 +42,7 @@ ANNEAL_MOVES, HOTTEST = 300, 0.3
 SEEN_M = 20.0
 # Limit on the moves per call, which bounds a cycle of the loop.
 MOST_MOVES = 3000
-# Value of the greatest detour that excludes detours.
+# Limit on the length of a detour that excludes all detours.
 NO_DETOURS = -1e6
 
 
@@ -59,9 +59,8 @@ class Polisher:
     def polish(self, ahead: LineAhead, floor: FloorMap, held: int, *, is_settled: bool) -> None:
         """Polish the next piece of the line.
 
-        On a map that still grows (``is_settled`` is False) random moves are included, but only
-        those at no loss: the floor that a detour or a lane was for may be swept by another lane
-        meanwhile.
+        On a map that still grows (``is_settled`` is False) annealing accepts only moves without a
+        loss; these drop detours to floor that another lane sweeps meanwhile.
 
         Args:
             ahead: the line.

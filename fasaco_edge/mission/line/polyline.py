@@ -140,7 +140,8 @@ def lengths(points: Points, within: float, along: float) -> NDArray[np.float64]:
 
     Args:
         points: float64 (n, 2), n of 1 or more.
-        within: a distance [pixels]: m is n, or the last of the points is farther than this.
+        within: distance that the result covers [pixels]: m may be less than n if the last of the m
+            points is farther.
         along: fraction of the first edge that is not counted.
     """
     count = FIRST_POINTS

@@ -1,10 +1,10 @@
-"""Published line: the part of the line that the robot has, and when it needs the newest line.
+"""Published line: the line as last published, and the decision when to publish a changed one.
 
-Maps, plans and polish change the line all the time, mostly far ahead of the robot. A change waits
-until the robot comes near it: it may be undone before, and is published with others. What is
-published stays as it is for the next metres: polish begins beyond.
+Maps, plans and polishing change the line all the time, mostly far ahead of the robot. A change
+waits until the robot comes near it, as a later change may undo it. The next metres of the published
+line are not polished.
 
-A new path for a robot that stands never waits, as the robot comes no nearer to the change.
+A new path for a robot that stands is published at once, as the robot comes no nearer to the change.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED, Points
 
-# A change this near is published at once: the robot needs a metre to stop, and a second [m], [s].
+# A change this near is published at once, unless the robot can drive on along the published line:
+# the robot needs a metre to stop, and a second [m], [s].
 NEAR_M, NEAR_S = 1.0, 1.0
-# A change less than this ahead is published once neither a plan nor polish is under way there, or
-# after the patience [m], [s]. The same holds for a line that is cut off nearer than that, if the
-# robot can drive on along the published one: a cell was lost, and a new plan comes within that
-# time.
+# A change within this distance waits while a plan is pending, or the line up to there is not yet
+# polished, but not longer than the patience [m], [s]: a line that a map has cut off gets a new plan
+# within that time.
 DUE_M, DUE_S, PATIENCE_S = 2.0, 1.0, 1.0
-# Length of a published line ahead of the robot that is no longer polished [m].
+# Length of the published line ahead of the robot that is no longer polished [m].
 HELD_M = 4.0
-# Number of points compared: they reach farther than that.
-SEEN_POINTS = 128
-# A point has not moved if it is this near to its former place [m]: rasters are shifted.
+# Number of points compared; they reach farther than HELD_M.
+COMPARED_POINTS = 128
+# Points within this distance are the same [m]: a change of the raster rounds their coordinates.
 SAME_M = 1e-3
 NONE: NDArray[np.float64] = np.empty((0, 2))
 
@@ -57,15 +57,15 @@ class PublishedLine:
         self._due_since = math.inf
 
     def look(self, xy: Points) -> None:
-        """Compare the line, float64 (n, 2): x, y [m], of which the first ``SEEN_POINTS`` points are
-        enough; it begins at the robot."""
-        ahead, known = xy[1:SEEN_POINTS], self._xy[self._next :]
+        """Compare the line from the robot on, float64 (n, 2): x, y [m]; its first
+        ``COMPARED_POINTS`` points suffice."""
+        ahead, known = xy[1:COMPARED_POINTS], self._xy[self._next :]
         self._common, self.differs_m = 0, 0.0
         if len(xy) and len(self._xy) and not len(ahead) and not len(known):
             self.differs_m = math.inf  # both end where the robot is
         if not len(ahead) or not len(known):
             return
-        at = np.flatnonzero(_are_same(known[:SEEN_POINTS], ahead[0]))
+        at = np.flatnonzero(_are_same(known[:COMPARED_POINTS], ahead[0]))
         if not len(at):
             return
         self._next += int(at[0])
@@ -73,7 +73,7 @@ class PublishedLine:
         most = min(len(known), len(ahead))
         same = _are_same(known[:most], ahead[:most])
         self._common = most if same.all() else int(np.argmin(same))
-        ends_alike = len(known) == len(ahead) or len(xy) > SEEN_POINTS
+        ends_alike = len(known) == len(ahead) or len(xy) > COMPARED_POINTS
         if self._common == len(ahead) and ends_alike:
             self.differs_m = math.inf
         else:
@@ -82,7 +82,7 @@ class PublishedLine:
 
     @property
     def held(self) -> int:
-        """Number of points, from the line's first on, that are not to be polished."""
+        """Number of the line's first points that are not to be polished."""
         return min(self._last_held - self._next + 2, self._common + 1)
 
     @property
@@ -109,14 +109,14 @@ class PublishedLine:
 
     def _near(self) -> Points:
         """Return the points of the next metre of the published line."""
-        rest = self._xy[self._next :][:SEEN_POINTS]
+        rest = self._xy[self._next :][:COMPARED_POINTS]
         ways = np.hypot(*np.diff(rest, axis=0).T) if len(rest) > 1 else np.empty(0)
         return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 2]
 
     def take(self, xy: Points, polished: int) -> None:
         """Note that a line is published, and the number of its polished points."""
         self._xy, self._next, self._due_since = xy, 1, math.inf
-        ways = np.hypot(*np.diff(xy[:SEEN_POINTS], axis=0).T) if len(xy) > 1 else np.empty(0)
+        ways = np.hypot(*np.diff(xy[:COMPARED_POINTS], axis=0).T) if len(xy) > 1 else np.empty(0)
         held = int(np.searchsorted(np.cumsum(ways), HELD_M)) + 1
         self._last_held = min(held, polished - 1)
         self._common, self.differs_m = max(len(xy) - 1, 0), math.inf
@@ -154,7 +154,7 @@ class Publication:
 
     def look(self, ahead: LineAhead) -> int:
         """Compare the line with the published one; return how many of its points are held."""
-        self._line.look(ahead.next_xy(SEEN_POINTS))
+        self._line.look(ahead.next_xy(COMPARED_POINTS))
         return self._line.held
 
     @property
@@ -176,7 +176,7 @@ class Publication:
             update: the new path, if there is one.
             reason: why the line changes; "" if it does not, or is polished.
             now: [s].
-            is_way: whether the path is only a way, on which nothing waits.
+            is_way: whether the path is only a way: then nothing waits.
         """
         route, waiting = self._route, self._waiting
         stands = self._stands(ahead, now)

@@ -31,7 +31,7 @@ from fasaco_edge.planners.line import blocks_of, left_in_blocks, memory_for_move
 
 
 def _causes() -> NDArray[np.uint8]:
-    """Return the ``Unswept`` of each state of a pixel, uint8 (256,); AHEAD of all open ones."""
+    """Return the ``Unswept`` value of each pixel state, uint8 (256,); AHEAD for open pixels."""
     state = np.arange(256, dtype=np.uint8)
     causes: NDArray[np.uint8] = (state & np.uint8(CAUSE)) >> np.uint8(CAUSE_SHIFT)
     causes[state & np.uint8(WANTED | SWEPT | OPEN) == WANTED] = Unswept.PASSED
@@ -55,12 +55,12 @@ class SweepTally:
     def __init__(self, floor: FloorMap) -> None:
         shape = floor.geometry.rows, floor.geometry.cols
         self.unit_m = floor.geometry.resolution
-        # Flags of each pixel, WANTED, OPEN, SWEPT and PASSED, and its cause of being out of reach.
+        # Per pixel: flags WANTED, OPEN, SWEPT and PASSED, and why it is out of reach.
         self._state = np.zeros(shape, np.uint8)
         self.sweeps = Sweeps(np.full(shape, NEVER, np.int16), np.zeros(blocks_of(shape), np.int32))
         # Numbers of wanted pixels, of swept ones among them, and of open ones.
         self._wanted_pixels = self._swept_pixels = self._open_pixels = 0
-        # Number of pixels out of reach by cause; the first element is unused.
+        # Number of pixels out of reach, by cause; the first element is unused.
         self._beyond_pixels = np.zeros(len(OUT_OF_REACH) + 1, np.int64)
         # Window of the pixels that the line has passed.
         self._passed: Window | None = None
@@ -115,16 +115,14 @@ class SweepTally:
         self._open_pixels += more_open
 
     def set_causes(self, part: Window, causes: NDArray[np.uint8]) -> None:
-        """Set the causes of being out of reach in a window, uint8 (rows, cols), see
-        ``causes_of``."""
+        """Set why pixels of a window are out of reach, uint8 (rows, cols), see ``causes_of``."""
         set_causes(self._state, (part.row0, part.col0), causes, self._beyond_pixels)
 
     def pass_line(self, points: NDArray[np.float64]) -> None:
         """Note that the robot has passed a part of its line, float64 (n, 2), y, x [pixels].
 
-        Only poses show whether it swept the floor there, later and more strictly. The robot does
-        not go back before the end of its path: floor that poses do not show as swept the first
-        time is seldom shown as swept by a detour.
+        Poses show later whether it swept the floor there. The robot does not return for the rest
+        before the end of its path, as poses after a detour seldom show more.
         """
         self._open_pixels -= pass_line(self.sweeps, self._state, points, self._tool, self._scratch)
         (row0, col0), (row1, col1) = points.min(axis=0), points.max(axis=0)
@@ -145,12 +143,12 @@ class SweepTally:
         return part
 
     def missed_m2(self, part: Window) -> float:
-        """Return the area in a window that should be swept and is not on the line [m2]."""
+        """Return the open area in a window that the line ahead does not sweep [m2]."""
         counts = self.sweeps.counts[part.row0 : part.row1, part.col0 : part.col1]
         return int(np.count_nonzero(counts == 0)) * self.unit_m**2
 
     def missed(self) -> NDArray[np.int64]:
-        """Return the pixels that should be swept and are not on the line, row, col (n, 2)."""
+        """Return the open pixels that the line ahead does not sweep, int64 (n, 2): row, col."""
         found = [np.empty((0, 2), np.int64)]
         for corner in np.argwhere(self.sweeps.left) << BLOCK:
             row, col = corner.tolist()
@@ -166,7 +164,7 @@ class SweepTally:
         return causes
 
     def open_in_m2(self, part: Window) -> float:
-        """Return the area in a window that should be swept, on the line or not [m2]."""
+        """Return the open area in a window, whether the line ahead sweeps it or not [m2]."""
         state = self._state[part.row0 : part.row1, part.col0 : part.col1]
         return int(np.count_nonzero(state & OPEN)) * self.unit_m**2
 
@@ -177,12 +175,12 @@ class SweepTally:
 
     @property
     def open_m2(self) -> float:
-        """Area asked for and neither swept yet nor passed [m2], without narrow strips."""
+        """Open area: asked for, neither swept nor passed, and without narrow strips [m2]."""
         return self._open_pixels * self.unit_m**2
 
     @property
     def passed_m2(self) -> float:
-        """Area that was passed, or is in narrow strips, and is not known to be swept [m2]."""
+        """Area asked for, not known to be swept, and passed or in narrow strips [m2]."""
         pixels = self._wanted_pixels - self._swept_pixels - self._open_pixels
         return pixels * self.unit_m**2
 

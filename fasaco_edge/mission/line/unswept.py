@@ -36,11 +36,11 @@ def causes_of(
 ) -> NDArray[np.uint8]:
     """Return why the tool cannot reach each pixel in a window of the raster, uint8 (rows, cols).
 
-    0 where it can, and where the pixel is not free.
+    The value is 0 where the tool can reach the pixel, and where the pixel is not free.
 
     Args:
         floor: the floor with keep-out zones.
-        free: the floor of the same map without; the same object if there are none.
+        free: the floor of the same map without these zones; the same object if there are none.
         reachable: bool (rows, cols) of the lattice, the reachable cells.
         part: window of the raster.
     """

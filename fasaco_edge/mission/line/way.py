@@ -1,10 +1,9 @@
-"""Way: a line that only leads somewhere, with as few corners as the floor allows.
+"""Way: a line that leads to a place without sweeping, with few corners.
 
-A walk over cells is a staircase wherever it leads diagonally across them: a robot that turns on the
-spot needs twice as long for the corners as for the length.
+A diagonal walk over cells is a staircase: its turns on the spot take twice as long as its length.
 
-Lead-out: the first step of a robot whose disc does not fit where it stands. A robot is a little off
-its line, poses are noisy, and walls get thicker from map to map. The step leads away from obstacles
+Lead-out: the first step of a robot whose disc does not fit where it stands, because it is off its
+line, its pose is noisy, or a wall is thicker on the newest map. The step leads away from obstacles
 that are too near, and comes nearer to none.
 """
 
@@ -27,17 +26,17 @@ from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.line.polyline import Points
 
-# Number of next points tried for the farthest straight connection of a point: each point is a
-# corner of the walk, so this spans a hall.
-MOST_SKIPPED = 40
-# How far a detour may lead away [m], and how far from a point it may begin at a place [pixels].
+# A straight part of a way leads at most this many points ahead: corners of the walk, so that it can
+# cross a hall.
+MOST_SPANNED = 40
+# Margin of a detour around its ends [m]; greatest distance from an end to a free pixel [pixels].
 DETOUR_M, BESIDE_PX = 2.0, 2.0
 # A robot nearer to an obstacle than this share of its radius has a wrong pose.
 LEAST_SHARE = 0.5
-# Number of nearest places tried for one with a straight, free way.
-MOST_TRIED = 64
+# A lead-out ends at one of this many nearest places where the disc fits.
+NEAREST_PLACES = 64
 # Precision of a radius [pixels].
-RADIUS_PX = 0.125
+RADIUS_ERROR_PX = 0.125
 
 
 def is_clear_between(floor: FloorMap, a: Points, b: Points, radius: float | None = None) -> bool:
@@ -59,12 +58,12 @@ def sees_on(floor: FloorMap, a: Points, b: Points) -> bool:
 
 
 def comes_nearer(a: Points, b: Points, beside: Points, start: Points | None = None) -> bool:
-    """Return whether a straight way enters one of some discs, or goes farther into one.
+    """Return whether a straight way enters a disc, or leads deeper into one.
 
     Args:
         a, b: its ends, (2,).
-        beside: the discs, float64 (k, 3): their middles, in the same units, and radii.
-        start: where the robot begins, which may be in a disc; None for ``a``.
+        beside: the discs, float64 (k, 3): centres and radii, in the units of the ends.
+        start: the robot's place, which may be in a disc; None for ``a``.
     """
     edge, to = b - a, beside[:, :2] - a
     share = np.clip(to @ edge / max(float(edge @ edge), 1e-12), 0.0, 1.0)
@@ -76,7 +75,8 @@ def comes_nearer(a: Points, b: Points, beside: Points, start: Points | None = No
 def corner_past(a: Points, b: Points, beside: Points) -> Points | None:
     """Return the corner of a way from ``a`` to ``b`` that comes no nearer to any disc.
 
-    First across the direction to the nearest disc, then on; None if that comes nearer, too.
+    The first part leads across the direction to the nearest disc. None if such a way comes nearer,
+    too.
 
     Args:
         a, b, beside: as for ``comes_nearer``; at least one disc.
@@ -89,7 +89,7 @@ def corner_past(a: Points, b: Points, beside: Points) -> Points | None:
 
 
 def discs_on(floor: FloorMap, beside: NDArray[np.float64] | None) -> Points:
-    """Return discs as of ``Route.beside`` on the raster, float64 (k, 3): y, x, radius [pixels]."""
+    """Return the discs of ``Route.beside`` on the raster, float64 (k, 3): y, x, radius [pixels]."""
     near, unit_m = () if beside is None else beside.tolist(), floor.geometry.resolution
     discs = [(*map_to_raster(floor.geometry, x, y), radius_m / unit_m) for x, y, radius_m in near]
     return np.array(discs, np.float64).reshape(-1, 3)
@@ -101,9 +101,9 @@ def shortened(
     """Return the indices of the points of a way that skips corners wherever the floor is clear.
 
     Args:
-        points: float64 (n, 2), n >= 1: y, x [pixels]; from each to the next one it is clear.
+        points: float64 (n, 2), n >= 1: y, x [pixels]; its straight parts are clear.
         floor: the floor.
-        beside: discs that no straight part comes too near to, as ``Route.beside``.
+        beside: discs that the new way keeps clear of, as ``Route.beside``; None for none.
     """
     discs = discs_on(floor, beside)
 
@@ -113,7 +113,7 @@ def shortened(
     kept, last = [0], len(points) - 1
     while kept[-1] < last:
         at = kept[-1]
-        farthest = min(at + MOST_SKIPPED, last)
+        farthest = min(at + MOST_SPANNED, last)
         while farthest > at + 1 and not may_skip(points[at], points[farthest]):
             farthest -= 1
         kept.append(farthest)
@@ -125,7 +125,7 @@ def corners_between(floor: FloorMap, a: Points, b: Points) -> Points:
 
     Args:
         floor: the floor.
-        a, b: points, (2,): y, x [pixels]; the robot can be at either.
+        a, b: points, (2,): y, x [pixels], at which the robot's disc fits.
 
     Returns:
         float64 (n, 2), both points excluded; n is 0 if no way is found within ``DETOUR_M`` around
@@ -159,7 +159,7 @@ def corners_between(floor: FloorMap, a: Points, b: Points) -> Points:
 def _place_beside(
     floor: FloorMap, places: NDArray[np.bool_], point: Points, corner: NDArray[np.int64]
 ) -> tuple[int, int] | None:
-    """Return a place nearest to a point, from which it can be reached straight; None for none."""
+    """Return the nearest place with a clear straight way to a point; None for none."""
     near = np.argwhere(places)
     apart = ((near + corner - point) ** 2).sum(axis=1)
     near = near[apart <= BESIDE_PX**2]
@@ -174,7 +174,7 @@ def _place_beside(
 def way_s(walk: NDArray[np.int32], pose: Pose2D, floor: FloorMap, sweeping: Sweeping) -> float:
     """Return how long the way along a walk takes [s].
 
-    Includes a half turn at each end: the robot may face away from the way, or from its next way.
+    Includes a half turn at each end, as the robot may face the other way.
 
     Args:
         walk: int32 (n, 2), n >= 1, cells (row, col), each a legal step from the previous one.
@@ -194,7 +194,7 @@ def way_s(walk: NDArray[np.int32], pose: Pose2D, floor: FloorMap, sweeping: Swee
 
 
 def fitting_radius(floor: FloorMap, here: Points) -> float:
-    """Return the radius of the largest disc that fits at a point, the robot's at most [pixels].
+    """Return the radius of the largest disc that fits at a point, up to the robot's [pixels].
 
     Args:
         floor: the floor.
@@ -204,7 +204,7 @@ def fitting_radius(floor: FloorMap, here: Points) -> float:
     if is_clear_between(floor, here, here):
         return most
     fits, too_large = 0.0, most
-    while too_large - fits > RADIUS_PX:
+    while too_large - fits > RADIUS_ERROR_PX:
         middle = (fits + too_large) / 2
         if is_clear_between(floor, here, here, middle):
             fits = middle
@@ -214,7 +214,7 @@ def fitting_radius(floor: FloorMap, here: Points) -> float:
 
 
 def leads_out(floor: FloorMap, here: Points, to: Points) -> bool:
-    """Return whether ``lead_out`` leads a robot whose disc does not fit straight to a point.
+    """Return whether a straight lead-out to a point exists for a robot whose disc does not fit.
 
     Args:
         floor: the floor.
@@ -248,7 +248,7 @@ def lead_out(floor: FloorMap, here: Points) -> Points:
     places = unpacked(floor.places[part.row0 : part.row1], floor.geometry.cols)
     corner = np.array((part.row0, part.col0))
     near = (np.argwhere(places[:, part.col0 : part.col1]) + corner).astype(np.float64)
-    order = np.argsort(((near - here) ** 2).sum(axis=1), kind="stable")[:MOST_TRIED]
+    order = np.argsort(((near - here) ** 2).sum(axis=1), kind="stable")[:NEAREST_PLACES]
     for place in near[order]:
         if is_clear_between(floor, here, place, radius):
             return np.array([place])

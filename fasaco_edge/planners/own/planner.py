@@ -1,4 +1,4 @@
-"""Planner of the user's own, as planners of the registry are called."""
+"""Planner of the user's own, with the interface of the registry's planners."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class OwnPlanner:
     def plan(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
     ) -> CoveragePath:
-        """Return the code's walk; it is not observed, and stopped by ``most_s`` alone.
+        """Return the code's walk; only ``most_s`` ends it, and ``observe`` is not called.
 
         Raises:
             PlannerFailed: the code raised, or took longer.

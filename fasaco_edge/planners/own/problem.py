@@ -1,4 +1,4 @@
-"""Problem as a planner of the user's own gets it, and checks of the walk it returns."""
+"""Input of a planner of the user's own, and checks of the walk that it returns."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class GridProblem:
 
 
 def posed(problem: CoverageProblem, seed: int) -> GridProblem:
-    """Return a problem as a planner of the user's own gets it."""
+    """Return a problem as the input of a planner of the user's own."""
     lattice, cost = problem.lattice, problem.cost
     bits = lattice.steps[..., np.newaxis] >> np.arange(len(MOVES), dtype=np.uint8)
     steps = (bits & 1).astype(np.bool_)
@@ -99,9 +99,9 @@ def walked(code: UserCode, problem: GridProblem, most_s: float | None = None) ->
 
 
 def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
-    """Return the cells that the code returned or yielded, at most one more than ``most``.
+    """Return the first ``most + 1`` cells that the code returned or yielded, as plain integers.
 
-    As plain integers; the first item that is no cell is returned as text, and ends the list.
+    The first item that is no cell is returned as text, and ends the list.
     """
     found: list[Cell | str] = []
     for _, given in zip(range(most + 1), walk, strict=False):

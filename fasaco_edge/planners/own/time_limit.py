@@ -1,4 +1,4 @@
-"""Time limit of a user's planner, which cannot be asked to end."""
+"""Time limit of a user's planner, enforced by a signal."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-# Time of a planner of the user's own if none is requested [s].
+# Default time limit of a planner of the user's own [s].
 OWN_BUDGET_S = 60.0
-# Code that catches everything is interrupted again after this time [s].
+# Period at which code that catches every exception is interrupted again [s].
 AGAIN_S = 0.1
 
 
 class TookTooLongError(BaseException):
-    """The time is over; no ``Exception``, which the code may catch."""
+    """The time is over; not an ``Exception``, as the code may catch these."""
 
 
 @contextmanager
 def no_longer_than(most_s: float | None) -> Iterator[None]:
     """Interrupt the block after this time [s]; None for no limit.
 
-    In other threads than the main one there is no limit, as signals reach the main thread alone;
-    nor where the program has a timer of its own. A call into a library ends first.
+    There is no limit outside the main thread, as only that gets signals, nor if the program has its
+    own timer. A call into a compiled library is not interrupted before it returns.
 
     Raises:
         TookTooLongError: the time was over.
@@ -47,7 +47,7 @@ def no_longer_than(most_s: float | None) -> Iterator[None]:
         finally:
             is_open = False
     finally:
-        # Again, as the line above may be what was interrupted.
+        # Again, as the signal may have interrupted the line above.
         is_open = False
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

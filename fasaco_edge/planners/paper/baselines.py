@@ -1,4 +1,4 @@
-"""Walks by fixed rules: the paper's baselines, and the first complete walks of a search.
+"""Walks by fixed rules: the paper's baselines, and the first walks of a search.
 
 Spanning-tree coverage, Gabriely and Rimon 2001 (``kernels.ants.baselines`` for any grid), is a
 closed walk. With no end cell, the walk stops at the last cell to cover. If an end cell other than
@@ -121,10 +121,10 @@ def zigzag(*unused: object) -> FixedRule:
 def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.int32]]:
     """Yield complete walks, flat cells int32 (n,).
 
-    The first is that of an ant that always takes the cell with the fewest open neighbours,
-    Warnsdorff's rule. Where turns cost, an ant that goes straight on, the spiral, the zigzag and
-    the walk around a spanning tree follow: each is best on some grids. So does a zigzag in
-    the direction of the lanes, if one is preferred.
+    On the first, an ant always takes the cell with the fewest open neighbours (Warnsdorff's rule).
+    If turns cost, the walks of an ant that goes straight on, of the spiral, the zigzag and the
+    spanning tree follow: each is best on some grids. If a direction of lanes is preferred, the last
+    walk is a zigzag in it.
     """
     yield _ant(problem, graph, velocity=1)
     if problem.cost.quarter_turn_us:

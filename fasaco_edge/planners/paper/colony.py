@@ -28,9 +28,9 @@ class ColonyConfig:
         alpha: weight of new pheromone, equations (7) and (8).
         tau0: pheromone every move starts with, equation (7).
         seed: seed of all random streams.
-        visibility: eta of equation (5) is 1 over this: the distance to the "neighbour", which is 1,
-            as in the paper; the "distance" an ant goes at its velocity; or one more than the
-            neighbour's own open neighbours, "fewest-open".
+        visibility: the value whose reciprocal is eta, equation (5). "neighbour": the distance to
+            the neighbour, 1, as in the paper; "distance": the distance that an ant goes at its
+            velocity; "fewest-open": one more than the number of the neighbour's open neighbours.
         beta: weight of eta, equations (4) and (6); no effect for "neighbour".
     """
 

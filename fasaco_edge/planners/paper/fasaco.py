@@ -11,8 +11,8 @@ about 1 at best on any map, so tau0 needs no tuning to the map's size. If a walk
 cell, ants go there by a shortest path when all is covered.
 
 With a living trail (``planners.living_trail``) and a previous walk, the search continues instead of
-restarting. The ants start from that trail, and their number is the share of the colony that new
-cells are of the cells to cover. The best walk so far is the previous walk, with invalid parts cut
+restarting. The ants start from that trail, and their number is proportional to the share of new
+cells among the cells to cover. The best walk so far is the previous walk, with invalid parts cut
 out and new cells inserted.
 """
 
@@ -52,10 +52,10 @@ LARGEST_GROUP = 32
 SMALLEST_GROUP = 2
 CELLS_PER_GROUP = 64_000
 
-# Number of ants where hardly any cell is new.
+# Least number of ants, if hardly any cell is new.
 FEWEST_ANTS = 64
 
-# Initial capacity for a walk; ants with a longer walk walk again with more.
+# Initial memory for a walk; a group with a longer walk walks again with more memory.
 STEPS_PER_CELL = 2
 
 
@@ -180,7 +180,7 @@ def groups_of(config: ColonyConfig, cells: int) -> Iterator[Group]:
 
 
 def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
-    """Return the number of ants: all; with a previous walk their share is that of new cells."""
+    """Return the number of ants; with a previous walk it is proportional to the new cells."""
     if problem.trail is None or problem.before is None or not can_repair(problem):
         return config.ants
     window = problem.lattice.window

@@ -33,7 +33,7 @@ class CurrentWalk:
         cost_us: of the current walk [us].
         best, best_us: the best walk so far, int32 (n,), and its cost [us].
         is_whole: whether one region covers the ground.
-        region: the region loaded now, or last.
+        region: the loaded region, or the last one.
         windows: the search in windows; None before ``open_windows``.
         held: number of leading visits that change only for a gain.
         since_gain: perturbations since the last gain.
@@ -84,10 +84,10 @@ class CurrentWalk:
         return min(self.best_us, self.windows.best_us)
 
     def progress(self) -> tuple[int, int]:
-        """Return cost [us] and steps of the best walk, as far as known.
+        """Return cost [us] and steps of the best walk.
 
-        A region's gain counts before it is put back; but not where turns cost, as the turns at its
-        border are known only then.
+        A region's gain counts before it is put back, unless turns cost and the region has a border,
+        whose turns are known only afterwards.
         """
         best_us, steps = self.best_us, self.best.size - 1
         exact = self.is_whole or not self._framed.prices.quarter_turn_us
@@ -108,7 +108,7 @@ class CurrentWalk:
         """Allocate memory for the regions, once the first walk is known."""
         framed, cells = self._framed, self._problem.cells
         if self.is_whole:
-            # A few cells may lie far apart: then most of the walk is between them.
+            # If a few cells lie far apart, most of the walk is between them.
             visits = max(VISITS_PER_CELL * cells, 2 * self._walk.size)
             self.region = WalkRegion(framed.rows, framed.cols, visits, 1, self._trail)
         else:

@@ -1,4 +1,4 @@
-"""Parameters of the local search for a cost, tuned on real grids."""
+"""Parameters of local search and repair by cost, tuned on real grids."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
 WHOLE_WALK = -1
 EVERY_CELL = 1 << 30
-# Number of 256 perturbations in which ants rebuild a disc.
+# Number of perturbations, of each 256, in which ants rebuild a disc.
 BY_ANTS = 128
 
 
@@ -38,7 +38,7 @@ class Effort:
 def effort_for(cost: CoverageCost, *, has_ants: bool = True) -> Effort:
     """Return the search parameters for a cost.
 
-    With free turns, proposals at temperature 0 all over the walk work best; otherwise the
+    If turns are free, proposals are made all over the walk at temperature 0; otherwise the
     surroundings of a perturbation are annealed.
     """
     by_ants = BY_ANTS if has_ants else 0
@@ -74,9 +74,8 @@ class RepairEffort:
 
     Attributes:
         rules: rules of perturbations.
-        proposals: number of proposals in each neighbourhood after which no perturbation begins.
-            Proposals are counted, as perturbations take up to three times as long in one
-            neighbourhood as in another.
+        proposals: number of proposals in a neighbourhood after which no perturbation begins.
+            Proposals are counted, as the time of a perturbation differs by a factor of three.
         held: number of these proposals that leave the walk just ahead of the robot unchanged.
         steady_us: a walk that keeps the robot's next cells is preferred up to this extra cost
             [us].
@@ -91,7 +90,7 @@ class RepairEffort:
 def repair_for(cost: CoverageCost) -> RepairEffort:
     """Return the repair parameters for a cost: only changes with a gain are accepted.
 
-    With free turns, the neighbourhood of a change is small enough for proposals all over it.
+    If turns are free, proposals are made all over the neighbourhood of a change.
     """
     rules = PerturbationRules(
         limit=100,

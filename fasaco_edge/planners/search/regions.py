@@ -71,7 +71,7 @@ def _span(number: int, shift: int, size: int) -> tuple[int, int]:
     return first, min((number + 1) * EDGE - shift, FRAME + size)
 
 
-# Radius of a neighbourhood in steps: in trials 10 and 20 gained nothing more, 3 lost.
+# Radius of a neighbourhood in steps: 10 and 20 gain nothing more, 3 loses.
 RADIUS = 6
 # Limits on a neighbourhood: changed cells it grows from, and all cells.
 MOST_CHANGED, MOST_CELLS = 1_000, 3_000

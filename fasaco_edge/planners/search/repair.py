@@ -1,10 +1,9 @@
 """Repair of the previous walk, after the problem has changed.
 
 The walk is completed, then improved around the changes. Its valid parts stay as they are, cell by
-cell: a change is accepted only for a gain, and the next ``HELD_CELLS`` cells are left alone at
-first, except where the map changed. So the path is stable wherever the map is, and the result of
-one search serves the next. The cost of a repair depends on the change: apart from a few passes over
-the walk, all work is local.
+cell: a change is accepted only for a gain, and at first the next ``HELD_CELLS`` cells change only
+where the map has changed. So the path is stable where the map is. Apart from a few passes over the
+walk, all work is local, and its time depends on the change.
 """
 
 from __future__ import annotations
@@ -33,18 +32,17 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_
 
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 8
-# Limit on the perturbations of a neighbourhood: without it, one where nothing can be proposed would
-# never end.
+# Limit on the perturbations of a neighbourhood, which ends one where no move can be proposed.
 MOST_PERTURBATIONS = 100
 # Proposals of a second repair, for the path ahead, as a share of those of the first.
 FEW = 0.2
 
-# With nothing to repair: stride between the first spots of two attempts, approximate cells of a
-# spot, and passes over all spots without gain after which the search ends.
+# For attempts to improve a valid walk: stride between the first spots of two attempts, approximate
+# cells of a spot, and passes over all spots without gain after which the search ends.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
-# A walk over more cells is repaired without a bound, which would dominate the time, and only once:
-# a second repair for the path ahead would take as long again.
+# Greatest number of cells for which a repair has a bound, and a second repair for the path ahead:
+# on larger walks the bound would dominate the time, and a second repair would double it.
 BOUNDED_CELLS = 2_000
 
 
@@ -88,10 +86,9 @@ def _steady(
 ) -> CoveragePath:
     """Return a path that begins with ``held`` steps of the previous walk, if it is similarly good.
 
-    A repair accepts a gain anywhere, though a change farther ahead may gain as much. So if it has
-    changed the path ahead unnecessarily, the rest of the walk is repaired alone, with few
-    perturbations: more of them do not keep more steps, and dominate the time. The result costs no
-    more than the completed walk.
+    A repair may change the path just ahead for a gain that a change farther ahead would give, too.
+    So the walk behind these steps is repaired alone, with few perturbations, as more do not keep
+    more steps. The result costs no more than the completed walk.
     """
     assert problem.before is not None
     try:

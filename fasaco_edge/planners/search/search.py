@@ -1,15 +1,15 @@
 """Search by colony and local search: a complete walk at once, then better ones until stopped.
 
-1. One or more simple walks, the cheapest kept: the first complete walk, within milliseconds
-   (``first_walks``). A previous walk is completed, and kept if it is as good: then the cells
+1. The first complete walk, within milliseconds, is the cheapest of some simple walks
+   (``first_walks``). A completed previous walk takes its place if it costs no more: then the cells
    just ahead of the robot change only for a gain.
 2. Local search improves it, region by region on a large ground.
-3. Perturbations, each followed by local search, continue from there: ants rebuild a disc in every
-   second one. Where turns cost, windows of the walk are solved again in between (``windows``), most
-   of the time if turns are expensive.
+3. Perturbations follow, each with local search: ants rebuild a disc in every second one. If turns
+   cost, windows of the walk are solved again in between (``windows``), most of the time if turns
+   are expensive.
 
-The search ends when it is stopped, when the walk meets its lower bound, or when perturbations gain
-nothing for long. Its work is counted; the same counts give the same walk.
+The search ends when it is stopped, when the walk meets its lower bound, or after many perturbations
+without gain. Its work is counted; the same counts give the same walk.
 """
 
 from __future__ import annotations
@@ -44,19 +44,19 @@ GAINLESS_PASSES = 10
 # Perturbations between two evaluations of the whole walk, with one region.
 PERTURBATIONS_IN_VISIT = 64
 
-# States that windows expand between two pauses: about two milliseconds. Pauses in a round of
-# windows, which follows each visit of perturbations: with expensive turns, and with cheap ones.
+# States that windows expand between two pauses, about two milliseconds; pauses in the round of
+# windows after each visit of perturbations, with expensive turns and with cheap ones.
 EXPANSIONS_AT_ONCE = 30_000
 DEAR_PIECES, PIECES = 50, 5
 # This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
-# Beam width for solving the whole ground, if turns cost enough: WHOLE_STATES divided by the number
-# of cells, within the limits. The ground is solved from each corner, and the cheapest walk kept:
-# four narrow beams find more than one beam of four times the width.
+# Beam width for solving the whole ground: WHOLE_STATES divided by the number of cells, within the
+# limits. The ground is solved from each corner, and the cheapest walk kept: four narrow beams find
+# more than one beam of four times the width.
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM = 8_000, 8, 100
 CORNERS = (0, LINES, PLACES, LINES | PLACES)
 
-# Distinguishes the random stream from those of the ants.
+# Seed that distinguishes the random stream of local search from the ants' streams.
 LOCAL_SEARCH = 1 << 32
 
 

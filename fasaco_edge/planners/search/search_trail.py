@@ -1,7 +1,7 @@
 """Search trail: the pheromone that the ants of a search or a repair read and change.
 
-It begins as the mission's living trail, where there is one, and is uniform elsewhere. A region cuts
-out its part, and pastes it back once it is done.
+It begins as the mission's living trail, if there is one, and is uniform elsewhere. A region copies
+its part, and pastes it back when it is done.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
 
-# Ants that rebuild a disc, of which the cheapest counts; least and largest radius of a disc.
+# Number of ants that rebuild a disc, whose cheapest result counts; range of a disc's radius.
 ANTS, RADIUS = 16, (3, 6)
 # A move has up to four quarter-turns: two before it, and two at the end of a tunnel.
 MOST_QUARTERS = 4
@@ -103,7 +103,7 @@ def _rules(problem: CoverageProblem, config: ColonyConfig) -> AntRules:
 def powers_of_turns(cost: CoverageCost, beta: float) -> NDArray[np.float64]:
     """Return eta ** beta of equation (5) by the quarter-turns of a move, float64 (5,).
 
-    Eta is the seconds of a step over those of the move with its turns.
+    Eta is the duration of a step divided by the duration of the move with its turns.
     """
     move_s = cost.step_s + np.arange(MOST_QUARTERS + 1) * cost.quarter_turn_s
     eta = cost.step_s / move_s

@@ -14,16 +14,16 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.documents.json_text import (
     OF_JSON,
     Amount,
+    Coordinate,
     Count,
+    Text,
+    ZenohId,
     allowed,
     decode_document,
 )
-from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS, MAX_COORDINATE_M, MAX_STRING_BYTES
+from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS
 
 REASONS: Final = ("obstacle", "stuck", "elsewhere")
-
-Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
-Text = Annotated[str, Meta(max_length=MAX_STRING_BYTES)]
 
 
 class Blocked(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,7 +41,7 @@ class Blocked(msgspec.Struct, frozen=True, kw_only=True):
         points: what is ahead: places x, y [m], the nearest first; none for elsewhere.
     """
 
-    daemon: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")]
+    daemon: ZenohId
     revision: Count
     reason: Annotated[str, allowed(enum=REASONS)]
     detail: Text

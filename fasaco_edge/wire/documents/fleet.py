@@ -12,9 +12,8 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.wire.documents.json_text import OF_JSON, Document
+from fasaco_edge.wire.documents.json_text import OF_JSON, Coordinate, Document, Text
 from fasaco_edge.wire.limits import (
-    MAX_COORDINATE_M,
     MAX_FLEET_INDEX,
     MAX_FLEET_PARTS,
     MAX_FLEET_POINTS,
@@ -30,10 +29,8 @@ TILE: Final = 64
 TILE_BYTES: Final = TILE * TILE // 8
 MOST_TILE_INDEX: Final = MAX_FLEET_INDEX // TILE
 
-Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
 Point = tuple[Coordinate, Coordinate]
 Angle = Annotated[float, Meta(ge=-360, le=360)]
-Text = Annotated[str, Meta(max_length=256)]
 Named = Annotated[str, Meta(min_length=1, max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]
@@ -87,8 +84,8 @@ class FleetMember(Document, frozen=True):
         division: number of the newest division of the remaining cells known to it.
         open_cells: number of cells known to it that are still to sweep.
         swept: its swept tiles: changed ones first, then all in turn.
-        kept: which cells of these tiles it swept before this epoch, no tile for none; null if it
-            does not know.
+        kept: the cells of these tiles that it swept before this epoch, without empty tiles; null if
+            it does not know.
         lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
         ground: tiles of cells that it can reach: changed ones first, then all in turn.
         by: name of the robot that made that division.
@@ -97,8 +94,8 @@ class FleetMember(Document, frozen=True):
         ahead: points x, y of the path's next metres [m], in the frame of the map.
         origin: where the origin of its map frame lies in the fleet's frame: x, y [m], the angle
             [deg]; 0 if the robots share one map frame.
-        waits_for: name of the robot that it waits for or makes way for; for a robot without a part,
-            of the one with the largest part left; "" for none.
+        waits_for: name of the robot that it waits for or makes way for; a robot without a part
+            names the robot with the largest part left; "" for none.
     """
 
     version: Annotated[int, Meta(ge=1)]
@@ -132,7 +129,7 @@ class _Head(msgspec.Struct, frozen=True):
 
 
 def fleet_of(payload: bytes) -> str | None:
-    """Return the name of the fleet that a message is for; None where it cannot be read."""
+    """Return the name of the fleet that a message is for; None if it cannot be read."""
     try:
         return msgspec.json.decode(payload, type=_Head).fleet
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):

@@ -20,24 +20,26 @@ from msgspec import UNSET, Meta
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.limits import (
+    MAX_COORDINATE_M,
     MAX_JSON_BYTES,
     MAX_JSON_DEPTH,
     MAX_JSON_INTEGER,
     MAX_JSON_NUMBER,
+    MAX_STRING_BYTES,
 )
 
 # A tolerant reader cuts texts at this length.
 MAX_TEXT = 500
-# What to do about a document that is refused.
+# Hint for a document that is refused.
 OF_JSON = "send a JSON object as the schema of this key describes it (protocol/schema)"
 
 Struct = TypeVar("Struct", bound=msgspec.Struct)
 
 
 def allowed(**schema: object) -> Meta:
-    """Return a limit that a schema states and writers keep; readers do not check it.
+    """Return a limit that a schema states and writers observe; readers do not check it.
 
-    Limits of numbers, which readers check, are stated by ``Meta(ge=...)``.
+    Limits of numbers, which readers check, are given by ``Meta(ge=...)``.
     """
     return Meta(extra_json_schema=schema)
 
@@ -46,6 +48,10 @@ Count = Annotated[int, Meta(ge=0, extra_json_schema={"minimum": 0})]
 Ordinal = Annotated[int, Meta(ge=1, extra_json_schema={"minimum": 1})]
 Amount = Annotated[float, Meta(ge=0, extra_json_schema={"minimum": 0})]
 Name = Annotated[str, allowed(minLength=1)]
+Text = Annotated[str, Meta(max_length=MAX_STRING_BYTES)]
+ZenohId = Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")]
+Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Corners = Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)]
 
 
 class Document(msgspec.Struct, frozen=True):
@@ -86,7 +92,7 @@ def decode_json(payload: bytes) -> dict[str, object]:
 
 
 def decode_document(payload: bytes, kind: type[Struct]) -> Struct:
-    """Return the JSON object in ``payload`` as values of ``kind``.
+    """Return the JSON object in ``payload`` as a struct of type ``kind``.
 
     Raises:
         MalformedMessage: it is no JSON object, or a member is missing or of another type.
@@ -109,13 +115,13 @@ def decode_tolerant(payload: bytes, kind: type[Struct]) -> Struct:
 def tolerant(document: Mapping[str, object], kind: type[Struct]) -> Struct:
     """Return the members of a JSON object that fit ``kind``; others keep their defaults.
 
-    What is beyond a limit of numbers or depth does not fit, texts are cut at ``MAX_TEXT``.
+    A member beyond a limit of numbers or depth does not fit; texts are cut at ``MAX_TEXT``.
 
     Raises:
         TypeError: a member without a default is missing, or does not fit.
     """
-    # Nearly all documents fit as a whole: much faster than member by member. A deeply nested one
-    # has unknown members.
+    # Nearly all documents fit as a whole, which is much faster than member by member. A document
+    # may be nested too deeply for that, in unknown members.
     with suppress(msgspec.ValidationError, RecursionError):
         if _is_within_bounds(document):
             return msgspec.convert(document, kind)
@@ -145,7 +151,7 @@ def _fitting(value: object, kind: Any) -> object:  # noqa: ANN401 - any type ann
     """Return a JSON value as one of ``kind``; UNSET where it does not fit."""
     origin, arguments = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        # A type of numbers has a range.
+        # Only a number has a range.
         is_plain = arguments[0] in (int, float)
         return _fitting_plain(value, kind) if is_plain else _fitting(value, arguments[0])
     if origin in (Union, UnionType):

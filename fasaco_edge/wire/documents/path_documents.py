@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 from typing import TYPE_CHECKING, Annotated, Self
 
-from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal, allowed
+from fasaco_edge.wire.documents.json_text import (
+    Amount,
+    Count,
+    Document,
+    Name,
+    Ordinal,
+    ZenohId,
+    allowed,
+)
 
 if TYPE_CHECKING:
     from fasaco_edge.planners.path import CoveragePath
-
-
-import hashlib
 
 
 class PlanFigures(Document, frozen=True):
@@ -31,8 +37,8 @@ class PlanFigures(Document, frozen=True):
             walks.
         saved_by_local_search_s: seconds saved by local search on the first walk, or on the one
             still to drive.
-        saved_by_velocity_s: what saved_by_ants_s is the sum of: seconds saved by each cohort, by
-            its velocity in cells a move; null if ants saved nothing.
+        saved_by_velocity_s: saved_by_ants_s for each cohort, by its velocity in cells per move;
+            null if ants saved nothing.
     """
 
     planner: str | None = None
@@ -71,8 +77,7 @@ class PlanFigures(Document, frozen=True):
             lower_bound_cost_s=round(plan.lower_bound_cost_s, 3) or None,
             gap=None if plan.gap is None else round(plan.gap, 6),
             saved_by_ants_s=round(plan.saved.ants, 3),
-            # A repair that keeps the path ahead may cost more than the walk before; it then saved
-            # nothing.
+            # A repair that keeps the path ahead may cost more than the walk before: it saved none.
             saved_by_local_search_s=round(max(plan.saved.local_search, 0.0), 3),
             saved_by_velocity_s={
                 str(velocity): round(saved_s, 3) for velocity, saved_s in plan.saved.by_velocity
@@ -132,7 +137,7 @@ class PathAttachment(PlanFigures, frozen=True):
         speed_m_s: speed to drive it at, below the robot's usual one [m/s]; null for that.
     """
 
-    daemon: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
+    daemon: ZenohId = ""
     revision: Count = 0
     map_stamp_ns: int = 0
     map_revision: Count = 0
@@ -146,7 +151,7 @@ class PathAttachment(PlanFigures, frozen=True):
 class TrailAttachment(Document, frozen=True):
     """The Zenoh attachment of each field of the living trail.
 
-    In old recordings a field without one is that of a cohort of ants.
+    In old recordings a field without an attachment is the pheromone of a cohort of ants.
 
     Attributes:
         revision: of the path in force.
@@ -161,8 +166,8 @@ class TrailAttachment(Document, frozen=True):
 
 
 PATH_DIGEST = "path_digest"
-"""Topic that stands for a path in a recording: with its attachment and, as payload, the ``digest``
-of its points, float64 x, y [m]."""
+"""Topic in a recording in place of a path: with the path's attachment and, as payload, the
+``digest`` of its points, float64 x, y [m]."""
 DIGEST_BYTES = 16
 
 

@@ -10,6 +10,7 @@ from msgspec import Meta
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.wire.documents.json_text import (
     Amount,
+    Corners,
     Count,
     Document,
     Name,
@@ -76,11 +77,11 @@ class FloorReport(Document, frozen=True):
 
     Attributes:
         swept_m2: floor that the tool has passed over, reachable now or not.
-        reachable_m2: floor that the tool can reach and has to sweep, as far as known; while the
-            robot is shut in, what it could reach since the order began; null if the robot drives
-            through the centres of cells.
+        reachable_m2: known floor that the tool can reach and has to sweep; for a robot that is shut
+            in, floor that it could reach since the order began; null if the robot drives through
+            the centres of cells.
         left: unswept part of that by reason, the largest first; null if unknown.
-        out_of_reach: floor that the map shows free and the tool cannot reach, part of the order or
+        out_of_reach: free floor on the map that the tool cannot reach, whether part of the order or
             not, by reason, the largest first; null if unknown.
         possible_m2: floor that the tool would reach if walls and furniture were a pixel thinner
             than on the map; null before the end of an order, or if unknown.
@@ -115,7 +116,7 @@ class ZoneReport(Document, frozen=True):
     pass_number: Count = msgspec.field(name="pass", default=0)
     cells: Count = 0
     covered: Count = 0
-    polygon: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    polygon: Corners = ()
 
 
 class UnreachedArea(Document, frozen=True):
@@ -133,7 +134,7 @@ class UnreachedArea(Document, frozen=True):
 
 
 class UnreachedReport(Document, frozen=True):
-    """The part of the order that stays uncovered as things are."""
+    """The part of the order that cannot be covered at present."""
 
     cells: Count = 0
     m2: Amount = 0.0
@@ -151,7 +152,7 @@ class KeepOutReport(Document, frozen=True):
     """
 
     name: str = ""
-    polygon: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    polygon: Corners = ()
     by: Annotated[str, allowed(enum=("operator", "order"))] = "operator"
 
 
@@ -163,18 +164,18 @@ class MissionReport(Document, frozen=True):
         zone: the zone being covered; null for everything reachable.
         pass: number of the present pass; null without an order.
         passes: number of all passes.
-        pass_kind: what is special about the present pass, as text: edge, rest, cross, 30 degrees;
-            null if nothing is.
+        pass_kind: how the present pass differs from a usual one, as text: edge, rest, cross, 30
+            degrees; null if it does not.
         keep_out: number of keep-out zones, with those of the configuration; a mask counts as one.
         keep_outs: the keep-out zones in force, without those of the configuration.
-        home: position the robot returns to; by default where the first order began since a reset.
+        home: position the robot returns to; by default where the first order after a reset began.
         tries: retries of cells left over.
-        unreached: part of the order that stays uncovered as things are.
+        unreached: part of the order that cannot be covered at present.
         waits_for_room: name of the room that the order waits for; null for none.
         left_out: rooms that the order for everything leaves out, by their settings.
         time_left_s: time until the order ends with the robot at home [s]; null without a limit.
-        first_from: priority from which on floor is planned now, as time or battery do not allow
-            all; null while all is.
+        first_from: least priority of the floor that is planned now, if time or battery do not
+            suffice for all; null otherwise.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None

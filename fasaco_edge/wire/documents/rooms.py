@@ -1,4 +1,4 @@
-"""Rooms: those that the daemon has found on its map, with names and settings that people gave."""
+"""Rooms on the daemon's map, with names and settings that people gave them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Ordinal, allowed
+from fasaco_edge.wire.documents.json_text import Amount, Corners, Count, Document, Ordinal, allowed
 from fasaco_edge.wire.limits import MAX_COORDINATE_M
 
 # A polygon of fewer corners has no inside.
@@ -23,18 +23,19 @@ class RoomReport(Document, frozen=True):
         name: given by people; "" for none: then it is shown and ordered as `room 3`, by its number.
         outline: corners x, y [m] in the frame of the map, without holes.
         neighbours: numbers of the rooms that it has a passage to.
-        encloses: numbers of the rooms that lie within its outline, and are no part of it.
+        encloses: numbers of the rooms that lie within its outline without being part of it.
         swept: swept share of its reachable floor, in the present pass; null if none is reachable.
         to_go_s: driving time of the path ahead within the room [s]; null without a path.
-        passes: passes if an order names the room without passes, as in `mission.json`; null: as
-            many as other zones get.
+        passes: its passes in an order that names the room without passes, as in `mission.json`;
+            null for as many as other zones get.
         skip: whether orders for everything leave it out.
-        priority: where time or battery do not allow all, rooms of higher priority come first.
+        priority: if time or battery do not suffice for all rooms, those of higher priority come
+            first.
     """
 
     id: Ordinal = 1
     name: str = ""
-    outline: Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)] = ()
+    outline: Corners = ()
     area_m2: Amount = 0.0
     neighbours: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()
     encloses: Annotated[tuple[Ordinal, ...], allowed(maxItems=250)] = ()

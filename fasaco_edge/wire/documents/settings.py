@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fasaco_edge.wire.documents.fleet import Angle, Coordinate
-from fasaco_edge.wire.documents.json_text import Document, tolerant
+from fasaco_edge.wire.documents.fleet import Angle
+from fasaco_edge.wire.documents.json_text import Coordinate, Corners, Document, tolerant
 
 Settings = dict[str, object]
 """The configuration in force, without secrets, by sections."""
@@ -23,7 +23,7 @@ class RobotSettings(Document, frozen=True):
 
 
 class PlannerSettings(Document, frozen=True):
-    """The form of path that the robot is given."""
+    """The form of the published path."""
 
     line: str = "cells"
 
@@ -39,9 +39,6 @@ class PoseSettings(Document, frozen=True):
     """The message type of poses whose samples name none."""
 
     schema: str = ""
-
-
-Corners = tuple[tuple[float, float], ...]
 
 
 class ZoneSettings(Document, frozen=True):
@@ -74,7 +71,7 @@ class RosSettings(Document, frozen=True):
 
 
 class FleetSettings(Document, frozen=True):
-    """Name of the fleet, "" without one; pose of the map's origin in its frame [m], [deg]."""
+    """Name of the fleet, "" without one; pose of the map's origin in the fleet's frame."""
 
     name: str = ""
     x_m: Coordinate = 0.0

@@ -11,7 +11,15 @@ from typing import Annotated, Final
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
-from fasaco_edge.wire.documents.json_text import Amount, Count, Document, Name, Ordinal, allowed
+from fasaco_edge.wire.documents.json_text import (
+    Amount,
+    Count,
+    Document,
+    Name,
+    Ordinal,
+    ZenohId,
+    allowed,
+)
 from fasaco_edge.wire.documents.path_documents import PathReport
 from fasaco_edge.wire.documents.replies import (
     TROUBLES,
@@ -38,7 +46,7 @@ class ClaimReport(Document, frozen=True):
             plans, and this one did before; looks: not known yet whether another one plans.
     """
 
-    id: Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")] = ""
+    id: ZenohId = ""
     stand: Annotated[str, allowed(enum=CLAIMS)] = "plans"
 
 

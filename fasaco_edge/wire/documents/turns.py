@@ -43,8 +43,8 @@ class TakenSample(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         topic: its topic.
         checksum: CRC-32 of its payload; 0 if the batch itself holds the sample.
-        at: time of arrival of maps and their updates [s]; 0 for others, whose time has no effect.
-        told: the sample itself, from before the recorder listened; None for others.
+        at: time of arrival of a map or an update [s]; 0 for others, whose time has no effect.
+        told: the sample itself, if it is from before the recorder listened; else None.
     """
 
     topic: str

@@ -1,5 +1,6 @@
 """Codecs of ROS messages in CDR.
 
-A function that decodes or reads raises MalformedMessage for bytes that are no such message, or for
-a value that the contract does not allow; one that encodes, for a message that would be refused.
+Functions that decode or read raise MalformedMessage for bytes that are no such message, and for
+values that the contract does not allow. Functions that encode raise it for messages that a reader
+would refuse.
 """

@@ -15,7 +15,7 @@ POWERS: Final[tuple[Power, ...]] = (
     *("unknown", "charging", "discharging"),
     *("not charging", "full"),
 )
-"""What the supply does, by the numbers of power_supply_status."""
+"""Power supply statuses, by their numbers in power_supply_status."""
 
 _FLOATS = struct.Struct("<7f")
 _NAMES = (
@@ -78,5 +78,5 @@ def decode_battery(payload: bytes) -> BatteryState:
 def _check(level: float) -> None:
     if not (math.isnan(level) or 0.0 <= level <= 1.0):
         expected = "in 0..1, or NaN where it is not known"
-        hint = "publish the charge as a share, 0 to 1: of a driver that gives percent, a hundredth"
+        hint = "publish the charge as a share, 0 to 1: divide a driver's percentage by 100"
         refuse(BATTERY_STATE, "percentage", expected, level, hint)

@@ -36,7 +36,7 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 
 
 SECOND_NS = 1_000_000_000
-# What to do about values that look like those of another unit or notation.
+# Hints for values that seem to be in another unit or notation.
 IN_METRES = "publish positions in metres, in a frame whose origin is nearer"
 IN_QUATERNIONS = "publish the orientation as a quaternion x, y, z, w of length 1"
 POSE = struct.Struct("<7d")
@@ -46,7 +46,7 @@ _HEADER = struct.Struct("<iII")
 _HEADER_NAMES = ("{}.stamp.sec", "{}.stamp.nanosec", "length of {}.frame_id")
 _SENT_HEADER_NAMES = tuple(name.format("header") for name in _HEADER_NAMES)
 
-# What to do about a value that its type allows and this project does not.
+# Hint for a value that its type allows and the contract does not.
 OF_A_VALUE = "correct this field where it is published"
 
 
@@ -80,8 +80,8 @@ class CdrReader:
 
     All methods raise MalformedMessage if the payload ends before the field does.
     Bytes skipped for alignment are not checked: some writers leave them unset.
-    Consecutive numbers are read in one call, and field names are made only for errors:
-    the time of a small message is that of its calls.
+    Consecutive numbers are read in one call, and field names are made only for errors, as calls
+    take most of the time of a small message.
     """
 
     __slots__ = ("_offset", "_payload", "_size", "message")
@@ -221,7 +221,7 @@ class CdrWriter:
         return self._size
 
     def words(self, layout: struct.Struct, names: Sequence[str], *values: float) -> None:
-        """Write 32-bit numbers, as ``CdrReader.words`` reads them; ``names`` are theirs."""
+        """Write 32-bit numbers, as ``CdrReader.words`` reads them; ``names`` are for errors."""
         try:
             self._put(4, layout.pack(*values))
         except struct.error:
@@ -288,8 +288,8 @@ def clipped(text: str) -> str:
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
     """Return the yaw [rad] of a quaternion.
 
-    The second argument is 1 - 2 (y^2 + z^2) for a unit quaternion, and also right for one
-    whose norm is within the tolerance.
+    The second argument of atan2 is 1 - 2 (y^2 + z^2) for a unit quaternion, and correct for any
+    other norm.
     """
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
@@ -303,7 +303,7 @@ def read_pose(reader: CdrReader, field: str) -> Pose2D:
 
 def write_pose(writer: CdrWriter, pose: Pose2D, field: str) -> None:
     """Write a pose in the plane as a geometry_msgs/Pose with z = 0."""
-    # math refuses an infinite angle; NaN passes here, and is refused later as any other.
+    # math.sin raises ValueError for an infinite angle; ``check_pose`` refuses NaN.
     half = pose.yaw / 2 if math.isfinite(pose.yaw) else math.nan
     floats = (pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
     check_pose(floats, writer.message, field)

@@ -1,9 +1,8 @@
 """Goals for Nav2's docking server: the actions nav2_msgs/action/DockRobot and UndockRobot.
 
-Sources: nav2_msgs of Jazzy and Lyrical, opennav_docking_msgs of Humble, whose members are the same;
-results end with a message only in Jazzy's later releases and after. ``docking_server.cpp``: a goal
-to dock a docked robot, or to undock an undocked one, ends as aborted, with success and without a
-code.
+Sources: nav2_msgs of Jazzy and Lyrical, opennav_docking_msgs of Humble, with the same members;
+results have a message from later releases of Jazzy on. ``docking_server.cpp``: a goal to dock a
+docked robot, or to undock an undocked one, ends as aborted, with success and without a code.
 """
 
 from __future__ import annotations
@@ -86,7 +85,7 @@ def encode_dock(
         dock: the robot's pose in the dock, in ``frame``.
         frame: of the pose.
         dock_id: of a dock in the server's database, used in place of the pose; "" for none.
-        dock_type: its plugin; "" for the only one there is.
+        dock_type: its plugin; "" if the server has only one.
     """
     writer = CdrWriter(DOCK)
     writer.octets(goal_id)
@@ -134,5 +133,5 @@ def _ending(payload: bytes, schema: str, *, has_retries: bool) -> DockEnding:
     message = reader.string("error_msg") if is_said else ""
     reader.end()
     if status not in (UNKNOWN, SUCCEEDED, CANCELED, ABORTED):
-        refuse(schema, "status", "that of a goal that ended: 0, 4, 5 or 6", status)
+        refuse(schema, "status", "the status of an ended goal: 0, 4, 5 or 6", status)
     return DockEnding(status, success == 1, code, message)

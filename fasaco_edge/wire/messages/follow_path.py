@@ -84,7 +84,7 @@ def encode_goal(
         frame: of the points.
         stamp_ns: of the path [ns]; 0 for the newest transform.
         plugins: as many names as the server's release has, see ``ros_keys.RELEASES``.
-        end_yaw: heading of the last pose [rad]; None for that of the one before it.
+        end_yaw: heading of the last pose [rad]; None for the previous pose's heading.
         is_back: whether poses face away from the next one: the robot drives backward.
     """
     writer = CdrWriter(SEND_GOAL)
@@ -138,7 +138,7 @@ def decode_ending(payload: bytes) -> Ending:
         message = reader.string("error_msg")
     reader.end()
     if status not in (UNKNOWN, SUCCEEDED, CANCELED, ABORTED):
-        refuse(GET_RESULT, "status", "that of a goal that ended: 0, 4, 5 or 6", status)
+        refuse(GET_RESULT, "status", "the status of an ended goal: 0, 4, 5 or 6", status)
     return Ending(status, code, message)
 
 

@@ -1,6 +1,6 @@
-"""Grids, a byte a cell: their placement, and their cells as octets.
+"""Grids of one byte per cell: their placement, and their cells as octets.
 
-Without numpy, for small programs that only pass grids on.
+The module works without numpy, for small programs that only forward grids.
 """
 
 from __future__ import annotations
@@ -95,12 +95,12 @@ def read_octets(
     return octets
 
 
-# A robot's maps have one resolution, and finding its decimal takes a while.
 _FLOAT32 = struct.Struct("<f")
 # A value far beyond any resolution; rounded up, it may overflow float32.
 _FAR = 1e30
 
 
+# Cached, as a robot's maps have one resolution.
 @lru_cache(maxsize=16)
 def _shortest_decimal(value: float) -> float:
     """Return the shortest decimal that is this float32: 0.05 m stays 0.05 m."""
@@ -126,8 +126,8 @@ class GridOctets:
 
     Attributes:
         geometry: its size and place.
-        octets: row by row, the southernmost first; an int8 of a map as its byte. The range of
-            values is not checked.
+        octets: row by row, from the south; the values of a map are int8. Their range is not
+            checked.
         frame: name of the map frame.
     """
 

@@ -137,7 +137,7 @@ def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
     return cells.item(cells.argmin()), cells.item(cells.argmax())
 
 
-# Values of a grid of directions for each direction.
+# Number of values per direction in a grid of directions.
 DIRECTION_VALUES = 25
 
 

@@ -1,7 +1,7 @@
 """The coverage path: nav_msgs/Path, thousands of poses at once.
 
-A PoseStamped ends with eight-byte floats, so every pose after the first begins at a
-multiple of eight: with the same frame name in all poses, they are records of an array.
+A PoseStamped ends with eight-byte floats, so every pose after the first begins at a multiple of
+eight. If all poses have the same frame name, they are read and written as records of an array.
 """
 
 from __future__ import annotations
@@ -105,9 +105,9 @@ def decode_path(payload: bytes) -> PathMessage:
 
 
 def _read_records(reader: CdrReader, frame: str, count: int) -> NDArray[np.float64] | None:
-    """Read poses that all name ``frame``, float64 (count, 7); None, and nothing taken, otherwise.
+    """Read poses that all name ``frame``, float64 (count, 7).
 
-    That is also so for anything else unusual.
+    Return None, without taking any bytes, for other frames or an invalid message.
     """
     text = np.frombuffer(encoded_string(frame, reader.message, "header.frame_id"), np.uint8)
     first, rest = _record(reader.position, len(text)), _record(0, len(text))

@@ -123,7 +123,7 @@ def _quantised(trail: NDArray[np.float32], message: str) -> tuple[NDArray[np.uin
     if not present.any():
         return levels, 0.0, 0.0
     least = float(trail[present].min())
-    # A field of one value is all level 1; its span is 0, no divisor.
+    # If all values are equal, their span is 0, and all levels are 1.
     span = math.log(highest) - math.log(least)
     logs = np.log(trail[present].astype(np.float64)) - math.log(least)
     levels[present] = 1 + np.rint(logs * (TOP_STEP / span if span else 0.0)).astype(np.uint8)

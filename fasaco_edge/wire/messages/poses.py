@@ -155,7 +155,7 @@ class Link:
     Attributes:
         transform: the transform.
         is_static: whether it is static.
-        came_at: time of arrival [s]; a transform with the previous stamp is not new.
+        came_at: time of arrival [s] of the first transform with its stamp.
     """
 
     transform: Transform
@@ -164,18 +164,18 @@ class Link:
 
 
 class TransformTree:
-    """Stores the newest transform of each frame, and chains those from the robot's to the map's.
+    """Stores the newest transform of each frame, and multiplies those between robot and map.
 
-    Usually map, odom, base_link: a localiser publishes the first link, odometry the second.
-    The newest is the one that arrived last.
+    The frames are usually map, odom and base_link: a localiser publishes the first link, odometry
+    the second. The newest transform is the last to arrive.
 
     Args:
         map_frame: the frame of the resulting poses.
         robot_frame: the robot's own.
 
     Attributes:
-        oldest: the moving link between map and robot that arrived longest ago; None if none moves,
-            or one is missing.
+        oldest: the moving link between map and robot that arrived longest ago; None if no link
+            moves, or a link is missing.
     """
 
     def __init__(self, map_frame: str, robot_frame: str) -> None:
@@ -184,7 +184,7 @@ class TransformTree:
         self.oldest: Link | None = None
         # The newest link to each child frame.
         self._links: dict[str, Link] = {}
-        self._told: StampedPose | None = None
+        self._last: StampedPose | None = None
 
     def follow(self, map_frame: str, robot_frame: str) -> None:
         """Change the two frames of the pose; stored transforms stay."""
@@ -195,7 +195,7 @@ class TransformTree:
     ) -> StampedPose | None:
         """Store transforms; return the robot's pose if it is known and has changed.
 
-        Its stamp is that of the moving link nearest to the robot, odometry.
+        It has the stamp of the moving link nearest to the robot, which is odometry.
 
         Args:
             transforms: the received transforms.
@@ -221,9 +221,9 @@ class TransformTree:
             pose = _placed(self._planar(link.transform), pose)
         nearest = (moving or chain)[0].transform
         stamped = StampedPose(pose, self._map_frame, nearest.stamp_ns)
-        if stamped == self._told:
+        if stamped == self._last:
             return None
-        self._told = stamped
+        self._last = stamped
         return stamped
 
     def _link(self, transform: Transform, is_static: bool, came_at: float) -> Link:

@@ -13,7 +13,7 @@ from fasaco_edge.wire.ros_keys import TRIGGER, attachment, attachment_of
 
 Triggered = Literal["start", "pause", "resume", "home", "cancel"]
 TRIGGERED: Final[tuple[Triggered, ...]] = ("start", "pause", "resume", "home", "cancel")
-"""Commands that need no more than their name; ``start`` is for all that can be reached."""
+"""Commands without parameters; ``start`` covers everything reachable."""
 
 
 def check_request(payload: bytes) -> None:
@@ -31,10 +31,10 @@ def encode_response(message: str, *, success: bool) -> bytes:
     return writer.payload()
 
 
-def response_attachment(asked: bytes, time_ns: int) -> bytes:
+def response_attachment(request: bytes, time_ns: int) -> bytes:
     """Return rmw_zenoh's attachment of a response, at a time [ns]; b"" for other clients.
 
-    ``asked``: the attachment of the request.
+    ``request``: the attachment of the request.
     """
-    parts = attachment_of(asked)
+    parts = attachment_of(request)
     return attachment(parts[0], time_ns, parts[1]) if parts else b""
