@@ -97,7 +97,7 @@ class Scene:
         """Apply a patch to the map.
 
         Raises:
-            PatchWithoutBase: the patch does not fit the last map, or there is none.
+            PatchWithoutBase: the patch lies outside the map, or there is no map.
         """
         if self._map is None:
             raise PatchWithoutBase("a map update came before any map")
