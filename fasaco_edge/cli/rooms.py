@@ -115,7 +115,7 @@ def _room(text: str) -> int | str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Give the command, if there is one, and show the rooms."""
+    """List the rooms, or send a command that changes them."""
     if args.rooms_action != "list":
         asked = _asked(args)
         read_command(asked)  # faults are reported without a daemon

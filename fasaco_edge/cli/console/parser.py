@@ -1,4 +1,4 @@
-"""A parser of command lines that says first what is wrong, and what was perhaps meant."""
+"""A parser of command lines whose errors suggest what was probably meant."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ USAGE = 2
 
 
 class Parser(argparse.ArgumentParser):
-    """Parses a command line; parsers of its commands are of this class, too."""
+    """Parses a command line; the parsers of commands have this class, too."""
 
     def __init__(self, **options: Any) -> None:  # noqa: ANN401 - those of argparse
         super().__init__(**{"formatter_class": HelpText} | options)
-        # Values such as -1,2 are places, too, and no options.
+        # A value such as -1,2 is a position, and no option.
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Return the arguments and unknown ones; ``parser`` is that of the innermost command."""
+        """Return the arguments, and unknown words; ``parser``: parser of the innermost command."""
         found, unknown = super().parse_known_args(args, namespace)
         if not hasattr(found, "parser"):
             found.parser = self
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong, and exit."""
+        """Print an error, and exit."""
         print(f"{self.prog}: {message}\nsee: {self.prog} --help", file=sys.stderr)
         sys.exit(USAGE)
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Say which arguments are unknown, and what was perhaps meant, and exit."""
+        """Print the unknown arguments and a suggestion, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
         meant = "".join(f"did you mean {name}?" for name in _close(names[:1], options))
@@ -54,5 +54,5 @@ class Parser(argparse.ArgumentParser):
 
 
 def _close(words: Iterable[str], names: Sequence[str]) -> list[str]:
-    """Return the name closest to each word that is close to one."""
+    """Return the closest name for each word that resembles a name."""
     return [name for word in words for name in get_close_matches(word, names, 1)]
