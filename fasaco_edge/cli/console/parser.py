@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from fasaco_edge.cli.console.help import HelpText
+from fasaco_edge.text import nearest
 
 USAGE = 2
 """Exit code of a wrong command line."""
@@ -41,18 +41,17 @@ class Parser(argparse.ArgumentParser):
         """Print the unknown arguments and a suggestion, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
-        meant = "".join(f"did you mean {name}?" for name in _close(names[:1], options))
+        meant = _suggestion(names[0], options) if names else ""
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401
         if action.choices is None or value in action.choices:
             return
         names = [str(choice) for choice in action.choices]
-        meant = "".join(f"did you mean {name}?" for name in _close([str(value)], names))
-        meant = meant or f"there are {', '.join(names)}"
+        meant = _suggestion(str(value), names) or f"there are {', '.join(names)}"
         raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {meant}")
 
 
-def _close(words: Iterable[str], names: Sequence[str]) -> list[str]:
-    """Return the closest name for each word that resembles a name."""
-    return [name for word in words for name in get_close_matches(word, names, 1)]
+def _suggestion(word: str, names: Sequence[str]) -> str:
+    """Return a question for the name that ``word`` resembles; "" for none."""
+    return "".join(f"did you mean {name}?" for name in nearest(word, names)[:1])
