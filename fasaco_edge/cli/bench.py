@@ -129,8 +129,8 @@ def _print(report: Report, interrupted_in: str | None) -> None:
     for remark in report.remarks:
         console.print(remark, style="dim")
     if interrupted_in is not None:
-        said = f"interrupted in {interrupted_in}; these are the measurements made until then"
-        console.print(Text(said, "yellow"))
+        text = f"interrupted in {interrupted_in}; these are the measurements made until then"
+        console.print(Text(text, "yellow"))
 
 
 def _goals(report: Report) -> Table:

@@ -64,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
         print(yaml.safe_dump(_shown(config), sort_keys=False), end="")
     else:
         print(f"{args.file}: in order")
-        for said in filter(None, (config.robot.assumed, *cautions(config))):
-            print(f"  {said}")
+        for remark in filter(None, (config.robot.assumed, *cautions(config))):
+            print(f"  {remark}")
     return Exit.OK if config is not None else Exit.CONFIG
 
 

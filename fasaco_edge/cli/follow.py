@@ -223,7 +223,7 @@ def _ros_poses(ros: RosConfig) -> tuple[PoseSource, ...]:
 def _scan(config: DaemonConfig) -> dict[str, object]:
     scan, ros = config.scan, config.ros2
     assert scan
-    heard = {"scan": ros.scan, **ros.inputs} if ros else {}
+    sources = {"scan": ros.scan, **ros.inputs} if ros else {}
     return {
         "mount": {
             "x": scan.x_m,
@@ -236,7 +236,7 @@ def _scan(config: DaemonConfig) -> dict[str, object]:
         "most_pixels": config.map.max_pixels,
         "topics": [
             (name, ros.input_key(topic), topic.latched, topic.depth)
-            for name, topic in heard.items()
+            for name, topic in sources.items()
             if ros and name in ("scan", "map", "map_update")
         ],
     }

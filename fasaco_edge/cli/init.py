@@ -157,11 +157,11 @@ def run(args: argparse.Namespace) -> int:
     config = _checked(text)
     with writing(file) as new:
         new.write_text(text, encoding="utf-8")
-    heard = None if args.no_try else _listen(config, args.listen)
+    found = None if args.no_try else _listen(config, args.listen)
     if args.json:
-        print_json({"file": str(file), "config": document, "heard": heard and asdict(heard)})
+        print_json({"file": str(file), "config": document, "heard": found and asdict(found)})
     else:
-        _print(file, text, config, heard)
+        _print(file, text, config, found)
     return Exit.OK
 
 
@@ -260,7 +260,7 @@ def _listen(config: DaemonConfig, listen_s: float) -> Finding:
     return peers(CheckContext(config), listen_s)
 
 
-def _print(file: Path, text: str, config: DaemonConfig, heard: Finding | None) -> None:
+def _print(file: Path, text: str, config: DaemonConfig, peers: Finding | None) -> None:
     from fasaco_edge.config.cautions import cautions
 
     console = out()
@@ -271,9 +271,9 @@ def _print(file: Path, text: str, config: DaemonConfig, heard: Finding | None) -
         console.print(f"assumed:    {assumed}", soft_wrap=True)
     for caution in cautions(config):
         console.print(f"caution:    {caution}", soft_wrap=True)
-    if heard is not None:
-        console.print(f"on the bus: {heard.found}", soft_wrap=True)
-        for line in heard.details:
+    if peers is not None:
+        console.print(f"on the bus: {peers.found}", soft_wrap=True)
+        for line in peers.details:
             console.print(f"  {line}", soft_wrap=True, markup=False)
     console.print(f"start it:   fasaco-edge run --config {file}", soft_wrap=True)
 

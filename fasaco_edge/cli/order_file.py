@@ -38,12 +38,12 @@ def read_order_file(path: Path) -> MissionOrder:
             return read_order(document)
     except OrderError as error:
         faults = [error]
-    told = []
-    for said in (_at_origin(str(fault), origins) for fault in faults):
-        line = _line_of(said, text)
-        told.append(f"{path}, line {line}: {said}" if line else f"{path}: {said}")
+    messages = []
+    for message in (_at_origin(str(fault), origins) for fault in faults):
+        line = _line_of(message, text)
+        messages.append(f"{path}, line {line}: {message}" if line else f"{path}: {message}")
     hints = dict.fromkeys(fault.hint for fault in faults)
-    raise OrderError("\n".join(told), hint="; ".join(hints))
+    raise OrderError("\n".join(messages), hint="; ".join(hints))
 
 
 def _text(path: Path) -> str:
@@ -77,17 +77,17 @@ def _faults_of_features(document: dict[str, object]) -> Iterator[OrderError]:
             yield OrderError(text, hint=error.hint)
 
 
-def _at_origin(said: str, origins: dict[str, str]) -> str:
+def _at_origin(message: str, origins: dict[str, str]) -> str:
     """Return an error's text with zone or keep-out replaced by the feature that it comes from."""
-    place = re.match(r"(?:zones|keep_out)\[\d+\]", said)
+    place = re.match(r"(?:zones|keep_out)\[\d+\]", message)
     if place is None or place[0] not in origins:
-        return said
-    return f"{origins[place[0]]}: {said[place.end() :].lstrip('.: ')}"
+        return message
+    return f"{origins[place[0]]}: {message[place.end() :].lstrip('.: ')}"
 
 
-def _line_of(said: str, text: str) -> int | None:
+def _line_of(message: str, text: str) -> int | None:
     """Return the line of the member at the start of an error's text; None if unknown."""
-    named = _NAMED.match(said)
+    named = _NAMED.match(message)
     key = ".".join(filter(None, named.groups())) if named else ""
     try:
         node, _ = compose(text.replace("\t", " "))  # JSON may have tabs

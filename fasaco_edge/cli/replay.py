@@ -280,10 +280,10 @@ def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
     if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
     turns = f"{compared.turns_equal} of {compared.turns} turns"
-    said = "equal bit for bit" if compared.equal else "equal as far as can be compared"
+    verdict = "equal bit for bit" if compared.equal else "equal as far as can be compared"
     if compared.difference is not None:
-        said = "not equal"
-    rows = [("replay", f"{said}: {turns}")]
+        verdict = "not equal"
+    rows = [("replay", f"{verdict}: {turns}")]
     if compared.difference is not None:
         rows.append(("first difference", _words(compared.difference)))
     if compared.log_ends:

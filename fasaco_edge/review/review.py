@@ -148,9 +148,9 @@ class Review:
     def covered_share(self) -> NDArray[np.float64]:
         """Times [s] and covered shares of the cells coverable at the end, float64 (n, 2).
 
-        The curve has a point every two seconds, as a share of all cells coverable at that time. The
-        statuses, recorded four times a minute and at the end, have the numbers of all cells and of
-        the order's.
+        The recorded curve has a point every two seconds: a share of all cells coverable at that
+        time. The statuses, four a minute and one at the end, count all cells, and those of the
+        order.
         """
         known = [
             (each.at_s, *cells, count.covered, count.coverable, status.state in OVER)
@@ -212,7 +212,7 @@ class Review:
     def reached_s(self) -> dict[int, float | None] | None:
         """Time from which the covered share stayed above each of ``MILESTONES`` [s].
 
-        A milestone that was not reached has None; the whole is None if the share is unknown.
+        None for a milestone that was not reached. The property is None if no share is known.
         """
         at_s, shares = self.covered_share.T
         if not len(at_s):

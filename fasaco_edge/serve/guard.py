@@ -73,7 +73,7 @@ class Guard:
 
 
 def is_same_origin(origins: list[str], host: str) -> bool:
-    """Return whether a request comes from a page of ``host``, or from no browser (no origin)."""
+    """Return whether a request has no Origin header (no browser), or that of a page of ``host``."""
     own = (f"{scheme}://{host.lower()}" for scheme in ("http", "https"))
     return not origins or (len(origins) == 1 and origins[0].lower() in own)
 

@@ -162,8 +162,7 @@ class RobotOnBus(NamedTuple):
 
 
 def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
-    """Return what the options of ``add_robot_on_bus`` say; else ``--config``, the environment,
-    the defaults, in this order.
+    """Return the robot and bus by options, ``--config``, environment and defaults, in this order.
 
     Raises:
         BadConfiguration: a name or an endpoint is invalid, or the configuration or the credentials
@@ -182,8 +181,8 @@ def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
             bus = _client("--connect", tuple(args.connect or bus.connect), args.security)
         return RobotOnBus(keys, bus, config)
     keys = Keys(args.robot or os.environ.get(ROBOT) or "robot", args.base or "fasaco")
-    told = [one.strip() for one in os.environ.get(CONNECT, "").split(",") if one.strip()]
-    connect = tuple(args.connect or told or (DEFAULT_ENDPOINT,))
+    listed = [one.strip() for one in os.environ.get(CONNECT, "").split(",") if one.strip()]
+    connect = tuple(args.connect or listed or (DEFAULT_ENDPOINT,))
     name = "--connect" if args.connect else f"${CONNECT}"
     return RobotOnBus(keys, _client(name, connect, args.security))
 

@@ -121,8 +121,8 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     changes = _given(args, ROBOT_OPTIONS)
     for fault in section_faults(RobotConfig, changes):
         option = next(name for name, member in ROBOT_OPTIONS.items() if member == fault.key)
-        said = str(fault.error).removeprefix(fault.key)
-        raise BadConfiguration(f"--{option.replace('_', '-')}{said}")
+        text = str(fault.error).removeprefix(fault.key)
+        raise BadConfiguration(f"--{option.replace('_', '-')}{text}")
     if args.turn_s is not None:
         changes["turn_deg_s"] = None
     if args.forward_only:

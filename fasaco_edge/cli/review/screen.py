@@ -77,7 +77,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
 def _fitting(
     console: Console, found: list[tuple[str, str]], above: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Return as many of the first rows as fit on the terminal, with the rest of the screen."""
+    """Return the first rows, without those for which the terminal has no space."""
 
     def height(shown: RenderableType) -> int:
         return len(console.render_lines(shown))

@@ -43,7 +43,7 @@ class Batch:
 
 
 class RecordedSamples:
-    """The samples in the parts of a recording, and of the recordings after it.
+    """The samples in the parts of one or more runs, in order of time.
 
     Args:
         paths: the files, in any order. If the first parts are missing, the samples begin with the

@@ -134,8 +134,8 @@ class Outcome:
             words += f" after {duration(1e-9 * (self._now_ns - self._began_ns))}"
         if simulated := scale_words(known_settings(status.config).robot.time_scale):
             words += f" ({simulated})"
-        said = [plain(status.reason)] if status.reason else []
+        facts = [plain(status.reason)] if status.reason else []
         floor = status.floor
         if floor is not None and floor.reachable_m2 and "swept" not in status.reason:
-            said.append(f"{floor.swept_m2:.1f} of {floor.reachable_m2:.1f} m2 swept")
-        self.text = ": ".join([words, *filter(None, ["; ".join(said)])])
+            facts.append(f"{floor.swept_m2:.1f} of {floor.reachable_m2:.1f} m2 swept")
+        self.text = ": ".join([words, *filter(None, ["; ".join(facts)])])

@@ -102,9 +102,9 @@ class Recorder:
         """Subscribe to all recorded topics, and declare the recorder's token."""
         keys = self._config.keys()
         if ros := self._config.ros2:
-            for name, heard in ros.inputs.items():
+            for name, source in ros.inputs.items():
                 self._subscribe(
-                    name, ros.input_key(heard), heard.latched, heard.depth, heard.schema
+                    name, ros.input_key(source), source.latched, source.depth, source.schema
                 )
         for topic in topics.RECORDED:
             self._subscribe(topic.name, keys.of(topic), topic.is_latched)

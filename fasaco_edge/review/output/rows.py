@@ -35,7 +35,7 @@ CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planne
 ORDERS = ("order", "from", "to", "result", "driven", "replans", "paused", "asked for")
 UNREACHED = ("order", "m2", "at", "why")
 LEFT = ("m2", "at", "why")
-"""Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
+"""Columns of ``order_rows``, ``unreached_rows`` and ``left_rows``."""
 ROOMS = ("room", "m2", "time", "entered", "swept", "passes", "left")
 """Columns of ``room_rows``."""
 MOST_PLACES = 2
@@ -186,10 +186,10 @@ def _processor(document: ReviewDocument) -> str:
     daemon, recorder = document.processor_s, document.recorder_processor_s
     if not daemon:
         return ""
-    told = f"daemon {amount(daemon, 's')}"
+    text = f"daemon {amount(daemon, 's')}"
     if document.recorded_s:
-        told += f" ({100 * daemon / document.recorded_s:.1f} % of a core)"
-    return told if recorder is None else f"{told}, recorder {amount(recorder, 's')}"
+        text += f" ({100 * daemon / document.recorded_s:.1f} % of a core)"
+    return text if recorder is None else f"{text}, recorder {amount(recorder, 's')}"
 
 
 def _some(texts: Sequence[str]) -> str:
