@@ -192,7 +192,7 @@ class Faults:
     Attributes:
         by_code: messages refused by the daemon.
         lost: number of samples that the recorder lost; None if unknown.
-        complaints: warnings in the recorder's log.
+        complaints: faults in the recorder's log, one a line.
     """
 
     by_code: dict[str, int]

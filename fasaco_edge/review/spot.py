@@ -62,7 +62,7 @@ class Spot(msgspec.Struct):
         words: the reason in full.
         missed_m: least distance from the tool's edge [m].
         nearest_s: time of that distance, since the recording began [s].
-        seen_s: time since which the map shows it free, to the end [s].
+        seen_s: beginning of the last period, up to the end, in which the map shows it free [s].
         patch_m2: area of the connected patch of unswept floor around it [m2].
     """
 
@@ -129,7 +129,7 @@ class _Recorded:
 
     @cached_property
     def seen_s(self) -> NDArray[np.float64]:
-        """Time since which the map shows each position free, to the end [s]; NaN if it does not."""
+        """Beginning of the last period in which each position is free on the map [s]; else NaN."""
         record, footprint = self._review.record, self._review.data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
         since = np.full(len(self.places), np.nan)
@@ -296,7 +296,7 @@ class _Judge:
         return next((one for one in paths if _distances(one.xy, place).min() <= reach_m), None)
 
     def _left_by(self, over: DrawnLine) -> tuple[str, str]:
-        """Return kind and text of the reason for a spot below a path that was not driven."""
+        """Return kind and text of the reason for a spot that a planned path led over."""
         led = f"path {over.revision} led over it"
         later = [p.about for p in self._data.paths if p.about.revision > over.revision]
         if not later:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 TURN_S = 2.0
 
 
-# Least angle of a turn [deg]; angle that outweighs one second of duration, or of distance from the
-# moment [deg/s].
+# Least angle of a turn [deg]. Among several turns the largest angle counts, minus this many degrees
+# for each second of duration and of distance from the moment [deg/s].
 TURN_DEG, SHORTER_DEG_S = 60.0, 20.0
 
 

@@ -2,7 +2,7 @@
 
 The queue's capacity bounds the recorder's memory. Zenoh, the drawing, the inputs and Rerun hold up
 to ten copies of a sample, and allocators keep some freed memory. With the largest maps that fit
-into the queue, at any rate, the recorder takes at most
+into the queue, at any publishing rate, the recorder takes at most
 
     BASE_BYTES + COPIES * capacity
 
@@ -31,7 +31,7 @@ class RunClock:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
 
     def now_ns(self) -> int:
-        """Return the time since the epoch [ns], as if the system clock was never set since."""
+        """Return the time since the epoch [ns]; later settings of the system clock are ignored."""
         return self._offset_ns + time.monotonic_ns()
 
     def arrival(self, topic: str, sample: Sample) -> Arrival:
@@ -59,8 +59,8 @@ def afforded_bytes(limit: int | None) -> int:
 # Number of waiting samples at which the writer is behind: about ten seconds of poses.
 BEHIND_SAMPLES = 1024
 
-# Topics whose waiting samples a new sample replaces when the writer is behind, by its topic. A map
-# replaces map updates, too.
+# For each topic: when the writer is behind, a new sample replaces waiting ones of these topics. A
+# map replaces map updates, too.
 SUPERSEDED = {
     topic.name: frozenset({topic.name}) for topic in TOPICS if topic.queues.recorder == NEWEST
 }
