@@ -1,7 +1,7 @@
-"""The command line: ``fasaco-edge`` and its commands, a file or folder each.
+"""The command line: ``fasaco-edge`` and its commands, one module or package each.
 
-A new command is a file, or a folder's ``__init__.py``, that ends with a ``Command``, and a row of
-``COMMANDS``. Only the file of the command that is given is imported.
+The module of a command defines ``COMMAND``, and ``COMMANDS`` has a row for it. Only the module of
+the given command is imported.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ COMMANDS = {
     "check-config": "check a configuration: every fault, with line, value and what is allowed",
     "doctor": "check host, bus and configuration, and say what to do",
 }
-"""Each command, and its line in the list of them."""
+"""Each command, and its line in ``fasaco-edge --help``."""
 
-# A faulty or full disk, no memory or file descriptors left. The exit code differs from that of an
-# invalid configuration, so that a service is restarted.
+# Errors of a faulty or full disk, or of exhausted memory or file descriptors. Their exit code makes
+# systemd restart a service, the exit code of an invalid configuration does not.
 _TRANSIENT = frozenset(
     (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 )
@@ -64,12 +64,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def program() -> NoReturn:
-    """Run one command as a separate process, and exit with the command's code.
+    """Run one command as the process's only task, and exit with the command's code.
 
-    Threads of a closed Zenoh session still release callbacks for a while (Zenoh 1.10). If the
-    interpreter shuts down meanwhile, the C library aborts the process with "FATAL: exception not
-    rethrown", or the shutdown waits for ever. So the process exits without it, except with Rerun,
-    which writes its last data during it. Nor can a hanging check of ``doctor`` delay the exit.
+    After a Zenoh session is closed, its threads still release callbacks for a while (Zenoh 1.10). A
+    shutdown of the interpreter in that time may abort with "FATAL: exception not rethrown", or
+    hang. So the process exits without a shutdown, unless Rerun is loaded, which writes its last
+    data during the shutdown. A hanging check of ``doctor`` cannot delay the exit either.
     """
     code = main()
     if "zenoh" not in sys.modules or "rerun" in sys.modules:
@@ -84,7 +84,7 @@ def program() -> NoReturn:
 
 def run_command(parser: Parser, words: Sequence[str]) -> int:
     """Run the command that ``parser`` finds in ``words``; report errors; return the exit code."""
-    # Whatever the caller's umask, no other user may change the files written here.
+    # No other user may change the files written here.
     os.umask(os.umask(0o022) | 0o022)
     open_missing_streams()
     clean_streams()
@@ -101,7 +101,7 @@ def run_command(parser: Parser, words: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except SystemError as error:
-        # Numba's error for Ctrl-C while a kernel runs.
+        # Numba raises this for Ctrl-C while a kernel runs.
         if isinstance(error.__cause__, KeyboardInterrupt):
             return Exit.INTERRUPTED
         raise
@@ -117,7 +117,7 @@ def run_command(parser: Parser, words: Sequence[str]) -> int:
 
 
 def _parser(words: Sequence[str]) -> Parser:
-    """Return a parser that knows all commands by name, and the options of the one in ``words``."""
+    """Return a parser with all commands, and the options of the command in ``words``."""
     parser = Parser(
         prog="fasaco-edge",
         description="Coverage path planning with fast-spanning ant colonies, on a robot.",
@@ -142,8 +142,8 @@ def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _is_transient(error: BaseException | None) -> bool:
-    """Return whether an error is transient: not a mistake of the user, and may be over soon."""
-    # An error of a user's own planner is a mistake of the user.
+    """Return whether the cause of an error may be over soon, and is no mistake of the user."""
+    # Errors of a user's own planner are the user's.
     while error is not None and not isinstance(error, PlannerFailed):
         if isinstance(error, OSError) and error.errno in _TRANSIENT:
             return True

@@ -1,7 +1,4 @@
-"""``fasaco-edge ask``: a query to a running daemon, and its answer.
-
-Answers are tables for people, or JSON where they came as CDR.
-"""
+"""``fasaco-edge ask``: a query to a running daemon, and its answer as a table or as JSON."""
 
 from __future__ import annotations
 
@@ -80,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _parameter(text: str) -> str:
-    # Characters with a meaning in a selector would change the query.
+    # Special characters of a Zenoh selector would change the query.
     if not re.fullmatch(r"\w+=[^;?#&|]*", text):
         raise argparse.ArgumentTypeError(f"must be KEY=VALUE, got {text!r}")
     return text
@@ -90,7 +87,7 @@ TIMEOUT_S = 5.0
 
 
 def nobody_answers(prefix: str, robots: Collection[str]) -> NobodyAnswersError:
-    """Return the error for no answer at ``prefix``; ``robots``: those with a daemon on the bus."""
+    """Return the error for no answer at ``prefix``; ``robots``: names of robots with a daemon."""
     if prefix.rpartition("/")[2] in robots:
         return NobodyAnswersError(
             f"the daemon at {prefix} is on the bus, but has not answered in time",
@@ -113,7 +110,7 @@ class RefusedError(FasacoError):
 
 
 def add_question(parser: argparse.ArgumentParser) -> None:
-    """Add options for the robot to ask, the time to wait, and the form of the answer."""
+    """Add options for the robot, the timeout, and the form of the answer."""
     add_json(parser, "the answer")
     parser.add_argument(
         "--timeout",
@@ -126,10 +123,10 @@ def add_question(parser: argparse.ArgumentParser) -> None:
 
 
 def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: bytes = b"") -> Reply:
-    """Query; ``parameters`` as they follow ``?``.
+    """Return the answer to a query; ``parameters``: text after ``?`` in the selector.
 
     Raises:
-        RefusedError: the answer is an error; with ``--json`` it is printed as it came.
+        RefusedError: the answer is an error; with ``--json`` it is printed first.
         NobodyAnswersError: there is no answer in time.
         BusUnavailable: no process listens at the endpoint.
     """
@@ -151,7 +148,7 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
 
 
 def show_mission(reply: Reply) -> None:
-    """Print state, mission and troubles in a status, or in the answer to a command."""
+    """Print state, mission and troubles of a status, or of the answer to a command."""
     answer = decode_tolerant(reply.payload, replies.Reply)
     mission, console = answer.mission, out()
     console.print(figures(_rows(answer)))
@@ -171,7 +168,7 @@ def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
         stage = phrases.stage(mission)
         rows.append(("mission", f"{stage}, {began}"))
     if answer.coverage is not None:
-        # Zones have counts of their own, below.
+        # Zones have their own counts in a table below.
         of_all = " of all floor" if mission.zones else ""
         rows.append(("covered", phrases.covered(answer.coverage) + of_all))
     if answer.floor is not None:
@@ -203,14 +200,14 @@ def _unreached(unreached: replies.UnreachedReport) -> Table:
 
 
 def print_answer(reply: Reply) -> None:
-    """Print the payload if it is JSON, with its escapes, else the figures of the message."""
+    """Print a JSON payload, or the figures of a ROS message as JSON."""
     print_json(_figures(reply) if reply.schema else decode_json(reply.payload))
 
 
 def show(name: str, reply: Reply) -> None:
-    """Print the answer to question ``name``."""
+    """Print the answer to query ``name``."""
     if reply.schema:
-        # A path that does not come from a plan has no figures of a plan.
+        # ``known`` leaves out null: a path without a plan has no figures of a plan.
         out().print(figures(known(_figures(reply))))
     elif name in ("status", "mission"):
         show_mission(reply)

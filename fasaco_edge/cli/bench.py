@@ -1,4 +1,4 @@
-"""``fasaco-edge bench``: benchmarks, each a command of its own."""
+"""``fasaco-edge bench``: benchmarks, each of them a subcommand."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ medians with their range; run them on a quiet machine.
 def add_benchmarks(
     parser: argparse.ArgumentParser, benchmarks: Sequence[Benchmark[Any]] = BENCHMARKS
 ) -> None:
-    """Add each benchmark to ``parser``, as a command of its own."""
+    """Add each benchmark to ``parser`` as a subcommand."""
     parser.set_defaults(
         command=run, benchmark=None, usage=parser, log_level="warning", with_parent=None
     )
@@ -58,7 +58,7 @@ def add_benchmarks(
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure and report; without a benchmark list them."""
+    """Run a benchmark and report it; without one, list all."""
     if args.benchmark is None:
         args.usage.print_help()
         return 0
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> int:
 def _measure(
     benchmark: Benchmark[Sample], args: argparse.Namespace
 ) -> tuple[list[Sample], str | None]:
-    """Return the samples, and which measurement the user interrupted; None for none."""
+    """Return the samples, and the measurement that the user interrupted; None for none."""
     samples: list[Sample] = []
     present = benchmark.name
     with terminal.progress() as bar:
@@ -116,7 +116,7 @@ def _print(report: Report, interrupted_in: str | None) -> None:
     console = terminal.out()
     for shown in report.tables:
         table = _table(shown.title)
-        # Text keeps the line breaks in a cell; a plain string shows them as a backslash and an n.
+        # Text keeps line breaks in a cell; the console escapes them in a plain string.
         first, *others = map(Text, shown.header)
         table.add_column(first, style="cyan", overflow="fold")
         for column in others:
@@ -129,8 +129,8 @@ def _print(report: Report, interrupted_in: str | None) -> None:
     for remark in report.remarks:
         console.print(remark, style="dim")
     if interrupted_in is not None:
-        said = f"interrupted in {interrupted_in}; these are the measurements made until then"
-        console.print(Text(said, "yellow"))
+        text = f"interrupted in {interrupted_in}; these are the measurements made until then"
+        console.print(Text(text, "yellow"))
 
 
 def _goals(report: Report) -> Table:
@@ -152,7 +152,7 @@ def _goals(report: Report) -> Table:
 
 
 def _table(title: str) -> Table:
-    """Return an empty table with narrow columns: ranges take room."""
+    """Return an empty table with little space between columns."""
     return Table(
         title=title,
         title_justify="left",

@@ -1,4 +1,4 @@
-"""``fasaco-edge check-config``: all that is wrong with a configuration."""
+"""``fasaco-edge check-config``: a list of all faults in a configuration."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
         print(yaml.safe_dump(_shown(config), sort_keys=False), end="")
     else:
         print(f"{args.file}: in order")
-        for said in filter(None, (config.robot.assumed, *cautions(config))):
-            print(f"  {said}")
+        for remark in filter(None, (config.robot.assumed, *cautions(config))):
+            print(f"  {remark}")
     return Exit.OK if config is not None else Exit.CONFIG
 
 
@@ -93,7 +93,7 @@ def _document(
 
 
 def _print(file: Path, faults: list[Fault]) -> None:
-    """Print a line for each fault, as compilers do, and each hint that is specific to its fault."""
+    """Print each fault as ``file:line: text``, and its hint unless that is the general one."""
     console = out()
     for fault in faults:
         where = f"{file}:{fault.line}" if fault.line else str(file)

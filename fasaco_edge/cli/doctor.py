@@ -42,7 +42,7 @@ examples:
   fasaco-edge doctor --config /etc/fasaco-edge.yaml
   fasaco-edge doctor --config robot.yaml --json | jq '.checks[] | select(.level != "ok")'
 """
-# Width of the texts, also in a narrower terminal [characters].
+# Least width of the texts [characters].
 LEAST_ROOM = 24
 COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 

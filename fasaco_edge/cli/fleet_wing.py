@@ -1,6 +1,6 @@
-"""Interface to the package ``fleet``: what commands need, loaded only if a fleet is requested.
+"""The interface of commands to the package ``fleet``, which is loaded only on use.
 
-No other module of the command line imports the fleet; the daemon has ``daemon.fleet_wing``.
+No other module of ``cli`` imports the fleet; the daemon has ``daemon.fleet_wing``.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _PLACES = {
 
 
 def __getattr__(name: str) -> object:
-    """Load a function of the fleet when it is imported from here."""
+    """Load a function of the fleet."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     found: object = getattr(import_module(f"fasaco_edge.fleet.{_PLACES[name]}"), name)

@@ -1,7 +1,7 @@
 """``fasaco-edge follow``: the driver of a robot's base along its path.
 
-The configuration takes more memory to read than the robot to drive: once it is read, the process
-becomes a small one, which gets its settings through a pipe.
+Reading the configuration takes more memory than driving. So the process reads it, and then replaces
+itself by a small process, which gets its settings through a pipe.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ if TYPE_CHECKING:
     from fasaco_edge.follow.node import Node
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
 
-# Descriptor of standard input; it may be closed, and sys.stdin None.
+# Descriptor of standard input; sys.stdin is None if it is closed.
 STDIN = 0
-# Share of the tool's width: lanes are further apart than this, and a robot is nearer to its lane.
+# Default of ros2.nav2.near_m, as a share of the tool's width: less than the distance of two lanes,
+# and more than a robot's distance from its lane.
 NEAR_SHARE = 0.75
 EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
@@ -108,30 +109,28 @@ def _age(text: str) -> float:
         value = float(text)
     except ValueError:
         value = 0.0
-    # A negated comparison, so that NaN is caught too.
+    # The comparison is negated to catch NaN.
     if not 0.05 <= value <= 10.0:
         raise argparse.ArgumentTypeError(f"must be in 0.05..10 s, got {text!r}")
     return value
 
 
 def run(args: argparse.Namespace) -> int:
-    """Drive until a signal."""
+    """Drive until SIGTERM or SIGINT."""
     return _drive() if args.given else _become_small(args)
 
 
 def _become_small(args: argparse.Namespace) -> NoReturn:
-    """Read the settings, and continue as a process that has never read a configuration."""
+    """Read the settings, and replace the process by a small one that drives."""
     if not 0.0 < args.speed <= 100.0:
         raise BadConfiguration(f"--speed must be above 0 and at most 100, got {args.speed}")
     document = settings_of(args).encode()
-    # The settings are not passed on the command line, which others can read: they may hold a
-    # password.
+    # The settings may hold a password, and other users can read a command line: use a pipe.
     reading, writing = os.pipe()
     os.write(writing, document)
     os.close(writing)
     os.dup2(reading, STDIN)
-    # If standard input was closed, the pipe itself may have its number, and would close at the
-    # exec.
+    # If standard input was closed, the pipe may have its number, and would close at the exec.
     os.set_inheritable(STDIN, True)
     words = ["follow", "--given", "--log-level", args.log_level]
     if args.with_parent is not None:
@@ -141,7 +140,7 @@ def _become_small(args: argparse.Namespace) -> NoReturn:
 
 
 def _drive() -> int:
-    """Drive, in the small process."""
+    """Drive until SIGTERM or SIGINT, in the small process."""
     from fasaco_edge.follow.node import FollowerNode, run_follower
     from fasaco_edge.follow.settings import FollowSettings
 
@@ -157,10 +156,10 @@ def _drive() -> int:
 
 
 def settings_of(args: argparse.Namespace) -> FollowSettings:
-    """Return the settings that options, configuration and environment state.
+    """Return the settings by options, configuration and environment.
 
     Raises:
-        BadConfiguration: one of them is wrong.
+        BadConfiguration: an option or the configuration is invalid.
     """
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
@@ -195,7 +194,7 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
 
 
 def limits_of(robot: RobotConfig) -> Limits:
-    """Return the limits of a base."""
+    """Return the limits of a base on speeds and accelerations."""
     from fasaco_edge.follow.estimate import Limits
 
     return Limits(
@@ -224,7 +223,7 @@ def _ros_poses(ros: RosConfig) -> tuple[PoseSource, ...]:
 def _scan(config: DaemonConfig) -> dict[str, object]:
     scan, ros = config.scan, config.ros2
     assert scan
-    heard = {"scan": ros.scan, **ros.inputs} if ros else {}
+    sources = {"scan": ros.scan, **ros.inputs} if ros else {}
     return {
         "mount": {
             "x": scan.x_m,
@@ -237,7 +236,7 @@ def _scan(config: DaemonConfig) -> dict[str, object]:
         "most_pixels": config.map.max_pixels,
         "topics": [
             (name, ros.input_key(topic), topic.latched, topic.depth)
-            for name, topic in heard.items()
+            for name, topic in sources.items()
             if ros and name in ("scan", "map", "map_update")
         ],
     }
@@ -263,7 +262,7 @@ def _nav2(config: DaemonConfig) -> dict[str, object]:
 
 def _dock(config: DaemonConfig) -> dict[str, object]:
     assert config.ros2
-    assert config.mission.dock is not None  # as checked with the configuration
+    assert config.mission.dock is not None  # checked when the configuration was read
     ros, nav2, dock = config.ros2, config.ros2.nav2, config.mission.dock
     return {
         "dock_action": ros.dock_action,

@@ -1,8 +1,7 @@
 """GeoJSON of rooms, lines and orders, for drawing programs and geographic information systems.
 
-Coordinates are metres in the frame of the map, x before y, not the degrees of RFC 7946: that is
-agreed between who writes and who reads. Polygons are closed, and their outlines run
-counter-clockwise.
+Coordinates are (x, y) [m] in the frame of the map, not the degrees of RFC 7946: writer and reader
+have to agree on that. Polygons are closed, their outlines counter-clockwise.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ from fasaco_edge.wire.documents.rooms import Rooms
 
 SUFFIX = ".geojson"
 HINT = "draw each zone as a Polygon; `rooms list --geojson` shows what one looks like"
-# Properties of a feature that are members of a zone.
+# Properties of a feature that become members of a zone.
 OF_ZONES = ("name", "passes", "room", "priority")
-# Members of the collection that are members of an order.
+# Members of the collection that become members of an order.
 OF_ORDERS = ("passes", "return_home", "keep_covered", "unknown", "until_min")
-# Other properties of a feature with a meaning, and members that a collection has.
+# Other known properties of a feature, and other known members of a collection.
 OF_FEATURES, OF_COLLECTIONS = ("keep_out", "skip"), ("type", "features", "name", "crs", "bbox")
-# How alike an unknown member is to the one that it was probably meant for.
+# Least similarity of an unknown member to a known one that counts as a misspelling.
 ALIKE = 0.8
 
 Feature = dict[str, object]
@@ -33,7 +32,7 @@ Feature = dict[str, object]
 def lines_collection(
     lines: Iterable[tuple[Sequence[Sequence[float]], dict[str, object]]],
 ) -> dict[str, object]:
-    """Return lines through points (x, y) [m], each with its properties."""
+    """Return lines through points (x, y) [m], each with its properties, as a collection."""
     features = [
         _feature("LineString", [list(point[:2]) for point in points], properties)
         for points, properties in lines
@@ -42,7 +41,7 @@ def lines_collection(
 
 
 def rooms_collection(rooms: Rooms) -> dict[str, object]:
-    """Return the rooms as polygons: outlines, with the rooms that they enclose as holes."""
+    """Return the rooms as polygons, whose holes are the rooms that they enclose."""
     outlined = {room.id: room for room in rooms.outlined}
     features = []
     for room in outlined.values():
@@ -74,21 +73,21 @@ def _ring(outline: Sequence[Point]) -> list[list[float]]:
 
 
 def is_geojson(document: object) -> TypeGuard[dict[str, object]]:
-    """Return whether a document is GeoJSON; no order has a type."""
+    """Return whether a document is GeoJSON: an order has no member ``type``."""
     return isinstance(document, dict) and "type" in document
 
 
 def order_of(document: dict[str, object]) -> tuple[dict[str, object], dict[str, str]]:
-    """Return the order that a collection of polygons stands for, and which feature, by its place
-    and name, each zone and keep-out comes from.
+    """Return the order in a collection of polygons, and the feature of each zone and keep-out.
 
-    A polygon is a zone, with ``OF_ZONES`` of its properties; with ``"keep_out": true`` it is one
-    that the robot must not touch. A room is ordered by its number, whatever its outline, unless it
-    is to be skipped. ``OF_ORDERS`` of the collection are those of the order.
+    A polygon is a zone, whose members are its properties ``OF_ZONES``; with ``"keep_out": true`` it
+    is a keep-out. A feature with the number of a room orders that room, whatever its outline. With
+    ``"skip": true`` a feature is ignored. The members ``OF_ORDERS`` of the collection are those of
+    the order.
 
     Raises:
-        OrderError: there is no feature, or one is no polygon without holes, or has what is
-            probably a misspelt property.
+        OrderError: there is no feature, a feature is no polygon or has holes, or a property is
+            probably misspelt.
     """
     zones: list[dict[str, object]] = []
     keep_out: list[object] = []
@@ -122,14 +121,14 @@ def order_of(document: dict[str, object]) -> tuple[dict[str, object], dict[str, 
 
 
 def _check_spelling(members: dict[str, object], known: Sequence[str], where: str) -> None:
-    """Check that no unknown member looks like a known one: programs write others of their own."""
+    """Check that no member is a misspelling; other unknown members may come from any program."""
     for name in (each for each in members if each not in (*known, *OF_COLLECTIONS)):
         if near := nearest(name, known, ALIKE):
             raise OrderError(f"{where}: unknown member {name}; did you mean {near[0]}?", hint=HINT)
 
 
 def _is_set(properties: dict[str, object], name: str, where: str) -> bool:
-    """Return a property that is true or false; without it false."""
+    """Return a boolean property; False if it is missing."""
     value = properties.get(name)
     if value is not None and not isinstance(value, bool):
         raise OrderError(f"{where}: {name}: must be true or false, is {value!r}", hint=HINT)
@@ -137,7 +136,7 @@ def _is_set(properties: dict[str, object], name: str, where: str) -> bool:
 
 
 def _corners(geometry: object, where: str) -> list[object]:
-    """Return the corners of a polygon."""
+    """Return the corners of a polygon without holes."""
     members = geometry if isinstance(geometry, dict) else {}
     rings, kind = members.get("coordinates"), members.get("type")
     if kind != "Polygon" or not isinstance(rings, list) or not rings:

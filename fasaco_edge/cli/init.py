@@ -1,4 +1,4 @@
-"""``fasaco-edge init``: a first configuration, by some questions, tried on the bus."""
+"""``fasaco-edge init``: a first configuration, made by questions and tried on the bus."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WAYS = {
     "rmw_zenoh": "ROS 2 whose middleware is rmw_zenoh",
     "bridge": "ROS 2 behind zenoh-bridge-ros2dds",
 }
-# Keys of the robot's section, and the options that set them.
+# Keys of the section ``robot``, and the options that set them.
 ROBOT = {
     "name": "name",
     "radius_m": "robot_radius",
@@ -44,7 +44,7 @@ ROBOT = {
     "clearance_m": "clearance",
     "tool_width_m": "tool_width",
 }
-# Options that are asked for: the question, and the answer by default.
+# Options that are asked for if missing, each with its question and default answer.
 QUESTIONS = {
     "robot_radius": ("Radius of the disc around the robot [m]", f"{DEFAULT_RADIUS_M:g}"),
     "tool_width": ("Width of its tool [m]", f"{DEFAULT_CELL_M:g}"),
@@ -57,8 +57,8 @@ QUESTIONS = {
         "",
     ),
 }
-# Where a robot passes something, its map and pose are wrong by one to two centimetres [m]; the
-# default of the key is for a simulation in which they are not.
+# Default clearance for a real robot, whose map and poses have errors of 1 to 2 cm [m]. The default
+# of the configuration is for a simulation without errors.
 CLEARANCE_M = 0.02
 HEAD = "# Every key, with its default and what it means: deploy/fasaco-edge.yaml\n"
 EPILOG = """\
@@ -157,11 +157,11 @@ def run(args: argparse.Namespace) -> int:
     config = _checked(text)
     with writing(file) as new:
         new.write_text(text, encoding="utf-8")
-    heard = None if args.no_try else _listen(config, args.listen)
+    found = None if args.no_try else _listen(config, args.listen)
     if args.json:
-        print_json({"file": str(file), "config": document, "heard": heard and asdict(heard)})
+        print_json({"file": str(file), "config": document, "heard": found and asdict(found)})
     else:
-        _print(file, text, config, heard)
+        _print(file, text, config, found)
     return Exit.OK
 
 
@@ -187,10 +187,10 @@ def document_of(args: argparse.Namespace) -> dict[str, object]:
 
 
 def _ask(args: argparse.Namespace) -> None:
-    """Ask for missing values if the terminal is interactive.
+    """Ask for missing values.
 
     Raises:
-        BadConfiguration: no person can answer, or there is no answer.
+        BadConfiguration: there is no terminal, or no answer.
     """
     missing = [name for name in QUESTIONS if getattr(args, name) is None]
     if args.robot_size is not None and "robot_radius" in missing:
@@ -208,10 +208,10 @@ def _asked(name: str) -> object:
     """Ask for the value of an option until the answer is valid."""
     question, default = QUESTIONS[name]
     while True:
-        # Questions do not go to standard output, which may be JSON for another program.
+        # Questions go to standard error, as standard output may be JSON.
         err().print(f"{question} [{default or 'none'}]: ", end="", markup=False, soft_wrap=True)
         line = sys.stdin.readline()
-        if not line:  # Ctrl-D: without an answer nothing is written
+        if not line:  # end of input, Ctrl-D
             raise BadConfiguration(f"no answer to: {question}", hint="give the options, see --help")
         try:
             return _read(name, line.strip() or default)
@@ -221,7 +221,7 @@ def _asked(name: str) -> object:
 
 
 def _read(name: str, text: str) -> object:
-    """Return the value of an option in an answer, checked as in a configuration."""
+    """Return the value in an answer, checked as in a configuration."""
     if name == "map_by":
         if text not in WAYS:
             raise BadConfiguration(f"must be {', '.join(WAYS)}, got {shown(text)}")
@@ -241,7 +241,7 @@ def _read(name: str, text: str) -> object:
 
 
 def _checked(text: str) -> DaemonConfig:
-    """Return the configuration in a text; raise the first of its faults."""
+    """Return the configuration in a text; raise its first fault."""
     from fasaco_edge.config.loading import inspect_config
 
     with TemporaryDirectory() as folder:
@@ -260,7 +260,7 @@ def _listen(config: DaemonConfig, listen_s: float) -> Finding:
     return peers(CheckContext(config), listen_s)
 
 
-def _print(file: Path, text: str, config: DaemonConfig, heard: Finding | None) -> None:
+def _print(file: Path, text: str, config: DaemonConfig, peers: Finding | None) -> None:
     from fasaco_edge.config.cautions import cautions
 
     console = out()
@@ -271,9 +271,9 @@ def _print(file: Path, text: str, config: DaemonConfig, heard: Finding | None) -
         console.print(f"assumed:    {assumed}", soft_wrap=True)
     for caution in cautions(config):
         console.print(f"caution:    {caution}", soft_wrap=True)
-    if heard is not None:
-        console.print(f"on the bus: {heard.found}", soft_wrap=True)
-        for line in heard.details:
+    if peers is not None:
+        console.print(f"on the bus: {peers.found}", soft_wrap=True)
+        for line in peers.details:
             console.print(f"  {line}", soft_wrap=True, markup=False)
     console.print(f"start it:   fasaco-edge run --config {file}", soft_wrap=True)
 

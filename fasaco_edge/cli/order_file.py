@@ -1,4 +1,4 @@
-"""Orders in files: YAML, JSON or GeoJSON; a fault is named with its line."""
+"""The reader of orders in YAML, JSON or GeoJSON files; errors name the line of each fault."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fasaco_edge.host.plain_yaml import PlainYamlError, compose, load, read_boun
 from fasaco_edge.mission.orders.commands import order_faults
 from fasaco_edge.mission.orders.order import MissionOrder, read_order
 
-# A member at the start of an error's text, and one in it that is unknown.
+# The member at the start of an error's text, and an unknown member in the text.
 _NAMED = re.compile(r"(?:the order|the collection|([\w.\[\]]*))(?:: unknown member ([^;]+))?")
 
 
@@ -22,7 +22,8 @@ def read_order_file(path: Path) -> MissionOrder:
     """Return the order in a file.
 
     Raises:
-        OrderError: naming file, line, member or feature, what was expected and what came.
+        OrderError: the file cannot be read, or the order is invalid; it lists all faults with file
+            and line.
     """
     text = _text(path)
     origins: dict[str, str] = {}
@@ -37,12 +38,12 @@ def read_order_file(path: Path) -> MissionOrder:
             return read_order(document)
     except OrderError as error:
         faults = [error]
-    told = []
-    for said in (_at_origin(str(fault), origins) for fault in faults):
-        line = _line_of(said, text)
-        told.append(f"{path}, line {line}: {said}" if line else f"{path}: {said}")
+    messages = []
+    for message in (_at_origin(str(fault), origins) for fault in faults):
+        line = _line_of(message, text)
+        messages.append(f"{path}, line {line}: {message}" if line else f"{path}: {message}")
     hints = dict.fromkeys(fault.hint for fault in faults)
-    raise OrderError("\n".join(told), hint="; ".join(hints))
+    raise OrderError("\n".join(messages), hint="; ".join(hints))
 
 
 def _text(path: Path) -> str:
@@ -57,7 +58,7 @@ def _text(path: Path) -> str:
 
 def _parsed(path: Path, text: str) -> object:
     try:
-        # YAML 1.1 would take 1e3 for a text.
+        # JSON is not read as YAML 1.1, in which 1e3 is a text.
         return json.loads(text) if path.suffix in (".json", SUFFIX) else load(text)
     except RecursionError as error:
         raise OrderError("nested too deeply") from error
@@ -66,7 +67,7 @@ def _parsed(path: Path, text: str) -> object:
 
 
 def _faults_of_features(document: dict[str, object]) -> Iterator[OrderError]:
-    """Yield what is wrong with each feature of a collection alone."""
+    """Yield the first fault of each feature of a collection."""
     features = document.get("features")
     for index, feature in enumerate(features if isinstance(features, list) else ()):
         try:
@@ -76,17 +77,17 @@ def _faults_of_features(document: dict[str, object]) -> Iterator[OrderError]:
             yield OrderError(text, hint=error.hint)
 
 
-def _at_origin(said: str, origins: dict[str, str]) -> str:
-    """Return an error's text with the feature in place of the zone or keep-out made of it."""
-    place = re.match(r"(?:zones|keep_out)\[\d+\]", said)
+def _at_origin(message: str, origins: dict[str, str]) -> str:
+    """Return an error's text with zone or keep-out replaced by the feature that it comes from."""
+    place = re.match(r"(?:zones|keep_out)\[\d+\]", message)
     if place is None or place[0] not in origins:
-        return said
-    return f"{origins[place[0]]}: {said[place.end() :].lstrip('.: ')}"
+        return message
+    return f"{origins[place[0]]}: {message[place.end() :].lstrip('.: ')}"
 
 
-def _line_of(said: str, text: str) -> int | None:
-    """Return the line of the member that an error's text begins with; None if it is not known."""
-    named = _NAMED.match(said)
+def _line_of(message: str, text: str) -> int | None:
+    """Return the line of the member at the start of an error's text; None if unknown."""
+    named = _NAMED.match(message)
     key = ".".join(filter(None, named.groups())) if named else ""
     try:
         node, _ = compose(text.replace("\t", " "))  # JSON may have tabs

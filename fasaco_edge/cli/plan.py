@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     """Plan, print the figures, and write the requested files."""
     request = read_request(args)
     robot, search = request.robot, request.search
-    search.colony()  # its faults are reported before kernels are compiled
+    search.colony()  # raises faults before kernels are compiled
     check_outputs(
         (args.path_out, args.xy_out, args.png, args.pheromone_png),
         [*map_sources(find_map(args.map)), *request.sources],
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     _check_together(args, request)
     stages = stages_of_plan(search.planner, has_curves=robot.turn_radius_m > 0.0)
     compile_kernels((*stages, ROOMS) if args.rooms else stages)
-    # Imported only now, as it imports the compiler.
+    # A late import, as it imports the compiler.
     from fasaco_edge.offline.maps import load_map
 
     map = load_map(args.map, resolution_m=args.resolution, unknown_free=args.unknown_free)
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     if request.line != CELLS and (caution := tool_caution(robot)):
         LOG.warning("%s", caution)
     asked, trails = Interrupt(), deque[ColonySnapshot](maxlen=1)
-    # A user's own planner has no request to end: Ctrl-C interrupts it.
+    # A user's own planner cannot be asked to stop: Ctrl-C interrupts it.
     with nullcontext() if request.own else first_signal_calls(signal.SIGINT, asked.asked.set):
         planned = _plan(args, request, map, asked, trails)
     _warn(request, planned)
@@ -121,7 +121,7 @@ def _plan(
 
 
 def _warn(request: PlanRequest, planned: Plan | PassPlans) -> None:
-    """Warn of floor that was asked for and is not swept, and of turns that do not fit."""
+    """Warn if the line sweeps less floor than requested, and of turns that fit on no arc."""
     floor, asked_share = planned.floor, request.search.swept
     if floor is None or floor.swept_share is None:
         return

@@ -1,4 +1,4 @@
-"""``fasaco-edge record``: the recorder of one robot, or of a whole fleet, as a command."""
+"""``fasaco-edge record``: the recorder of one robot or of a whole fleet."""
 
 from __future__ import annotations
 
@@ -67,10 +67,10 @@ def ros_config(text: str) -> RosConfig:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Record.
+    """Record until SIGTERM or SIGINT.
 
     Raises:
-        BadConfiguration: options contradict each other, or the configuration is wrong.
+        BadConfiguration: options contradict each other, or the configuration is invalid.
     """
     if args.fleet is not None and args.ros2 is not None:
         raise BadConfiguration(
@@ -106,7 +106,7 @@ def _record(args: argparse.Namespace) -> int:
 
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:
-    """Return the configuration that the options state, and how to join the bus."""
+    """Return the configuration and bus settings by the options."""
     from fasaco_edge.config.config import BusConfig, DaemonConfig, RecordingConfig
     from fasaco_edge.config.robot import RobotConfig
 
@@ -125,10 +125,10 @@ def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettin
 
 
 def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
-    """Return the daemon's configuration, and how a client on its computer joins its bus.
+    """Return the daemon's configuration, and the bus settings of its client on this computer.
 
     Raises:
-        BadConfiguration: the file, or the document on standard input, is wrong.
+        BadConfiguration: the file, or the document on standard input, is invalid.
     """
     from fasaco_edge.config.loading import decode_config, load_config
 

@@ -1,4 +1,4 @@
-"""``fasaco-edge replay``: a recorded mission once more, and whether it decides the same."""
+"""``fasaco-edge replay``: a replay of a recorded mission, with a comparison of its decisions."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Replay."""
+    """Replay the recording, and print decisions and comparison."""
     from fasaco_edge.recording.read.run import RecordedSamples, read_clock
 
     samples = RecordedSamples(args.recordings)
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     last_s = 0.0
 
     def robots_s(at_s: float, step: ReplayStep | None = None) -> float:
-        """Return the robot's seconds since the recording began, as in its review."""
+        """Return the robot's time since the recording began [s], as in its review."""
         at_ns = replay.began_ns + round(1e9 * at_s)
         if step is not None and step.as_recorded and step.decision.path is not None:
             at_ns = recorded.path_ns.get(step.decision.path.revision, at_ns)
@@ -238,7 +238,7 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
 
 
 class Versions(msgspec.Struct):
-    """The software that decided then, and the software that decides now."""
+    """The versions of software in the recorded run and in the replay."""
 
     recorded: str
     replayed: str
@@ -276,14 +276,14 @@ def _comparison(
 
 
 def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
-    """Return the result of a replay by cycles, for people."""
+    """Return the result of a replay by cycles as rows of text."""
     if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
     turns = f"{compared.turns_equal} of {compared.turns} turns"
-    said = "equal bit for bit" if compared.equal else "equal as far as can be compared"
+    verdict = "equal bit for bit" if compared.equal else "equal as far as can be compared"
     if compared.difference is not None:
-        said = "not equal"
-    rows = [("replay", f"{said}: {turns}")]
+        verdict = "not equal"
+    rows = [("replay", f"{verdict}: {turns}")]
     if compared.difference is not None:
         rows.append(("first difference", _words(compared.difference)))
     if compared.log_ends:

@@ -6,7 +6,6 @@ import argparse
 
 from fasaco_edge.cli.ask import add_question, ask
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, pair_of_floats
-from fasaco_edge.cli.console.help import HelpText
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.cli.console.streams import print_json
@@ -50,9 +49,7 @@ def _add_actions(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, text in ACTIONS.items():
         described = f"{text[0].upper()}{text[1:]}."
-        action = actions.add_parser(
-            name, help=text, description=described, formatter_class=HelpText
-        )
+        action = actions.add_parser(name, help=text, description=described)
         action.set_defaults(rooms_action=name)
         if name != "list":
             action.add_argument("room", type=_room, metavar="ROOM", help="its number or name")
@@ -115,7 +112,7 @@ def _room(text: str) -> int | str:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Give the command, if there is one, and show the rooms."""
+    """List the rooms, or send a command that changes them."""
     if args.rooms_action != "list":
         asked = _asked(args)
         read_command(asked)  # faults are reported without a daemon

@@ -48,7 +48,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve."""
+    """Run the daemon until SIGTERM or SIGINT."""
     from fasaco_edge.daemon.reload import read_config
     from fasaco_edge.daemon.service import run_daemon
 

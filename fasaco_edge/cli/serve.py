@@ -1,4 +1,4 @@
-"""``fasaco-edge serve``: a robot's mission, live or recorded, as a page in a browser or phone."""
+"""``fasaco-edge serve``: the web page of a robot's mission, live or recorded."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fasaco_edge.serve.server import Server
 
 PORT = 8465
-# Options of a robot on the bus.
+# Options that do not apply to a recording.
 NOT_RECORDED = ("allow_commands", "config", "robot", "base", "connect", "security")
 EPILOG = f"""\
 examples:
@@ -91,7 +91,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until a signal."""
+    """Serve until SIGTERM or SIGINT."""
     from fasaco_edge.host.processes import return_soon
     from fasaco_edge.serve.guard import guard_for
 
@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
 
 @contextmanager
 def _recording(args: argparse.Namespace) -> Iterator[Callable[[], Playback]]:
-    """Open a recording; yield what makes the source of a viewer's messages."""
+    """Open a recording; yield a function that returns the source of a viewer's messages."""
     for option in NOT_RECORDED:
         if getattr(args, option):
             raise BadConfiguration(
@@ -150,7 +150,7 @@ def _serve(server: Server, args: argparse.Namespace, address: Address, guard: Gu
     import logging
 
     secured = _tls(args)
-    # The library logs each connection.
+    # The library would log each connection.
     logging.getLogger("websockets").setLevel(logging.WARNING)
     try:
         say = partial(_say, address, guard, args.tokens, secured is not None)
@@ -184,7 +184,7 @@ def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> 
     if tokens is not None:
         print(f"page at {page}; the tokens are in {one_line(str(tokens))}")
         if sys.stdout.isatty():
-            # One of each role; a recording has viewers alone, and the first token is theirs.
+            # A link for each role, with its first token. A recording has only viewers.
             for role, token in dict(reversed(guard.tokens)).items():
                 print(f"  {role}: {page}#{token}")
     else:

@@ -1,4 +1,4 @@
-"""``fasaco-edge simulate``: a robot that maps a building and follows the path."""
+"""``fasaco-edge simulate``: a simulated robot that maps a building and follows the path."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Drive until a signal."""
+    """Simulate until SIGTERM or SIGINT."""
     from fasaco_edge.planners.grids import start_point
     from fasaco_edge.simulation.node import run_simulation
     from fasaco_edge.simulation.robot import SimulationConfig

@@ -59,10 +59,10 @@ def run(args: argparse.Namespace) -> int:
         }
         print_json(document)
     else:
-        if passed_over and args.check:  # or else it has been logged
+        if passed_over and args.check:  # otherwise it is already logged
             err().print(f"{passed_over}: not used", soft_wrap=True)
         after = "" if args.check else f" after {seconds:.1f} s"
-        # Kernels missing after a run that compiled them could not be kept, which has been logged.
+        # Kernels still missing after compilation could not be saved, which is already logged.
         ready = f"not ready: {missing};" if missing else f"ready{after}"
         to_do = ": `fasaco-edge warmup` compiles them" if missing and args.check else ""
         err().print(f"kernels {ready} in {folder}{to_do}", soft_wrap=True)
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def compile_kernels(stages: Collection[str] = STAGES) -> float:
-    """Compile what is missing of some stages with a progress bar; return the seconds it took."""
+    """Compile missing kernels of some stages with a progress bar; return the duration [s]."""
     started = time.monotonic()
     with progress() as bar:
         task = bar.add_task("looking at the kernels", total=len(stages))

@@ -1,4 +1,4 @@
-"""``fasaco-edge watch``: a robot's mission, or that of a fleet, in a terminal, as it goes."""
+"""``fasaco-edge watch``: a live view of the mission of a robot or fleet in a terminal."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Watch until a signal."""
+    """Watch until the user quits, or SIGTERM or SIGINT."""
     keys, bus, _ = robot_on_bus(args)
     try:
         if args.fleet is None:
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
                 _watch(args, watched, no_answer)
         sys.stdout.flush()
     except OSError:
-        # The terminal is gone, or the reader of a pipe has seen enough.
+        # The terminal is gone, or the reader of a pipe has closed it.
         return Exit.ERROR
     return Exit.OK
 
@@ -97,7 +97,7 @@ def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None
 def _watch(
     args: argparse.Namespace, watched: Watched, no_answer: Callable[[], FasacoError]
 ) -> None:
-    """Watch in the form that the options ask for; ``no_answer``: the error if no robot answers."""
+    """Watch in the requested form; ``no_answer``: returns the error if no robot answers."""
     if args.once:
         _once(args, watched, no_answer)
     elif args.json:
@@ -115,10 +115,9 @@ def _once(args: argparse.Namespace, watched: Watched, no_answer: Callable[[], Fa
         live.print_json(watched.document())
         return
     console = out()
-    # Leaves one line of the screen for the prompt.
+    # One line of the screen is left for the prompt.
     for line in watched.page(steady_now(), console.width, console.height - 1):
-        # Written as it is, to keep the colours; texts in it are already clean of control
-        # characters.
+        # Not printed by the console, to keep the colours; its texts are already sanitized.
         console.file.write(f"{line.rstrip()}\n")
 
 

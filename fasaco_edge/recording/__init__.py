@@ -1,1 +1,1 @@
-"""The recorder, a separate process: bus in, .rrd out; reading back. The only package with Rerun."""
+"""Recordings (.rrd): the recorder process, and their readers. The only package that uses Rerun."""

@@ -6,7 +6,7 @@ import os
 
 from fasaco_edge.recording.arrow import missing_rerun
 
-# Rerun's allocator (mimalloc) kept 130 MB of freed memory in an hour; read once, at its import.
+# Rerun's allocator, mimalloc, keeps 130 MB of freed memory an hour unless this is set at import.
 os.environ.setdefault("MIMALLOC_PURGE_DELAY", "0")
 
 try:

@@ -1,4 +1,4 @@
-"""The figures of a run by name, and the comparison of set-ups and figures of two runs."""
+"""The comparison of two runs: their set-ups and figures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.drive import MILESTONES
 from fasaco_edge.review.wording import NOT_KNOWN, count
 
-# Keys of the configuration by the name of a setting.
+# Names of the compared settings, and their keys in the configuration.
 SETTINGS = {
     "tool width": "robot.tool_width_m",
     "robot radius": "robot.radius_m",
@@ -29,9 +29,9 @@ SETTINGS = {
     "acceleration": "robot.acceleration_m_s2",
     "simulated seconds per second": "robot.time_scale",
 }
-# If these differ, floor, cells and times belong to different problems.
+# Settings whose difference makes floor, cells and times incomparable.
 ANOTHER_PROBLEM = ("tool width", "robot radius", "overlap", "line", "building", "orders")
-# Sides of one building differ by less than this between the maps of two missions [m].
+# Most difference between the sides of two maps of the same building [m].
 SIDE_M = 1.0
 
 Difference = tuple[str, str, str]
@@ -66,7 +66,7 @@ NUMBERS = (
 
 
 def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
-    """Return the differences of two runs' set-ups; a setting that one lacks does not count."""
+    """Return the differences of two runs' set-ups, without settings that only one run has."""
     found = []
     for name, mine, theirs in (
         ("robot", one.robot, other.robot),
@@ -85,7 +85,7 @@ def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Differ
 
 
 def other_problem(setup: list[Difference]) -> str:
-    """Return the differences by which two runs solve different problems; "" for none."""
+    """Return the names of differences that make two runs incomparable; "" for none."""
     return ", ".join(name for name, _, _ in setup if name in ANOTHER_PROBLEM)
 
 
@@ -97,10 +97,7 @@ def setup_words(setup: list[Difference]) -> str:
 
 
 def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object]:
-    """Return two documents, the differences of their set-ups and of their numbers.
-
-    A difference is the first less the second, of each number that both have.
-    """
+    """Return two documents, and the differences of their set-ups and of their numbers."""
     setup = setup_differences(one, other)
     this, that = (msgspec.to_builtins(document) for document in (one, other))
     return {
@@ -113,7 +110,7 @@ def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object
 
 
 def differences(one: Mapping[str, object], other: Mapping[str, object]) -> dict[str, object]:
-    """Return the first less the second of each number that both documents have."""
+    """Return the first number minus the second one, for each number in both documents."""
     found: dict[str, object] = {}
     for name, value in one.items():
         mate = other.get(name)
@@ -132,7 +129,7 @@ def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
 
 
 def reason_counts(documents: Sequence[ReviewDocument]) -> list[tuple[str, list[int]]]:
-    """Return each kind of reason for a replan, and how many there were in each run."""
+    """Return each kind of reason for a replan, and the number of such replans in each run."""
     counts = [document.replans_by_reason for document in documents]
     kinds = dict.fromkeys(kind for count in counts for kind in count)
     return [(kind, [count.get(kind, 0) for count in counts]) for kind in kinds]
@@ -144,14 +141,14 @@ def _is_number(value: object) -> TypeGuard[float]:
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure: its name, its text, and its value where it is a number."""
+    """A figure: name, text, and its value if it is a number."""
 
     name: str
     text: str
     value: float | None = None
 
     def less(self, other: Figure) -> str:
-        """Return the difference to another one, as text; "" where one is no number."""
+        """Return this value minus the other one as text; "" if one is no number."""
         if self.value is None or other.value is None:
             return ""
         less = round(self.value - other.value, 1)
@@ -159,7 +156,7 @@ class Figure:
 
 
 def floor_words(document: ReviewDocument) -> str:
-    """Return swept and reachable floor in words; "" where they are not known."""
+    """Return swept and reachable floor as text; "" if unknown."""
     if document.swept_m2 is None or document.reachable_m2 is None:
         return ""
     return swept_words(document.swept_m2, document.reachable_m2)

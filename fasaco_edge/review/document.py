@@ -71,64 +71,65 @@ class ReviewDocument(msgspec.Struct):
     Attributes:
         recording: common part of the files' names.
         files: each part: path, bytes, torn_bytes (cut off by a crash), ended (properly closed).
-        robot, version, config: of the daemon, by its last status.
-        map: the last one: rows, cols, resolution_m.
-        began: when the recording began, UTC.
-        time_scale: seconds of the robot per second: 1, unless it was simulated faster or slower.
-            All times and durations in [s] are by the robot's clock, unless described otherwise;
-            those in [ms] are by the computer's.
-        duration_s: from its first entry to its last [s].
+        robot, version, config: name, version and configuration in the daemon's last status.
+        map: the last map: rows, cols, resolution_m.
+        began: beginning of the recording, UTC.
+        time_scale: simulated seconds per second; 1 for a real robot. Times and durations in [s] are
+            by the robot's clock, unless described otherwise; those in [ms] are by the computer's.
+        duration_s: duration of the recording [s].
         recorded_s: the same by the computer's clock [s].
         state: last state of the mission.
-        orders: each order: ordered (`command`, or `itself` for one that began without a command),
-            at_s, until_s, ended_by (`start` of another, `cancel`, `reset`; null for the end of the
-            recording), state, complete, covered_cells, coverable_cells, order (what it asked for;
-            null where that is not recorded), replans, paused_s, driven_m, and unreached: areas
-            that stayed uncovered at its end, with cells, m2, place (x, y) [m] and reason.
-        commands: each received command: at_s, command (in words).
-        rooms: each room, with the outline that it had at the end: room (its number), name, area_m2,
-            seconds (in it at work, standing too, but not in pauses and charging), entered (how
-            often the robot came into it), swept_share and left_m2 (of its reachable floor, by
-            recorded poses; null if that is not known), counted_share (swept, as the daemon counted
-            last, in that pass), passes (the newest pass of the last order that named it; null if
-            none did), skip (whether orders for everything leave it out).
-        complete: of the last order: whether the mission reached `done` with every reachable cell
+        orders: each order: ordered (`command`, or `itself` for an order without a command), at_s,
+            until_s, ended_by (`start` of another order, `cancel`, `reset`; null for the end of the
+            recording), state, complete, covered_cells, coverable_cells, order (its content; null if
+            not recorded), replans, paused_s, driven_m, and unreached: areas not covered at its end,
+            with cells, m2, place (x, y) [m] and reason.
+        commands: each received command: at_s, command (as text).
+        rooms: each room, with its outline at the end: room (its number), name, area_m2, seconds
+            (of work in it, standstill included, pauses and charging excluded), entered (how often
+            the robot entered it), swept_share and left_m2 (of its reachable floor, by recorded
+            poses; null if unknown), counted_share (swept share of the current pass, by the daemon's
+            last count), passes (current pass in the last order that names the room; null for none),
+            skip (whether orders for everything leave it out).
+        complete: whether the mission reached `done` in the last order, with every reachable cell
             (of its zones) covered.
-        covered_cells, coverable_cells: at the end, by the daemon's last recorded count: covered
-            cells, and all reachable cells, of the order's zones where it had some, and also of
-            other robots of its fleet.
-        recovered_cells: cells covered more than once.
-        unreachable_cells: cells where the robot would fit, but that it cannot get to.
-        reachable_m2, swept_m2: floor at the end, by pixels of the last map: all that the tool's
-            disc touches wherever the robot's disc can be; the part that the tool passed over along
-            the recorded poses [m2]. If each order was for zones, floor in these alone.
-        swept_by_others_m2: reachable floor that other robots of its fleet swept, by their cells,
-            and that is not part of these figures [m2]; null for a robot alone.
-        patches_over_4_dm2, largest_patch_m2: connected patches of this floor that were not swept
-            [m2].
-        swept_before_m2: floor swept before the recording began, approximately, as counted by the
-            daemon; its poses are missing, so it counts as not swept unless the robot swept it again
-            [m2].
-        left: the largest patches that were not swept: m2, and a place in the middle (x, y) [m].
+        covered_cells, coverable_cells: numbers of covered and of reachable cells at the end, by the
+            daemon's last recorded count; if the order has zones, in these; other robots of the
+            fleet included.
+        recovered_cells: number of cells covered more than once.
+        unreachable_cells: number of cells where the robot would fit, but that it cannot reach.
+        reachable_m2, swept_m2: floor at the end, in pixels of the last map [m2]. Reachable is what
+            the tool's disc touches at any position that the robot can reach; swept is the part that
+            the tool passed over, along the recorded poses. If all orders have zones, only floor in
+            zones counts.
+        swept_by_others_m2: reachable floor that other robots of the fleet swept, by their cells
+            [m2]. It is not part of these figures; null for a robot alone.
+        patches_over_4_dm2, largest_patch_m2: number of connected unswept patches of this floor
+            above 4 dm2; area of the largest one [m2].
+        swept_before_m2: floor swept before the recording began, approximately, by the daemon's
+            count [m2]. It counts as unswept, as its poses are missing, unless it was swept again.
+        left: the largest unswept patches: m2, and a place in the middle (x, y) [m].
         ledger_swept_m2: floor that the daemon counted as swept at the end, reachable or not [m2].
-        left_by_reason: reachable floor not swept at the end, by the daemon's reasons [m2].
+        left_by_reason: unswept reachable floor at the end, by the daemon's reasons [m2].
         out_of_reach_by_reason: free floor that the tool cannot reach, by reason [m2]; null if the
             robot drives through the centres of cells.
-        reached_s: when 50, 90, 99 and 100 % of the cells coverable at the end were covered [s].
-        driven_m: length of the trail, without jumps [m].
-        paths: paths that were published.
-        replans: paths from a plan, without the first after each start of the daemon.
-        replans_by_reason: number by kind of reason.
-        first_plan_ms: how long the first plan took [ms].
-        replan_ms_p50, replan_ms_p99, replan_ms_max: how long replans took [ms], nearest rank.
-        replan_ms_by_reason: median (p50) and slowest (max) by kind of reason [ms].
-        replan_list: each replan: at_s, revision, reason, plan_ms, steps (to drive); of the plan
-            itself, from where the robot was then: planned_steps, lower_bound_steps, cost_s (driving
-            it, by the configuration), lower_bound_cost_s and gap (cost_s over that bound, as a
-            share of it); changed, the changed rectangle of the map that caused it [m].
-        plans, plans_unused: by the daemon's count: all plans; plans that were not used, as they
-            equalled the current one or were outdated.
-        attempts, attempts_used: plans made to improve the path; those that did.
+        reached_s: times at which 50, 90, 99 and 100 % of the cells coverable at the end were
+            covered [s].
+        driven_m: length of the track, without jumps [m].
+        paths: number of published paths.
+        replans: number of paths from a plan, without the first one after each start of the daemon.
+        replans_by_reason: number of replans by kind of reason.
+        first_plan_ms: duration of the first plan [ms].
+        replan_ms_p50, replan_ms_p99, replan_ms_max: percentiles of the duration of replans, by
+            nearest rank [ms].
+        replan_ms_by_reason: median (p50) and longest (max) duration by kind of reason [ms].
+        replan_list: each replan: at_s, revision, reason, plan_ms, steps (to drive); of its plan,
+            from the robot's position at that time: planned_steps, lower_bound_steps, cost_s (time
+            of driving it, by the configuration), lower_bound_cost_s and gap (cost_s /
+            lower_bound_cost_s - 1); changed, the changed rectangle of the map that caused it [m].
+        plans, plans_unused: the daemon's counts of all plans, and of plans that were not used, as
+            they equalled the current one or were outdated.
+        attempts, attempts_used: number of plans made to improve the path, and of those that did.
         memory_mb_max, recorder_memory_mb_max: peak memory of daemon and recorder [MB].
         processor_s, recorder_processor_s: total processor time of daemon and recorder, by the
             computer's clock [s].
@@ -136,19 +137,19 @@ class ReviewDocument(msgspec.Struct):
             core], threads.
         restored_cells: cells that were covered before a restart.
         states: seconds in each state.
-        troubles: each time the mission was degraded, blocked or silent, something was wrong in
-            another state (its reason says what), or the recorder could not write (`recorder: disk
-            full`, `recorder: stalled`): state, reason, at_s, seconds.
-        charges: each time the robot charged: at_s, seconds, level_from, level_to (0 to 1; null
-            where not known).
-        longest_stand: the longest time at work that the robot neither drove nor turned: at_s,
-            seconds, place (x, y) [m], and the states of the mission meanwhile; null without any.
-        faults: messages refused by the daemon.
+        troubles: each period in which the mission was degraded, blocked or silent, had a trouble in
+            another state (see its reason), or the recorder could not write (`recorder: disk full`,
+            `recorder: stalled`): state, reason, at_s, seconds.
+        charges: each period of charging: at_s, seconds, level_from, level_to (0 to 1; null if
+            unknown).
+        longest_stand: the longest standstill during a mission: at_s, seconds, place (x, y) [m], and
+            the states of the mission meanwhile; null for none.
+        faults: number of messages refused by the daemon.
         faults_by_code: the same by code.
-        recorder_lost: samples that the recorder could not write, by its own count.
-        samples_missing: gaps in the samples' sequence numbers.
-        unreadable: samples in the recording that could not be decoded, by topic.
-        remarks: the recorder's log.
+        recorder_lost: number of samples that the recorder could not write, by its own count.
+        samples_missing: number of samples missing, by gaps in their sequence numbers.
+        unreadable: number of samples in the recording that could not be decoded, by topic.
+        remarks: warnings in the recorder's log.
         not_recorded: why a figure is null.
     """
 

@@ -1,8 +1,8 @@
 """The robot's drive: the cells that its tool passed over, and the floor it swept.
 
-Cells count as the mission's own ledger counts them: one is passed when the tool passes over its
-centre. The floor is judged on the pixels of the last map along the recorded poses, by tool and
-robot of the configuration. Pixels touched by a keep-out zone count as wall.
+Cells are counted as in the mission's ledger: a cell counts when the tool passes over its centre.
+Swept floor is counted in pixels of the last map, along the recorded poses, with tool and robot of
+the configuration. Pixels that touch a keep-out zone count as wall.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from fasaco_edge.review.run_data import RunData
 from fasaco_edge.wire.documents.settings import known_settings
 
 MILESTONES = (50, 90, 99, 100)
-"""Shares of the cells that can be covered at the end [percent]."""
+"""Shares of the cells that are coverable at the end [percent]."""
 
 
 def visits_of(data: RunData, lattice: CoverageLattice) -> NDArray[np.uint16]:
-    """Return how often the tool passed over each cell, shape of the lattice."""
+    """Return how often the tool passed over each cell, uint16 in the shape of the lattice."""
     ledger = CoverageLedger(lattice.cell_m)
     before = data.pose_s[0] if data.pose_s else 0.0
     for now, (x, y, _) in zip(data.pose_s, data.poses, strict=True):
-        # As in the mission: a jump of kilometres is no driving.
+        # Poses outside the lattice are invalid, as in the mission.
         if not lattice.contains(lattice.cell_at(x, y)):
             continue
         if 0 < data.lost_pose_s < now - before:
@@ -40,7 +40,7 @@ def visits_of(data: RunData, lattice: CoverageLattice) -> NDArray[np.uint16]:
 
 
 def nearest_points(line: NDArray[np.float64], place: tuple[float, float]) -> NDArray[np.float64]:
-    """Return the point of each piece of a line (n, 2) that is nearest to a place, (n - 1, 2)."""
+    """Return the point of each segment of a line (n, 2) nearest to a place, float64 (n - 1, 2)."""
     starts, ways = line[:-1], np.diff(line, axis=0)
     squares = np.maximum((ways**2).sum(axis=1), 1e-12)
     shares = np.clip(((np.array(place) - starts) * ways).sum(axis=1) / squares, 0.0, 1.0)
@@ -53,14 +53,14 @@ def swept_floor(
     lattice: CoverageLattice,
     keep_out: tuple[Polygon, ...] | None = None,
 ) -> JudgedFloor | None:
-    """Return the swept floor; None without a pose on the map.
+    """Return the swept floor; None without a map, a configuration, or a pose on the map.
 
-    Also None if floor was swept before the recording began, as the recording lacks it.
+    Also None if cells were covered before a restart, as the recording may lack those poses.
 
     Args:
-        data: of the samples, with a map and a configuration.
-        lattice: over that map; a pose beyond it is invalid.
-        keep_out: other keep-out zones than the last order's.
+        data: data of the samples.
+        lattice: lattice over the last map; poses outside it are invalid.
+        keep_out: keep-out zones; None for those of ``data``.
     """
     footprint = data.footprint
     if data.grid is None or footprint is None or data.restored_cells:
@@ -75,7 +75,7 @@ def swept_floor(
         return None
     tool_m = known_settings(data.config).robot.tool_width_m
     robot = SweepingRobot(tool_m, footprint.robot_radius_m, free_at_most=footprint.free_at_most)
-    # Reachability is from the robot's last position, as for the cells.
+    # Floor is reachable if it is so from the robot's last position; the same holds for cells.
     x, y = track[-1].tolist()
     grid = with_kept_out(data.grid, data.keep_out if keep_out is None else keep_out)
     return judge_floor(grid, track, robot, driven=kept.driven, stands_at=(x, y))

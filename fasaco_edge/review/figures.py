@@ -1,4 +1,4 @@
-"""The figures of a review, gathered into its JSON document."""
+"""The conversion of a review into its JSON document."""
 
 from __future__ import annotations
 
@@ -99,13 +99,13 @@ def document_of(review: Review) -> ReviewDocument:
 
 
 def _used(counts: Sequence[float]) -> float | None:
-    """Return the total of a count that restarts at 0 with each process; None without values."""
+    """Return the growth of a count that restarts at 0 with each process; None if unknown."""
     grown = (now - before if now >= before else now for before, now in pairwise(counts))
     return sum(grown) if len(counts) > 1 and counts[-1] else None
 
 
 def charges_of(review: Review) -> list[Charge]:
-    """Return each period of charging, with the levels in the statuses at its ends."""
+    """Return each period of charging, with the battery levels at its beginning and end."""
     levels = [
         (each.at_s, each.status.battery.level)
         for each in review.data.statuses
@@ -129,7 +129,7 @@ PLOTTED = {
     "recorder_memory_mb_max": f"{entities.MEMORY}/recorder",
     "processor_percent_max": entities.PROCESSOR,
 }
-"""Members that are the most of a curve, and the curve."""
+"""Members that are the maximum of a curve, and the curve."""
 
 
 def _add_coverage(document: ReviewDocument, review: Review) -> None:

@@ -1,7 +1,7 @@
 """One moment of a recorded mission: robot, paths before and after, map, command, trail.
 
-It shows why the robot acted as it did at that moment. Maps are decoded again up to that time, and
-paths are read as drawn: where paths follow each other quickly, some were not recorded as drawings.
+It shows why the robot acted as it did then. Maps are decoded again up to that time. Paths are
+read from their drawings; of paths in quick succession, some have none.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PathSample
 
-# Map changes are reported for this long before [s].
+# Period before the moment in which changes of the map are reported [s].
 MAP_S = 5.0
 
 
 class PathThen(msgspec.Struct):
-    """A path: its time, its reason, and its heading at the robot's position [deg]."""
+    """A path: its time and reason, and its heading at the robot's position [deg]."""
 
     at_s: float
     revision: int
@@ -44,11 +44,11 @@ class PathThen(msgspec.Struct):
 
 
 class PlanThen(msgspec.Struct):
-    """The plan of a path: its time and reason, and what saved time against its first walk [s].
+    """The plan of a path: its time and reason, and the driving time that its search saved [s].
 
     Attributes:
-        revision: the path with which it was published.
-        saved_by_velocity_s: savings of each cohort of ants, by its velocity.
+        revision: the path that published it.
+        saved_by_velocity_s: time saved by each cohort of ants, by velocity [s].
     """
 
     at_s: float
@@ -61,7 +61,7 @@ class PlanThen(msgspec.Struct):
 
 
 class MapThen(msgspec.Struct):
-    """Changes of the map between two times [m2], and the rectangle around them."""
+    """Changes of the map since a time [m2], and their bounding rectangle."""
 
     since_s: float
     seen_m2: float
@@ -93,7 +93,7 @@ class Instant(msgspec.Struct):
 
 
 class Scene(msgspec.Struct, frozen=True):
-    """An instant with the data of its picture: the map then, and lines of the paths."""
+    """An instant with the data of its picture: map, and lines of the paths."""
 
     instant: Instant
     grid: OccupancyGrid | None
@@ -115,7 +115,7 @@ def scene_at(review: Review, at_s: float) -> Scene:
     span = next((s for s in reversed(review.states) if s.begin_s <= at_s), None)
     chapter = next((c for c in reversed(review.orders) if c.at_s <= at_s), None)
     turn = turn_at(review, drawn.lines, at_s)
-    # The reason of a turn is the path that arrived as it began.
+    # A turn is caused by the path at its beginning.
     place = (turn.x, turn.y) if turn else pose[:2] if pose else None
     index = sum(path.at_s <= at_s for path in data.paths) - 1
     before, path, after = (
@@ -194,7 +194,7 @@ def _path(
 
 
 def _plan(paths: Sequence[PathSample]) -> PlanThen | None:
-    """Return the last plan of paths; the line was changed along it since."""
+    """Return the plan of the last path that has one."""
     for sample in reversed(paths):
         about = sample.about
         if about.planner is not None:
@@ -220,7 +220,7 @@ def _speed(times: NDArray[np.float64], track: NDArray[np.float64], at_s: float) 
 
 
 def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapThen | None]:
-    """Return the map in force at a time [s], and how it changed in the ``MAP_S`` before."""
+    """Return the map in force at a time [s], and its changes in the ``MAP_S`` before."""
     since_s = max(at_s - MAP_S, 0.0)
     old: OccupancyGrid | None = None
     new: OccupancyGrid | None = None
@@ -237,7 +237,7 @@ def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapTh
 def _map_change(old: OccupancyGrid, new: OccupancyGrid, since_s: float) -> MapThen:
     rows, cols = np.indices(new.cells.shape).reshape(2, -1) + 0.5
     places = np.column_stack(new.geometry.to_map(cols, rows))
-    # Beyond the older map all was as unknown, -1.
+    # Pixels outside the older map were unknown, -1.
     before = (old.geometry.values_at(old.cells + 1, places) - 1).reshape(new.cells.shape)
     known, free, was_free = new.cells >= FREE, new.cells < 50, before < 50
     seen = known & (before < FREE)

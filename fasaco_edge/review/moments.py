@@ -1,4 +1,4 @@
-"""States of a recording and their durations, the longest stand, replans, faults."""
+"""States of a recording and their durations, longest standstill, replans, faults."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
 
-# Less than this is no motion.
+# Smaller changes of the pose do not count as motion.
 STILL_M = 0.05
 STILL_RAD = 0.1
-# States in which the robot has nothing to do, or not yet.
+# States without work for the robot.
 AT_REST = (
     *("idle", "waiting for map", "waiting for pose"),
     *("loading", "charging", "done", "silent"),
 )
 TROUBLES = ("degraded", "blocked", "silent")
 RECORDER_IN_ORDER = ("recording", "stopping")
-# "path blocked at cell (2, 3)" has the kind "path blocked".
+# Begin of the details in a reason: "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
 # Texts of ``mission.map.reachable_area.AreaChange``.
 _MAP = "map: "
@@ -54,7 +54,7 @@ class Span:
 
 
 class Stand(msgspec.Struct, frozen=True):
-    """A time [s] that the robot stood at a place (x, y) [m], and what the mission did meanwhile."""
+    """A standstill of the robot: time [s], place (x, y) [m], states of the mission meanwhile."""
 
     at_s: float
     seconds: float
@@ -64,10 +64,10 @@ class Stand(msgspec.Struct, frozen=True):
 
 
 def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[Span, ...]:
-    """Return the periods of states entered at given times, for given reasons."""
+    """Return the periods of states; ``entered``: time [s], state and reason of each entry."""
     spans: list[Span] = []
     for at_s, state, reason in entered:
-        # Parts begin with the state in force.
+        # Each part repeats the state in force at its beginning.
         if spans and spans[-1].name == state:
             continue
         if spans:
@@ -77,9 +77,9 @@ def spans_of(entered: Sequence[tuple[float, str, str]], end_s: float) -> tuple[S
 
 
 def troubles_at_rest(statuses: Sequence[StatusSample], end_s: float) -> list[Span]:
-    """Return the periods of troubles in other states than those of ``TROUBLES``.
+    """Return the periods of troubles outside the states of ``TROUBLES``.
 
-    Each has the name of the state in which it began, and the trouble as its reason.
+    The name of a period is the state in which it began, its reason is the trouble's text.
     """
     found: list[Span] = []
     lasting: dict[str, Span] = {}
@@ -95,13 +95,13 @@ def troubles_at_rest(statuses: Sequence[StatusSample], end_s: float) -> list[Spa
 
 
 def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
-    """Return the times from a mission's first plan to its end; pauses and troubles count."""
+    """Return the periods of each mission, from its first plan to its end, pauses included."""
     runs = [list(run) for rests, run in groupby(states, lambda s: s.name in AT_REST) if not rests]
     return tuple(Span("under way", run[0].begin_s, run[-1].end_s) for run in runs)
 
 
 def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
-    """Return the longest time at work that the robot neither drove nor turned."""
+    """Return the longest standstill during a mission; None without any."""
     found = [stand for during in under_way(states) if (stand := _stand(data, during))]
     longest = max(found, key=lambda stand: stand[1], default=None)
     if longest is None:
@@ -112,7 +112,7 @@ def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
 
 
 def _stand(data: RunData, during: Span) -> tuple[float, float, float, float] | None:
-    """Return begin and length of the longest stand [s], and its place [m]; None without a pose."""
+    """Return begin, length [s], x, y [m] of the longest standstill; None without a pose."""
     chosen = (data.times >= during.begin_s) & (data.times <= during.end_s)
     times, poses = data.times[chosen].tolist(), data.track[chosen].tolist()
     if not times:
@@ -130,11 +130,11 @@ def _stand(data: RunData, during: Span) -> tuple[float, float, float, float] | N
 
 @dataclass(frozen=True, slots=True)
 class Replans:
-    """The paths that were planned, the first apart from those that came later.
+    """The planned paths: the first plan, and the replans.
 
     Attributes:
         first: the first planned path.
-        later: all others, in order, without the first ones of a daemon that was started again.
+        later: the replans in order, without the first plan after each restart of the daemon.
     """
 
     first: PathSample | None
@@ -142,7 +142,7 @@ class Replans:
 
     @classmethod
     def of(cls, paths: Sequence[PathSample]) -> Replans:
-        """Return the replans in ``paths``; paths without a plan are none."""
+        """Return the plans among ``paths``."""
         planned = [path for path in paths if path.about.planner]
         later = [
             after
@@ -153,12 +153,12 @@ class Replans:
 
     @property
     def by_reason(self) -> dict[str, int]:
-        """How many there were of each kind of reason, the most frequent first."""
+        """Number of replans for each kind of reason, the most frequent first."""
         return dict(Counter(kind_of(path.about.reason) for path in self.later).most_common())
 
     @property
     def spread_by_reason(self) -> dict[str, tuple[float | None, float | None]]:
-        """The median and the slowest [ms] of each kind of reason, the most frequent first."""
+        """Median and longest duration [ms] for each kind of reason, the most frequent first."""
         took: dict[str, list[float]] = {kind: [] for kind in self.by_reason}
         for path in self.later:
             if path.plan_ms is not None:
@@ -167,17 +167,17 @@ class Replans:
 
     @property
     def slowest_first(self) -> list[PathSample]:
-        """Those whose duration is known, the slowest first."""
+        """Replans with a known duration, the slowest first."""
         timed = [path for path in self.later if path.plan_ms is not None]
         return sorted(timed, key=lambda path: -(path.plan_ms or 0.0))
 
     def milliseconds(self, percent: float) -> float | None:
-        """Return a percentile of their durations [ms], by nearest rank."""
+        """Return a percentile of the durations [ms], by nearest rank."""
         return percentile([p.plan_ms for p in self.later if p.plan_ms is not None], percent)
 
 
 def kind_of(reason: str) -> str:
-    """Return ``reason`` without its details; of a map's change, whether cells came or went."""
+    """Return ``reason`` without details; for a change of the map, with the kind of change."""
     if reason.startswith(_MAP):
         changes = [change for change in _CHANGES if change in reason]
         cells = "" if "passages changed" in changes else "cells "
@@ -191,8 +191,8 @@ class Faults:
 
     Attributes:
         by_code: messages refused by the daemon.
-        lost: samples that the recorder could not write; None where that is not recorded.
-        complaints: warnings in the recorder's log.
+        lost: number of samples that the recorder lost; None if unknown.
+        complaints: faults in the recorder's log, one a line.
     """
 
     by_code: dict[str, int]
@@ -201,7 +201,7 @@ class Faults:
 
     @property
     def total(self) -> int:
-        """Number of all messages refused by the daemon."""
+        """Number of messages refused by the daemon."""
         return sum(self.by_code.values())
 
 
@@ -222,7 +222,7 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
 
 
 def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> dict[str, int]:
-    """Return the counts of curves by code; a restart of the daemon resets them."""
+    """Return the total of each error's curve, by code; a restart of the daemon resets curves."""
     counts: dict[str, int] = {}
     for entity, points in plots.items():
         if entity.startswith(f"{entities.ERRORS}/"):

@@ -1,4 +1,4 @@
-"""The orders of a recording, one section each: when it was in force, and its result."""
+"""The orders of a recording: for each the period in which it was in force, and its result."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
 from fasaco_edge.wire.documents.status import Status
 
 ENDS = ("cancel", "reset")
-# States in which an order is over, or there is none: the same order would start again.
+# States without an order in force: the same order would begin anew.
 OVER = ("done", "idle")
 
 
 @dataclass(frozen=True, slots=True)
 class OrderChapter:
-    """An order, from its command to the next one; ``ReviewDocument`` describes its members."""
+    """An order, from its command to the next one; see ``ReviewDocument.orders``."""
 
     ordered: str
     at_s: float
@@ -46,7 +46,7 @@ class OrderChapter:
 
 
 class CommandThen(msgspec.Struct):
-    """A command: its time [s] and its text."""
+    """A command: time [s] and text."""
 
     at_s: float
     command: str
@@ -61,14 +61,14 @@ def commands_of(data: RunData) -> list[CommandThen]:
 
 
 def command_words(name: str, order: MissionOrder) -> str:
-    """Return a command in words, with its order."""
+    """Return a command and its order as text."""
     if name != "start":
         return name
     return f"start: {order_words(msgspec.convert(order_document(order), OrderDocument))}"
 
 
 def order_words(order: OrderDocument) -> str:
-    """Return an order in words."""
+    """Return an order as text."""
     asked = [f"zone {zone.name}" + passes_words(zone.passes or 1) for zone in order.zones] or [
         "everything" + passes_words(order.passes or 1)
     ]
@@ -83,24 +83,24 @@ def order_words(order: OrderDocument) -> str:
 
 
 def chapters(data: RunData, states: Sequence[Span], end_s: float) -> tuple[OrderChapter, ...]:
-    """Return the chapters of a recording, in order; one at least.
+    """Return the orders of a recording, one or more, in order of time.
 
     Args:
-        data: of its samples.
-        states: of the mission, in order.
-        end_s: of the recording [s].
+        data: data of its samples.
+        states: states of the mission, in order.
+        end_s: end of the recording [s].
     """
     held = list(_held(data, states, end_s))
     return tuple(
         _chapter(data, states, *one)
         for one in held
-        # Before the first command there may have been nothing.
+        # The period before the first command counts only if the mission was at work.
         if len(held) == 1 or one[4] is not None or _has_begun(states, one[1], one[2])
     )
 
 
 def cells_of(status: Status) -> tuple[int, int] | None:
-    """Return the covered and all reachable cells of the order; None if they are not counted."""
+    """Return the numbers of covered and of reachable cells of the order; None if unknown."""
     if zones := status.mission.zones:
         return sum(zone.covered for zone in zones), sum(zone.cells for zone in zones)
     count = status.coverage
@@ -108,14 +108,14 @@ def cells_of(status: Status) -> tuple[int, int] | None:
 
 
 def ordered_words(orders: Sequence[OrderChapter]) -> str:
-    """Return of which zones the figures of floor are, as " of A and B"; "" for all floor."""
+    """Return the zones that the figures of floor refer to, as " of A and B"; "" for all floor."""
     asked = [order.order.zones if order.order else [] for order in orders]
     names = dict.fromkeys(one_line(zone.name) for zones in asked for zone in zones)
     return f" of {' and '.join(names)}" if names and all(asked) else ""
 
 
 def ordered_zones(data: RunData, orders: Sequence[OrderChapter]) -> tuple[Polygon, ...]:
-    """Return the zones that were ordered [m]; () if one order was for everything."""
+    """Return the polygons of all ordered zones [m]; () if one order was for everything."""
     found: tuple[Polygon, ...] = ()
     for order in orders:
         zones = _zones(data, order.at_s, order.until_s)
@@ -126,7 +126,7 @@ def ordered_zones(data: RunData, orders: Sequence[OrderChapter]) -> tuple[Polygo
 
 
 def _zones(data: RunData, begin_s: float, end_s: float) -> tuple[ZoneReport, ...]:
-    """Return the zones of the order between two times [s], by its statuses."""
+    """Return the zones in the last status between two times [s] that has some."""
     reported = (
         each.status.mission.zones
         for each in reversed(data.statuses)
@@ -136,7 +136,7 @@ def _zones(data: RunData, begin_s: float, end_s: float) -> tuple[ZoneReport, ...
 
 
 def _by_zones(zones: Sequence[ZoneReport]) -> OrderDocument | None:
-    """Return an order whose command was not recorded, by its zones; None without any."""
+    """Return an order that was not recorded, from its zones; None without zones."""
     asked = [ZoneDocument(zone.name, list(zone.polygon) or None, zone.passes) for zone in zones]
     return OrderDocument(asked) if asked else None
 
@@ -144,8 +144,8 @@ def _by_zones(zones: Sequence[ZoneReport]) -> OrderDocument | None:
 def _held(
     data: RunData, states: Sequence[Span], end_s: float
 ) -> Iterator[tuple[str, float, float, str | None, MissionOrder | None]]:
-    """Yield each order with its source, its period in force [s] and its end."""
-    # An order that is older than the recording: the daemon was restarted, or the recorder.
+    """Yield for each order its source, beginning and end [s], the command that ended it, itself."""
+    # Daemon or recorder may have been restarted during an order.
     first_s = next((at_s for at_s, name, _ in data.commands if name == "start"), end_s)
     reported = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)
     ordered, began, order = next(filter(None, reported), "itself"), 0.0, None
@@ -166,7 +166,7 @@ def _goes_on(order: MissionOrder | None, given: MissionOrder, state: str) -> boo
 
 
 def _state_at(states: Sequence[Span], at_s: float) -> str:
-    """Return the last state before a time [s]; "" without any."""
+    """Return the last state before a time [s]; "" for none."""
     names = [span.name for span in states if span.begin_s < at_s and span.name != "silent"]
     return names[-1] if names else ""
 

@@ -1,4 +1,4 @@
-"""A review: all figures of one recorded mission, from the files of its recording."""
+"""A review: all figures of a recorded mission."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ Item = TypeVar("Item")
 
 
 Others = Callable[[Iterable[Arrival], FleetSettings, GridGeometry], Mask | None]
-"""Returns the pixels that other robots of a fleet swept, by the turn log of one."""
+"""Returns the pixels that the other robots of a fleet swept, from one robot's turn log."""
 
 
 def read_review(
@@ -66,7 +66,7 @@ def read_review(
 
     Args:
         paths: the files, in any order; they are not changed.
-        progress: called now and then.
+        progress: reports the progress.
         others: called for a robot of a fleet.
 
     Raises:
@@ -76,7 +76,7 @@ def read_review(
     total, numbers = count_frames(paths), count(1)
     record = read_run_record(paths, lambda: progress("reading", next(numbers), total))
     samples = RecordedSamples((), record.batches)
-    # Samples are numbered: the last batch shows their approximate number.
+    # The number of the last batch's first sample approximates the number of samples.
     about = max(batch.place.first for batch in record.batches) + 1
     data = gather(_reported(samples, progress, "decoding", about), record.clock)
     progress("following the robot", 0, 1)
@@ -99,23 +99,23 @@ class Review:
     """All figures of a recording; times are the robot's [s] since it began.
 
     Attributes:
-        record: its files, plots, states and log.
-        data: of its samples.
-        lattice: over the last map; None without a map or a configuration, or if the map is too
-            large or too far away.
-        no_lattice: why there is none; "" if there is one.
-        visits: uint16, its shape: how often the tool passed over each cell.
-        floor: the swept part of the reachable floor that was ordered; None without a lattice, or
-            if some was swept before.
-        all_floor: the same of all floor, ordered or not.
-        by_others: reachable floor that other robots of its fleet swept, and so not part of both;
-            None for a robot alone, or if it is not known.
-        replans: plans after the first.
-        states: of the mission, in order.
-        recorder_states: of the recorder.
-        longest_stand: the longest time at work that the robot stood; None without any.
+        record: files, plots, states and log of the recording.
+        data: data of its samples.
+        lattice: lattice over the last map; None without a map or a configuration, or if the map is
+            too large or too far away.
+        no_lattice: why ``lattice`` is None; "" if it is not.
+        visits: number of passes of the tool over each cell, uint16 in the shape of the lattice.
+        floor: swept and unswept pixels of the reachable floor that was ordered; None without a
+            lattice, or if cells were covered before a restart.
+        all_floor: the same for all reachable floor, ordered or not.
+        by_others: reachable floor that other robots of the fleet swept, bool (rows, cols); it is
+            part of neither ``floor`` nor ``all_floor``. None for a robot alone, or if unknown.
+        replans: plans after the first one.
+        states: states of the mission, in order.
+        recorder_states: states of the recorder, in order.
+        longest_stand: longest standstill during a mission; None without any.
         faults: refused messages and losses.
-        missing: samples that were lost before they were written.
+        missing: number of samples lost before they were written.
     """
 
     record: RunRecord
@@ -135,21 +135,22 @@ class Review:
 
     @property
     def duration_s(self) -> float:
-        """From the first entry of the recording to its last [s]."""
+        """Duration of the recording [s]."""
         return _end_s(self.record, self.data)
 
     @property
     def state(self) -> str:
-        """The last state of the mission; "" without any."""
+        """The last state of the mission; "" if unknown."""
         names = [span.name for span in self.states if span.name != "silent"]
         return names[-1] if names else ""
 
     @property
     def covered_share(self) -> NDArray[np.float64]:
-        """Times [s] and covered shares of the cells that could be covered at the end, (n, 2).
+        """Times [s] and covered shares of the cells coverable at the end, float64 (n, 2).
 
-        They are drawn every two seconds, of all cells known then; statuses, recorded four times a
-        minute and at the end, say how many these were, and how many were ordered.
+        The recorded curve has a point every two seconds: a share of all cells coverable at that
+        time. The statuses, four a minute and one at the end, count all cells, and those of the
+        order.
         """
         known = [
             (each.at_s, *cells, count.covered, count.coverable, status.state in OVER)
@@ -160,10 +161,10 @@ class Review:
             return np.zeros((0, 2))
         at_s, covered, coverable, of_all, all_cells, is_over = np.array(known, np.float64).T
         drawn = self.record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
-        # It is drawn a little late: once an order is over, it says nothing new.
+        # The curve lags behind a little: its points after the end of an order are left out.
         before = np.searchsorted(at_s, drawn[:, 0], side="right") - 1
         drawn = drawn[(before < 0) | (is_over[before] == 0)]
-        # Zones get as much of what they gain until the next status as is drawn of all cells.
+        # Between two statuses, the cells of zones are interpolated in proportion to all cells.
         now = np.searchsorted(at_s, drawn[:, 0], side="right").clip(1, len(at_s)) - 1
         then = np.minimum(now + 1, len(at_s) - 1)
         since = drawn[:, 1] * np.interp(drawn[:, 0], at_s, all_cells) - of_all[now]
@@ -177,13 +178,13 @@ class Review:
 
     @property
     def cells(self) -> tuple[int, int] | None:
-        """The daemon's last count of covered and all reachable cells of the order; None without."""
+        """The daemon's last counts of covered and of reachable cells of the order, if known."""
         counted = (cells_of(each.status) for each in reversed(self.data.statuses))
         return next((cells for cells in counted if cells is not None), None)
 
     @property
     def complete(self) -> bool | None:
-        """Whether the last order reached ``done`` with nothing missing; None if not recorded."""
+        """Whether the last order was completed; None if unknown."""
         return self.orders[-1].complete
 
     @property
@@ -209,7 +210,10 @@ class Review:
 
     @property
     def reached_s(self) -> dict[int, float | None] | None:
-        """When each of ``MILESTONES`` was reached for good [s]; None if not recorded."""
+        """Time from which the covered share stayed above each of ``MILESTONES`` [s].
+
+        None for a milestone that was not reached. The property is None if no share is known.
+        """
         at_s, shares = self.covered_share.T
         if not len(at_s):
             return None
@@ -219,12 +223,12 @@ class Review:
 
     @property
     def orders(self) -> tuple[OrderChapter, ...]:
-        """The orders, and the outcome of each."""
+        """The orders, with their results."""
         return chapters(self.data, self.states, self.duration_s)
 
     @property
     def rooms(self) -> tuple[RoomChapter, ...]:
-        """The rooms, and what was done in each; none if no rooms were recorded."""
+        """The rooms, with what was done in each; () if no rooms were recorded."""
         return room_chapters(self.data, self.states, self.all_floor)
 
 
@@ -234,9 +238,9 @@ def review_of(
     """Return the review of a recording.
 
     Args:
-        record: its content.
-        data: of its samples.
-        missing: number of samples lost in between.
+        record: content of its parts.
+        data: data of its samples.
+        missing: number of samples lost before they were written.
         others: called for a robot of a fleet.
     """
     end_s = _end_s(record, data)
@@ -292,12 +296,12 @@ def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
 
 
 def _end_s(record: RunRecord, data: RunData) -> float:
-    """Return when the recording ended [s]; samples are written before their drawings."""
+    """Return the end of the recording [s], by its drawings and samples."""
     return max(record.clock.seconds(record.ended_ns), data.last_s)
 
 
 def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
-    """Return when the mission entered its states, by its statuses and its drawn states."""
+    """Return the states that the mission entered, from statuses and drawn states."""
     published = [(each.at_s, each.status.state, each.status.reason) for each in data.statuses]
     drawn = _entered(record, entities.MISSION_STATE, entities.MISSION_LOG)
     return sorted((*published, *drawn), key=lambda entry: entry[0])
@@ -312,7 +316,7 @@ def _entered(record: RunRecord, entity: str, log: str) -> list[Entered]:
 
 
 def _reason(lines: tuple[TimedText, ...], at_ns: int, state: str) -> str:
-    """Return the reason that the log gives for a state entered just then."""
+    """Return the reason in the log for a state entered at ``at_ns``; "" for none."""
     prefix = f"{state}: "
     found = (line for at, line in lines if at == at_ns and line.startswith(prefix))
     return next(found, prefix).removeprefix(prefix)

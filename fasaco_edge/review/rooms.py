@@ -1,4 +1,4 @@
-"""The rooms of a recording, one chapter each: the time in it, what was swept and what was left."""
+"""The rooms of a recording: working time, swept and unswept floor of each."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from fasaco_edge.review.run_data import RunData
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.rooms import RoomReport
 
-# States in which the robot is not at work, whatever room it stands in.
+# States in which the robot is not at work.
 RESTS = ("idle", "done", "paused", "charging", "loading", "waiting for map", "waiting for pose")
 
 
 @dataclass(frozen=True, slots=True)
 class RoomChapter:
-    """A room at the end of the recording; ``ReviewDocument`` describes its members."""
+    """A room at the end of the recording; see ``ReviewDocument.rooms``."""
 
     room: int
     name: str
@@ -39,22 +39,22 @@ class RoomChapter:
 
     @property
     def share(self) -> float | None:
-        """Its swept share, by recorded poses, or else as the daemon counted it."""
+        """Swept share by recorded poses; if unknown, the daemon's count."""
         return self.counted_share if self.swept_share is None else self.swept_share
 
     @property
     def title(self) -> str:
-        """Its name, or its number in words."""
+        """Name of the room, else its number."""
         return one_line(self.name) or f"room {self.room}"
 
 
 def outlined(data: RunData) -> list[RoomReport]:
-    """Return the rooms that have an outline, the largest first: others may lie within."""
+    """Return the rooms with an outline, the largest first, as it may enclose others."""
     return sorted(data.rooms.outlined, key=lambda room: -area_m2(room.outline))
 
 
 def room_at(data: RunData, point: Point) -> RoomReport | None:
-    """Return the room that a point x, y [m] lies in; None for none."""
+    """Return the room that contains a point (x, y) [m]; None for none."""
     there = [room for room in outlined(data) if is_near(room.outline, point, 0.0)]
     return there[-1] if there else None
 
@@ -62,12 +62,12 @@ def room_at(data: RunData, point: Point) -> RoomReport | None:
 def room_chapters(
     data: RunData, states: Sequence[Span], floor: JudgedFloor | None
 ) -> tuple[RoomChapter, ...]:
-    """Return the chapters of the rooms, by number; none if no rooms were recorded.
+    """Return the rooms in order of number; () if no rooms were recorded.
 
     Args:
-        data: of the samples.
-        states: of the mission, in order.
-        floor: swept and left; None if not known.
+        data: data of the samples.
+        states: states of the mission, in order.
+        floor: swept and unswept floor; None if unknown.
     """
     rooms = outlined(data)
     geometry = floor.geometry if floor else data.grid.geometry if data.grid else None
@@ -76,7 +76,7 @@ def room_chapters(
     labels = labels_of(geometry, [room.outline for room in rooms])
     at = geometry.values_at(labels, data.track[:, :2])
     seconds = np.bincount(at[:-1], _work_s(data, states), len(rooms) + 1) if len(at) else None
-    # Between rooms, in doors and beside furniture, it is in none.
+    # 0 is in no room: doors, and floor beside furniture.
     passed = at[at > 0]
     entered = np.bincount(passed[np.diff(passed, prepend=0) != 0], minlength=len(rooms) + 1)
     pixel_m2, done, left = geometry.resolution**2, None, None
@@ -109,7 +109,10 @@ def room_chapters(
 
 
 def labels_of(geometry: GridGeometry, outlines: Sequence[Polygon]) -> NDArray[np.int16]:
-    """Return which room each pixel is in, from 1, int16 (rows, cols); later ones lie above."""
+    """Return the number of each pixel's outline, int16 (rows, cols): from 1, 0 for none.
+
+    A pixel within several outlines gets the number of the last one.
+    """
     whole = Window(0, 0, geometry.rows, geometry.cols)
     labels = np.zeros((geometry.rows, geometry.cols), np.int16)
     for number, outline in enumerate(outlines, 1):
@@ -122,7 +125,7 @@ def labels_of(geometry: GridGeometry, outlines: Sequence[Polygon]) -> NDArray[np
 
 
 def _work_s(data: RunData, states: Sequence[Span]) -> NDArray[np.float64]:
-    """Return how long the robot was at work from each pose to the next [s], float64 (n - 1,)."""
+    """Return the working time from each pose to the next [s], float64 (n - 1,)."""
     times = data.times
     lasted = np.diff(times)
     lasted[lasted > (data.lost_pose_s or math.inf)] = 0.0
@@ -133,7 +136,7 @@ def _work_s(data: RunData, states: Sequence[Span]) -> NDArray[np.float64]:
 
 
 def _passes(data: RunData, room: RoomReport) -> int | None:
-    """Return the newest pass of the last order that named a room; None if none did."""
+    """Return the current pass of a room in the last order that names it; None for none."""
     titles = (room.title, f"room {room.id}")
     for each in reversed(data.statuses):
         for zone in each.status.mission.zones:

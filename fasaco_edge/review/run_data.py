@@ -33,13 +33,13 @@ from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_g
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
-# Smaller areas are within the noise of poses and times [m2].
+# Smaller areas may come from the noise of poses and times [m2].
 SURELY_SWEPT_M2 = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class PathSample:
-    """A path's attachment, and when the path came, since the recording began [s]."""
+    """A path's attachment, and the path's arrival since the recording began [s]."""
 
     at_s: float
     about: PathAttachment
@@ -52,7 +52,7 @@ class PathSample:
 
 @dataclass(frozen=True, slots=True)
 class StatusSample:
-    """A status, and when it came, since the recording began [s]."""
+    """A status, and its arrival since the recording began [s]."""
 
     at_s: float
     status: Status
@@ -64,17 +64,17 @@ class RunData:
 
     Attributes:
         pose_s, poses: arrival of each pose, and its x [m], y [m], yaw [rad].
-        map_s: arrival of each map and update.
-        paths, statuses: in order.
-        commands: arrival and name of each, and the order of a ``start``.
+        map_s: arrival of each map and map update.
+        paths, statuses: newest last.
+        commands: arrival, name and order of each; only a ``start`` has an order.
         grid: the map at the end, with all updates.
-        ordered_keep_out: polygons of the last order.
-        zones: polygons of the last order; empty without an order, or if it is for everything.
-        rooms: as they were at the end; none if none were recorded.
-        config, version, robot: of the daemon, by its last status.
-        undecodable: samples that could not be read, by topic.
-        last_s: when the last sample came.
-        time_scale: seconds of the robot per second; 1 for a real one.
+        ordered_keep_out: keep-out polygons of the last order [m].
+        zones: zone polygons of the last order [m]; empty without an order, or for everything.
+        rooms: the rooms at the end; empty if none were recorded.
+        config, version, robot: configuration, version and name in the daemon's last status.
+        undecodable: number of samples that could not be decoded, by topic.
+        last_s: arrival of the last sample.
+        time_scale: simulated seconds per second; 1 for a real robot.
     """
 
     pose_s: list[float] = field(default_factory=list)
@@ -96,15 +96,15 @@ class RunData:
 
     @property
     def restored_cells(self) -> int:
-        """Cells that were covered before a restart."""
+        """Number of cells covered before a restart of the daemon."""
         return max((each.status.ledger.restored_cells for each in self.statuses), default=0)
 
     @property
     def swept_before_m2(self) -> float:
         """Floor of the order swept before the recording began [m2], approximately.
 
-        It is the swept floor of the first report, less what the tool can have swept since the
-        beginning; 0 for an order that began later.
+        It is the swept floor of the first report, minus what the tool can have swept since the
+        beginning; 0 if the order began later.
         """
         reports = [(each.at_s, each.status.floor) for each in self.statuses]
         swept = [(at_s, floor.swept_m2) for at_s, floor in reports if floor is not None]
@@ -131,7 +131,7 @@ class RunData:
 
     @property
     def keep_out(self) -> tuple[Polygon, ...]:
-        """Keep-out zones in force at the end: of last order, configuration and operator."""
+        """Keep-out zones in force at the end, of the last order, configuration and operator [m]."""
         always = known_settings(self.config).mission
         polygons = self.ordered_keep_out + always.keep_out
         drawn = self.statuses[-1].status.mission.keep_outs if self.statuses else ()
@@ -163,7 +163,7 @@ class RunData:
 
     @property
     def jumps(self) -> NDArray[np.bool_]:
-        """Which ways between poses are jumps, bool (n - 1,)."""
+        """Whether the pose jumped from each to the next, bool (n - 1,)."""
         jump_m = JUMP_CELLS * self.footprint.cell_m if self.footprint else math.inf
         return self.lengths_m > jump_m
 
@@ -174,21 +174,21 @@ class RunData:
 
     @property
     def lost_pose_s(self) -> float:
-        """Gap between poses over which the path is unknown [s]; 0 for none."""
+        """Longest gap between poses that counts as driven [s]; 0 for no limit."""
         # The daemon's timeout is in real seconds.
         return self.time_scale * known_settings(self.config).mission.lost_pose_s
 
     @property
     def driven(self) -> NDArray[np.bool_]:
-        """Which ways between poses were driven, bool (n - 1,), as in the ledger.
+        """Whether the robot drove from each pose to the next, bool (n - 1,), as in the ledger.
 
-        Over the others, jumps and gaps without a pose, no floor counts as swept.
+        False for jumps and for gaps without poses, where no floor counts as swept.
         """
         return ~self.jumps & (np.diff(self.times) <= (self.lost_pose_s or math.inf))
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """When each pose came [s], float64 (n,)."""
+        """Arrival of each pose [s], float64 (n,)."""
         return np.array(self.pose_s, np.float64)
 
     @property
@@ -198,7 +198,7 @@ class RunData:
 
 
 def gather(samples: Iterable[Arrival], clock: RobotClock) -> RunData:
-    """Return the data of ``samples``, in order; one that cannot be decoded is only counted."""
+    """Return the data of ``samples``; samples that cannot be decoded are only counted."""
     reader = _SampleReader(clock)
     for arrival in samples:
         reader.read(arrival)
@@ -206,7 +206,7 @@ def gather(samples: Iterable[Arrival], clock: RobotClock) -> RunData:
 
 
 def maps_of(samples: Iterable[Arrival], clock: RobotClock) -> Iterator[tuple[float, OccupancyGrid]]:
-    """Yield each state of the map, and when it came, since the recording began [s]."""
+    """Yield each version of the map, and its arrival since the recording began [s]."""
     reader = _SampleReader(clock)
     for arrival in samples:
         if arrival.topic in ("map", "map_update"):
@@ -216,7 +216,7 @@ def maps_of(samples: Iterable[Arrival], clock: RobotClock) -> Iterator[tuple[flo
 
 
 class _SampleReader:
-    """Adds the data of one sample after the other; holds one map at a time."""
+    """Adds the data of samples, one by one; keeps only the newest map."""
 
     def __init__(self, clock: RobotClock) -> None:
         self.data = RunData(time_scale=clock.scale)
@@ -235,7 +235,7 @@ class _SampleReader:
         }
 
     def read(self, arrival: Arrival) -> None:
-        # A part begins with the samples in force before it.
+        # Samples in force at the beginning of a part are older than the recording.
         self._now = max(self._clock.seconds(arrival.wall_ns), 0.0)
         self.data.last_s = max(self.data.last_s, self._now)
         reader = self._readers.get(arrival.topic)
@@ -278,7 +278,7 @@ class _SampleReader:
         data.config = renamed(status.config) or data.config
         data.version = status.version or data.version
         data.robot = status.robot or data.robot
-        # An order may name a standing zone or a room in place of a polygon.
+        # The order may name a zone or room; the status then has its polygon.
         data.zones = tuple(z.polygon for z in status.mission.zones if z.polygon) or data.zones
         known = known_settings(data.config)
         self._poses.schema = known.pose.schema or self._poses.schema
@@ -292,8 +292,7 @@ class _SampleReader:
     def _path(self, arrival: Arrival) -> None:
         about = decode_tolerant(arrival.sample.attachment, PathAttachment)
         paths = self.data.paths
-        # A path that is published again is the same; a daemon's first one, 0, belongs to no
-        # mission.
+        # Ignore a path published again, and revision 0, which a daemon publishes before a mission.
         if not about.revision or (paths and paths[-1].about.revision == about.revision):
             return
         paths.append(PathSample(self._now, about))

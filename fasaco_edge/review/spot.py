@@ -1,14 +1,15 @@
-"""One spot of the floor: swept or not, and why not.
+"""The reason why one spot of the floor was swept or not.
 
 Reasons are checked in this order:
 
-1. the map does not show it;
+1. the spot is unknown to the map;
 2. it is no floor;
 3. it is in a keep-out zone;
-4. the robot cannot reach it;
-5. it is not part of the order;
-6. poses are missing for a time in which the robot can have swept it;
-7. it is sweepable, but was missed by the robot or by its path.
+4. another robot of the fleet swept it;
+5. the robot cannot reach it;
+6. it is not part of the order;
+7. the robot may have swept it while poses were missing;
+8. the robot or its path missed it.
 """
 
 from __future__ import annotations
@@ -42,11 +43,11 @@ from fasaco_edge.wire.reasons import plain
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
 
-# A path this near [m] would have swept a spot at its tool's edge.
+# A path sweeps a spot this far inside the edge of the tool [m].
 NEAR_M = 0.02
-# The mission's reason for a path that differs only in its line.
+# The mission's reason for a path with the same walk and another line.
 POLISHED = "line polished"
-# Number of listed patches, the largest first, and the smallest area [m2].
+# Limits on the listed patches: their number, and their least area [m2].
 MOST_PATCHES, LEAST_M2 = 8, 0.04
 
 
@@ -55,14 +56,14 @@ class Spot(msgspec.Struct):
 
     Attributes:
         swept: whether the tool passed over it; None if unknown.
-        why: the reason in a word: swept, swept by others, never seen, not floor, keep-out, too
+        why: the kind of reason: swept, swept by others, never seen, not floor, keep-out, too
             narrow, closed off, not ordered, poses missing, still to come, seen late, missed, not
             worth it, not known.
         words: the reason in full.
-        missed_m: least distance of the tool's edge [m].
-        nearest_s: when the robot came nearest [s since the recording began].
-        seen_s: when the map first showed it free [s].
-        patch_m2: all unswept floor in one piece with it [m2].
+        missed_m: least distance from the tool's edge [m].
+        nearest_s: time of that distance, since the recording began [s].
+        seen_s: beginning of the last period, up to the end, in which the map shows it free [s].
+        patch_m2: area of the connected patch of unswept floor around it [m2].
     """
 
     x: float
@@ -94,7 +95,7 @@ def left_patches(floor: JudgedFloor) -> list[LeftPatch]:
         if m2 < LEAST_M2:
             break
         runs = patches.of_run == patch
-        # The middle of the patch's longest row is inside, whatever its shape.
+        # The middle of its longest row lies inside the patch.
         starts, ends = patches.starts[runs], patches.ends[runs]
         longest = int(np.argmax(ends - starts))
         row, first = divmod(int(starts[longest]), cols)
@@ -105,13 +106,13 @@ def left_patches(floor: JudgedFloor) -> list[LeftPatch]:
 
 
 def spots_left(review: Review) -> list[Spot]:
-    """Return why each of ``left_patches`` was not swept."""
+    """Return a spot in each of ``left_patches``, with the reason why it was not swept."""
     patches = left_patches(review.floor) if review.floor else []
     return explain(review, [(patch.x, patch.y) for patch in patches])
 
 
 def explain(review: Review, places: Sequence[tuple[float, float]]) -> list[Spot]:
-    """Return for each position (x, y) [m] why it was not swept, or that it was.
+    """Return a spot for each position (x, y) [m].
 
     Raises:
         UnreadableRecording: a file of the recording is gone.
@@ -121,14 +122,14 @@ def explain(review: Review, places: Sequence[tuple[float, float]]) -> list[Spot]
 
 
 class _Recorded:
-    """Data read again from a recording on demand, once for all positions, float64 (n, 2) [m]."""
+    """Data read from a recording on demand, once for all positions, float64 (n, 2) [m]."""
 
     def __init__(self, review: Review, places: NDArray[np.float64]) -> None:
         self._review, self.places = review, places
 
     @cached_property
     def seen_s(self) -> NDArray[np.float64]:
-        """When the map first showed each position free, to the end [s]; NaN for never."""
+        """Beginning of the last period in which each position is free on the map [s]; else NaN."""
         record, footprint = self._review.record, self._review.data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
         since = np.full(len(self.places), np.nan)
@@ -140,14 +141,14 @@ class _Recorded:
 
     @cached_property
     def paths(self) -> list[DrawnLine]:
-        """The paths as they were drawn, in order of time."""
+        """The drawn paths, in order of time."""
         parts = [part.path for part in self._review.record.parts]
         found = [one for _, one in drawings(parts, entities.PATH) if isinstance(one, DrawnLine)]
         return sorted((one for one in found if len(one.xy)), key=lambda one: one.at_ns)
 
 
 class _Judge:
-    """Finds the reason for one position."""
+    """Finds the reason for one spot."""
 
     def __init__(self, review: Review, recorded: _Recorded, number: int) -> None:
         self._review, self._recorded, self._number = review, recorded, number
@@ -181,8 +182,8 @@ class _Judge:
         return bool(geometry.values_at(mask, np.array([(self._x, self._y)]))[0])
 
     def _off_the_floor(self, grid: OccupancyGrid, footprint: Footprint) -> Spot | None:
-        """Return why map or order exclude it; None if they do not."""
-        # Beyond the map it is as unknown, -1.
+        """Return the spot if map or keep-out zones exclude it; None if they do not."""
+        # Pixels outside the map are unknown, -1.
         (value,) = grid.geometry.values_at(grid.cells + 1, np.array([(self._x, self._y)])) - 1
         if value < FREE:
             return self._spot("never seen", "unknown to the map at the end")
@@ -205,7 +206,7 @@ class _Judge:
                 return self._spot("keep-out", "a keep-out zone is in the way, or too near")
         geometry = grid.geometry
         free_mask = (grid.cells >= FREE) & (grid.cells <= footprint.free_at_most)
-        # As in the judge: a disc fits if all pixels that it touches are free.
+        # As in ``judge_floor``: a disc fits if all pixels that it touches are free.
         radius_px, tool_px = (m / geometry.resolution for m in (self._radius_m, self._tool_m / 2))
         fits = ~within(~np.pad(free_mask, 1), radius_px + 0.5)[1:-1, 1:-1]
         if self._is_in(within(fits, tool_px), geometry):
@@ -225,7 +226,7 @@ class _Judge:
     def _within_reach(self, floor: JudgedFloor) -> Spot:
         data = self._data
         away_m, at_s = _distances(data.track[:, :2], (self._x, self._y)), data.times
-        if len(away_m) < len(at_s):  # pieces: when each ended
+        if len(away_m) < len(at_s):  # a distance for each segment: take the time of its end
             away_m[~data.driven], at_s = math.inf, at_s[1:]
         first = int(np.argmin(away_m))
         if self._is_in(floor.swept, floor.geometry):
@@ -275,11 +276,12 @@ class _Judge:
         return spot
 
     def _gap(self) -> tuple[float, float] | None:
-        """Return the first time without poses in which the robot can have come here [s]."""
+        """Return the first gap between poses [s] in which the robot may have swept the spot."""
         data = self._data
         away_m = np.hypot(*(data.track[:, :2] - (self._x, self._y)).T)
         via_m, way_m = away_m[:-1] + away_m[1:], data.lengths_m
-        # At its speed it can have made a detour; if it hardly moved, it rather stood.
+        # The longest detour at full speed, but not longer than the way from pose to pose: a robot
+        # that hardly moved probably stood.
         speed_m_s = known_settings(data.config).robot.speed_m_s
         detour_m = np.clip(speed_m_s * np.diff(data.times) - way_m, 0.0, way_m)
         gaps = np.flatnonzero(~data.driven & (via_m <= way_m + detour_m + self._tool_m))
@@ -288,19 +290,19 @@ class _Judge:
         return data.pose_s[gaps[0]], data.pose_s[gaps[0] + 1]
 
     def _last_path_over(self) -> DrawnLine | None:
-        """Return the last path that would have swept it; None without any."""
+        """Return the last path that would have swept the spot; None for none."""
         reach_m, place = self._tool_m / 2 - NEAR_M, (self._x, self._y)
         paths = reversed(self._recorded.paths)
         return next((one for one in paths if _distances(one.xy, place).min() <= reach_m), None)
 
     def _left_by(self, over: DrawnLine) -> tuple[str, str]:
-        """Return the fate of a path that led over it."""
+        """Return kind and text of the reason for a spot that a planned path led over."""
         led = f"path {over.revision} led over it"
         later = [p.about for p in self._data.paths if p.about.revision > over.revision]
         if not later:
             return "missed", f"{led}, and the robot did not get there"
         words = f"{led}, until path {later[0].revision} took its place ({plain(later[0].reason)})"
-        # A shorter line leaves floor that is not worth the distance.
+        # A polished or better path leaves floor that is not worth a detour.
         return "not worth it" if later[0].reason in (POLISHED, BETTER) else "missed", words
 
     def _is_within(self, polygons: Sequence[Polygon]) -> bool:
@@ -308,6 +310,6 @@ class _Judge:
 
 
 def _distances(line: NDArray[np.float64], place: tuple[float, float]) -> NDArray[np.float64]:
-    """Return the distance of each piece of a line (n, 2) to a place, or of its only point [m]."""
+    """Return the distance of a place to each segment of a line (n, 2), or to its only point [m]."""
     points = nearest_points(line, place) if len(line) > 1 else line
     return np.asarray(np.hypot(*(points - place).T), np.float64)

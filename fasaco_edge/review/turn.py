@@ -1,4 +1,4 @@
-"""The turn of a robot around a moment, and the path that turned it."""
+"""The turn of a robot near a moment, and the path that caused it."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
     from fasaco_edge.review.run_data import PathSample
 
 
-# A turn is searched for this long before and after [s], and lasts at most this long.
+# Period before and after the moment in which turns are searched, and longest turn [s].
 TURN_S = 2.0
 
 
-# A smaller angle is a bend [deg]; a turn that is sharper by this many degrees may be a second
-# longer, or a second farther away.
+# Least angle of a turn [deg]. Among several turns the largest angle counts, minus this many degrees
+# for each second of duration and of distance from the moment [deg/s].
 TURN_DEG, SHORTER_DEG_S = 60.0, 20.0
 
 
-# Distance ahead at which a path's heading is taken [m]; the least difference of two headings.
+# Distance ahead at which a path's heading is taken [m]; least difference of two headings [deg].
 AHEAD_M = 0.5
 
 
@@ -43,7 +43,7 @@ DIRECTIONS = (
 
 
 class TurnThen(msgspec.Struct):
-    """The sharpest turn around a time: angle to the left [deg], position and reason."""
+    """The sharpest turn near a time: angle to the left [deg], position [m], reason."""
 
     begin_s: float
     end_s: float
@@ -54,9 +54,9 @@ class TurnThen(msgspec.Struct):
 
 
 def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float | None:
-    """Return the heading of a line (n, 2) at its point nearest to a position, (-180, 180] [deg].
+    """Return the heading of a line (n, 2) at its point nearest to a place, in (-180, 180] [deg].
 
-    None if it ends there.
+    None if the line ends there.
     """
     if len(line) < 2:
         return None
@@ -69,7 +69,7 @@ def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float
 
 
 def turn_at(review: Review, lines: Mapping[int, DrawnLine], at_s: float) -> TurnThen | None:
-    """Return the sharpest turn around a time; None if the robot went straight."""
+    """Return the sharpest turn near a time; None if the robot made none."""
     data = review.data
     times, track = data.times, data.track
     about = np.abs(times - at_s) <= TURN_S
@@ -79,8 +79,7 @@ def turn_at(review: Review, lines: Mapping[int, DrawnLine], at_s: float) -> Turn
     yaw = np.degrees(np.unwrap(track[:, 2]))
     turned = yaw[None, :] - yaw[:, None]
     seconds = times[None, :] - times[:, None]
-    # Of equally sharp turns the shortest and nearest one counts; two successive turns stay
-    # separate.
+    # Short turns near the moment come first; so two successive turns are not taken for one.
     away = np.abs((times[None, :] + times[:, None]) / 2 - at_s)
     sharp = np.minimum(np.abs(turned), 180.0) - SHORTER_DEG_S * (seconds + away)
     worth = np.where((seconds > 0) & (seconds <= TURN_S), sharp, 0.0)
@@ -103,7 +102,7 @@ def _why(
     begin_s: float,
     end_s: float,
 ) -> str:
-    """Return the path that turned the robot at a position: a new one, or the one it followed."""
+    """Return the path that caused a turn: a new path, or the one the robot followed."""
     index = sum(path.at_s <= begin_s for path in paths) - 1
     known = [
         (path, heading)
@@ -129,5 +128,5 @@ def _why(
 
 
 def direction(degrees: float) -> str:
-    """Return a direction in the map frame in words; 0 is east, 90 north."""
+    """Return the compass point of a heading in the map frame [deg]; 0 is east, 90 north."""
     return DIRECTIONS[round(degrees / 45.0) % 8]

@@ -15,7 +15,7 @@ def amount(value: float | None, unit: str) -> str:
 
 
 def count(value: float | None, unit: str) -> str:
-    """Return a value with its unit, a whole number with all its digits."""
+    """Return a value with its unit: a whole number with all digits, others with one decimal."""
     if value is None:
         return NOT_KNOWN
     text = f"{value:,}" if isinstance(value, int) else f"{value:,.1f}"

@@ -1,1 +1,1 @@
-"""The live page of a mission: samples from the bus in, a picture in browsers out; orders back."""
+"""The web page of a mission: it shows samples from the bus in browsers, and sends their orders."""

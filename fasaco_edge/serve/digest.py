@@ -25,7 +25,7 @@ Digest = dict[str, object]
 # Limits on the shown entries of received lists.
 MOST_ENTRIES, MOST_AREAS, MOST_ROBOTS = 40, 100, 50
 MOST_CORNERS = 1_000
-# A longer time means a speed of almost 0 [s].
+# Longer remaining times come from a speed of almost 0 [s].
 MOST_TO_GO_S = 1e8
 # Coordinates beyond this are invalid [m].
 MOST_M = 1e6
@@ -37,7 +37,7 @@ class Way:
     """The remaining distance and turns from each point of a path.
 
     Args:
-        xy: its points (x, y) [m].
+        xy: points (x, y) of the path [m].
     """
 
     def __init__(self, xy: Sequence[Point] = ()) -> None:
@@ -57,9 +57,9 @@ class Way:
     def left_s(
         self, at: int, robot: RobotSettings, drive: DriveReport, beyond_m: float = 0.0
     ) -> float | None:
-        """Return the remaining time from ``beyond_m`` [m] beyond point ``at`` [s].
+        """Return the remaining time [s] from a place ``beyond_m`` [m] after point ``at``.
 
-        None if no speed or no path is known.
+        None if speed or path is unknown.
         """
         speed_m_s = drive.speed_m_s or robot.speed_m_s
         if not speed_m_s > 0.0 or not self._is_known:
@@ -77,14 +77,14 @@ def state(
     ordered: Status | None = None,
     order: dict[str, Any] | None = None,
 ) -> Digest:
-    """Return the content of the newest status; ``absent`` says why there is no newer one.
+    """Return the document of the newest status; ``absent`` says why there is no newer status.
 
     Args:
-        view: of the robot.
-        way: its path.
-        now: since the epoch [s].
+        view: state of the robot.
+        way: path of the robot.
+        now: time by the clock of ``view`` [s].
         ordered: the newest status with an order.
-        order: the newest order by command; None if that is not known.
+        order: the newest order given by command; None if unknown.
     """
     status = view.status
     others = sorted(view.robots - {view.robot})[:MOST_ROBOTS]
@@ -123,7 +123,7 @@ def state(
 
 
 def _absent(view: RobotState, now: float) -> str:
-    """Return why there is nothing new to show; "" if there is."""
+    """Return why there is no new status; "" if there is one."""
     if view.trouble:
         return "No contact with the robot's network; trying again"
     if view.gone_since is not None:
@@ -156,12 +156,12 @@ def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
     if status.state not in UNDERWAY or view.gone_since is not None:
         return None
     path = status.path
-    if path is None:  # a daemon that has begun anew has not planned yet
+    if path is None:  # the daemon has not planned since its start
         return None
     left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)
     if not path.steps:
-        # A paused robot continues on its last path. Without that path, as after a restart of this
-        # server, only the daemon knows how long it takes. In any other state it drives nowhere.
+        # A paused robot will continue on its last path. If this server does not have that path, as
+        # after its restart, the daemon's time counts. In any other state the robot does not drive.
         is_paused = status.state == "paused"
         left_s = (left_s or path.line_s or None) if is_paused else None
     return None if left_s is None or left_s > MOST_TO_GO_S else round(left_s)
@@ -194,7 +194,7 @@ def _mission(mission: MissionReport) -> Digest:
 
 
 def _part(mission: MissionReport) -> str:
-    """Return what the figures are of: pass, place, places, or "" for all floor in reach."""
+    """Return what the figures refer to: pass, place, places, or "" for all reachable floor."""
     is_covering = mission.stage == "covering"
     if is_covering and (mission.passes or 1) > 1:
         return "pass"
@@ -203,7 +203,7 @@ def _part(mission: MissionReport) -> str:
 
 
 def _comes_more(mission: MissionReport) -> bool:
-    """Return whether another pass or zone comes after the present one."""
+    """Return whether another pass or zone follows the current one."""
     if mission.stage != "covering" or mission.passes is None:
         return False
     is_last_pass = (mission.pass_number or 1) >= mission.passes
@@ -212,9 +212,10 @@ def _comes_more(mission: MissionReport) -> bool:
 
 
 def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
-    """Return the order by command that a status reports: its command came before this server began.
+    """Return the order in a status, for an order commanded before this server began; else None.
 
-    A zone with the name of a room is that room. The status says how often, and not in which way.
+    A zone with the name of a room is that room. The status has the number of passes, not their
+    kinds.
     """
     if mission.ordered != "command":
         return None
@@ -238,14 +239,14 @@ def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None
 
 
 def _again(order: dict[str, Any] | None) -> Digest | None:
-    """Return the last order by command, so that the user can repeat it once it is over; else None.
+    """Return the last order by command, which the user can repeat once it is over; else None.
 
-    It is sent from its beginning on: a page keeps it, also if this server begins anew before the
-    end. It is empty if Start gives the same order.
+    It is sent from the order's beginning on: the page keeps it if this server restarts before the
+    end. It is empty if it equals the order of the Start button.
     """
     if order is None:
         return None
-    # The outline of a room may have changed since: its number is enough.
+    # A room is repeated by its number only, as its outline may have changed since.
     given = order.get("zones")
     zones = [
         {name: value for name, value in zone.items() if name != "polygon" or "room" not in zone}
@@ -266,7 +267,7 @@ def _battery(status: Status) -> Digest | None:
 
 
 def _faults(status: Status) -> Iterator[str]:
-    """Yield troubles and faults in an engineer's words."""
+    """Yield troubles and faults as text for engineers."""
     for what, to_do in phrases.troubles(status):
         yield f"{what}. {to_do[:1].upper()}{to_do[1:]}."
     if status.errors.total:
@@ -306,7 +307,7 @@ def areas(settings: KnownSettings, report: MissionReport) -> Digest:
 
 
 def _areas(found: Iterable[tuple[str, Corners, str]]) -> Iterator[Digest]:
-    """Yield the areas (name, polygon, kind) that can be drawn, up to a limit."""
+    """Yield documents of the valid areas (name, polygon, kind), up to a limit."""
     drawn = (area for area in found if _is_polygon(area[1]))
     for name, polygon, kind in islice(drawn, 2 * MOST_AREAS):
         yield {"name": name, "polygon": polygon, "is": kind}
@@ -319,7 +320,7 @@ def _is_polygon(corners: Corners) -> bool:
 
 
 def lately(events: EventLog) -> list[Digest]:
-    """Return the newest entries, the newest first."""
+    """Return the documents of the newest events, the newest first."""
     entries = list(events.entries)[-MOST_ENTRIES:]
     # The page shows wall-clock times; entries have monotonic ones.
     offset = time.time() - phrases.steady_now()

@@ -1,8 +1,8 @@
 """Access control of the page and its commands: hosts, origins, tokens.
 
-A foreign page in a browser on this computer may call this server, too: its requests have its own
-origin, or its host name resolves to this server (DNS rebinding). A host that is an address is
-neither.
+A page of another site in a user's browser can call this server, too. Such requests have an Origin
+header of the other site, or a host name that was made to resolve to this server (DNS rebinding).
+Requests with an IP address as host are safe from the latter.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fasaco_edge.host.files import FileTooLongError, read_own
 from fasaco_edge.host.outputs import whole
 from fasaco_edge.serve.messages import Role
 
-# Longest file with tokens: it holds about forty.
+# Largest file of tokens: about forty tokens.
 MOST_BYTES = 4096
 _TOKEN = re.compile(r"[\w.~-]{16,200}", re.ASCII)
 ROLES: tuple[Role, ...] = get_args(Role)
@@ -35,9 +35,9 @@ class Guard:
     """Decides the rights of a client.
 
     Attributes:
-        names: host names of this server, beside addresses.
-        tokens: by role; none: no token is required, and all clients have ``role``.
-        role: of all clients, without tokens.
+        names: host names of this server; addresses are always allowed.
+        tokens: each with its role; if empty, no token is required, and all clients have ``role``.
+        role: role of all clients if there are no tokens.
     """
 
     names: frozenset[str]
@@ -56,16 +56,16 @@ class Guard:
         return True
 
     def to_look_only(self) -> Guard:
-        """Return a guard under which all clients may only view."""
+        """Return a guard that gives all clients the role of a viewer."""
         tokens: tuple[tuple[Role, str], ...] = tuple(("viewer", token) for _, token in self.tokens)
         return Guard(self.names, tokens)
 
     def role_of(self, token: str) -> Role | None:
-        """Return the role of a client with ``token``; None for none."""
+        """Return the role of a client with ``token``; None if it is rejected."""
         if not self.tokens:
             return self.role
         found: Role | None = None
-        # All are compared, each in constant time.
+        # All tokens are compared, each in constant time, against timing attacks.
         for role, known in self.tokens:
             if hmac.compare_digest(token.encode(), known.encode()):
                 found = role
@@ -73,7 +73,7 @@ class Guard:
 
 
 def is_same_origin(origins: list[str], host: str) -> bool:
-    """Return whether the caller is a page of ``host`` itself; only browsers send an origin."""
+    """Return whether a request has no Origin header (no browser), or that of a page of ``host``."""
     own = (f"{scheme}://{host.lower()}" for scheme in ("http", "https"))
     return not origins or (len(origins) == 1 and origins[0].lower() in own)
 
@@ -84,10 +84,10 @@ def guard_for(
     """Return the guard of a server.
 
     Args:
-        address: where the server listens.
-        tokens: the file with tokens, created if missing. None for none.
-        names: more host names of this server.
-        allow_commands: whether all may command, without a token.
+        address: address at which the server listens.
+        tokens: file of tokens, created if missing; None for no tokens.
+        names: additional host names of this server.
+        allow_commands: whether all clients may command without a token.
 
     Raises:
         BadConfiguration: access would be open to the network, or the token file is invalid.
@@ -110,10 +110,11 @@ def guard_for(
 
 
 def read_tokens(file: Path) -> tuple[tuple[Role, str], ...]:
-    """Return the tokens in a file, lines as ``operator: TOKEN``; create the file if missing.
+    """Return the tokens in a file of lines ``operator: TOKEN``; create the file if missing.
 
     Raises:
-        BadConfiguration: it cannot be read or made, others may read it, or a line is invalid.
+        BadConfiguration: the file cannot be read or created, others may read it, or a line is
+            invalid.
     """
     try:
         if not file.exists():

@@ -1,4 +1,4 @@
-"""The page of a robot on the bus: a thread takes in its samples, and makes messages of them."""
+"""The server of a robot's live page: a thread makes messages from the robot's samples."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.server import Server
 from fasaco_edge.wire.topics import FLOOR, PHEROMONE, UNSWEPT
 
-# Least period of messages to pages; without any, period of the check for viewers [s].
+# Least period of messages to viewers, and longest wait for samples [s].
 FRAME_S, IDLE_S = 0.1, 0.2
 # Timeout of the query for a path [s].
 PATH_S = 1.0
 
 
 class LiveServer(Server):
-    """Serves the page of a robot on the bus, and is the source of all its viewers.
+    """Serves the page of a robot on the bus; it is the source of all its viewers.
 
     Args:
-        feed: its samples.
-        view: makes messages of them.
-        guard: decides rights.
+        feed: samples of the robot.
+        view: makes messages from the samples.
+        guard: decides the rights of clients.
     """
 
     def __init__(self, feed: Feed, view: ServedView, guard: Guard) -> None:
@@ -36,7 +36,7 @@ class LiveServer(Server):
         self._newest: dict[str, tuple[int, str | bytes]] = {}
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
-        """Return the newest messages: kind, number, message."""
+        """Return kind, number and content of the newest messages."""
         return [(kind, number, message) for kind, (number, message) in self._newest.items()]
 
     def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
@@ -44,11 +44,11 @@ class LiveServer(Server):
         return self._feed.ask(query, payload, timeout_s)
 
     def at(self, _: float) -> list[str | bytes]:
-        """Return nothing: only a recording has other times than now."""
+        """Return nothing: only recordings have other times than the present."""
         return []
 
     def _work(self) -> None:
-        """Take in samples, and make messages of them while there are viewers."""
+        """Take in samples; make messages while there are viewers."""
         while not self._ended.is_set():
             items = self._feed.take(IDLE_S)
             now = steady_now()
@@ -66,7 +66,7 @@ class LiveServer(Server):
             self._ended.wait(max(FRAME_S - (steady_now() - now), 0.0))
 
     def _ask_for_path(self, now: float) -> None:
-        """Take the path with which a paused robot goes on: it was sent before this server began."""
+        """Query the path on which a paused robot continues, published before this server began."""
         self._view.lacks_path = False
         with suppress(FasacoError):
             for reply in self._feed.ask("path?before_stop", b"", PATH_S):

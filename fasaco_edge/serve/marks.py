@@ -1,8 +1,8 @@
 """Grids as marks, a byte of flags for each pixel.
 
-Pixels are merged by OR, so no thin wall is lost; a level has the bits of all lower levels, so OR
-gives the maximum. Without numpy: the whole process should take no more memory than a browser tab on
-the robot.
+Large grids are reduced: pixels are merged by OR, so that no thin wall is lost. A level has the bits
+of all lower levels, so that OR gives the maximum. There is no NumPy here, to save memory on the
+robot.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from fasaco_edge.wire.messages.grids import GridOctets
 # Marks of a map: unmarked pixels are unknown.
 FREE, WALL = 1, 2
 LEVELS = 7
-# Limits of a map by default; a daemon's status may state others [percent].
+# Default thresholds of a map [percent]; the configuration in the status may have others.
 FREE_AT_MOST, OCCUPIED_AT_LEAST = 25, 65
-# Values of a coverage grid, as ``wire.messages.maps.CoverageValue`` has them for arrays.
+# Values of a coverage grid, as in ``wire.messages.maps.CoverageValue``, which needs NumPy.
 TO_COVER, COVERED, RECOVERED, BLOCKED = 0, 50, 75, 100
-# A phone draws this many pixels easily.
+# Limit on the pixels of a grid message: a phone draws this many easily.
 MOST_PIXELS = 2_000_000
 COMPRESSION = 1
 
 
 def map_marks(settings: MapSettings) -> bytes:
-    """Return the mark of each byte of a map, by the limits in force."""
+    """Return the mark of each value of a map, by the thresholds in force."""
     free, occupied = settings.free_at_most, settings.occupied_at_least
     free = FREE_AT_MOST if free is None else free
     occupied = OCCUPIED_AT_LEAST if occupied is None else occupied
@@ -44,23 +44,23 @@ def _coverage_marks() -> bytes:
 
 
 def level_marks(top: int) -> bytes:
-    """Return the mark of each byte: ``LEVELS`` levels from 1 to ``top`` and above, 0 for 0."""
+    """Return the mark of each value: ``LEVELS`` levels for 1 to ``top``, 0 for 0."""
     levels = (-(-min(value, top) * LEVELS // top) for value in range(256))
     return bytes((1 << level) - 1 for level in levels)
 
 
 COVERAGE_MARKS = _coverage_marks()
-"""For a coverage grid, if no map is received."""
+"""Marks of a coverage grid, used if no map is received."""
 FLOOR_MARKS = level_marks(100)
-"""For a floor in percent."""
+"""Marks of swept floor in percent."""
 FIELD_MARKS = level_marks(255)
-"""For a pheromone field."""
+"""Marks of a pheromone field."""
 UNSWEPT_MARKS = bytes(1 << value - 1 if 1 <= value <= 6 else 0 for value in range(256))
-"""For the reasons of unswept floor: a bit for each."""
+"""Marks of unswept floor: a bit for each reason."""
 
 
 def grid_message(kind: str, grid: GridOctets, marks: bytes) -> bytes:
-    """Return a grid message for the page: placement and compressed marks."""
+    """Return a grid as a message for the page: its place and its compressed marks."""
     size, origin = grid.geometry, grid.geometry.origin
     octets = bytes(grid.octets).translate(marks)
     step = 1
@@ -81,7 +81,7 @@ def grid_message(kind: str, grid: GridOctets, marks: bytes) -> bytes:
 
 
 def merged(octets: bytes, cols: int, step: int) -> bytes:
-    """Return marks, rows of ``cols``, with each ``step`` x ``step`` of them made one."""
+    """Return marks, in rows of ``cols``, with each ``step`` x ``step`` of them merged."""
     width = -(-cols // step) * step
     rows = [octets[start : start + cols] for start in range(0, len(octets), cols)]
     parts = []

@@ -1,6 +1,6 @@
 """Messages between the server and its page: JSON, or a JSON head with a body of bytes.
 
-All text in them is sanitized here, once, before it is sent; the page shows text as text only.
+All text is sanitized here before it is sent; the page shows it as text only, never as HTML.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MOST_TEXT = 400
 _LENGTH = struct.Struct("<I")
 
 Role = Literal["viewer", "operator"]
-# Commands of the page: all but a reset of the coverage.
+# Commands that the page may send: all but ``reset``.
 Command = Literal[
     "start",
     "pause",
@@ -35,20 +35,20 @@ Command = Literal[
 
 
 class Hello(msgspec.Struct, tag="hello", tag_field="kind", forbid_unknown_fields=True):
-    """The first message of a page: its token."""
+    """The first message of a page, with its token."""
 
     token: str = ""
 
 
 class Wants(msgspec.Struct, tag="wants", tag_field="kind", forbid_unknown_fields=True):
-    """Whether the page shows the pheromone field, and where floor is not swept."""
+    """Whether the page shows the pheromone field, and unswept floor."""
 
     field: bool = False
     unswept: bool = False
 
 
 class Seek(msgspec.Struct, tag="seek", tag_field="kind", forbid_unknown_fields=True):
-    """The time of a recording to show, since it began [s]."""
+    """The time in a recording to show, since its beginning [s]."""
 
     at: float
 
@@ -59,10 +59,10 @@ class Order(msgspec.Struct, tag="command", tag_field="kind", forbid_unknown_fiel
     Attributes:
         id: returned with the reply.
         command: one of the page's commands.
-        order: what to cover, as in ``protocol/schema/mission.json``; only with ``start``.
-        discard: whether it may forget what is covered; only with ``start``.
-        keep_out: as in that schema; only with ``keep_out_add`` and ``keep_out_remove``.
-        room: as in that schema; only with the commands of rooms.
+        order: the order, as in ``protocol/schema/mission.json``; only for ``start``.
+        discard: whether covered cells may be forgotten; only for ``start``.
+        keep_out: as in that schema; only for ``keep_out_add`` and ``keep_out_remove``.
+        room: as in that schema; only for commands on rooms.
     """
 
     id: int
@@ -78,10 +78,10 @@ _DECODER: msgspec.json.Decoder[FromPage] = msgspec.json.Decoder(FromPage)
 
 
 def from_page(text: str | bytes) -> FromPage:
-    """Return the message of a page.
+    """Decode a message of the page.
 
     Raises:
-        msgspec.DecodeError: it is no such message.
+        msgspec.DecodeError: the message is invalid.
     """
     return _DECODER.decode(text)
 
@@ -92,7 +92,7 @@ def message_text(kind: str, **members: object) -> str:
 
 
 def framed(kind: str, head: dict[str, object], body: bytes) -> bytes:
-    """Return a message with a body: the length of its head (uint32), its head as JSON, the body."""
+    """Return a message of a head and a body: length of the head (uint32), JSON head, body."""
     encoded = message_text(kind, **head).encode()
     return _LENGTH.pack(len(encoded)) + encoded + body
 

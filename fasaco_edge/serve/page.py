@@ -1,4 +1,4 @@
-"""The page itself: one file, nothing from the network but what this server sends."""
+"""The HTML page: one file, which loads nothing from other servers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import hashlib
 from dataclasses import dataclass
 from importlib.resources import files
 
-# Concatenated in this order they are one script.
+# Files of the page's script, which are concatenated in this order.
 SCRIPTS = (
     "model.js",
     "view.js",
@@ -27,7 +27,7 @@ class Page:
 
     Attributes:
         body: HTML with style and script.
-        policy: its Content-Security-Policy without connect-src.
+        policy: Content-Security-Policy without connect-src.
     """
 
     body: bytes

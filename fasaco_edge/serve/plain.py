@@ -1,6 +1,6 @@
-"""The page's words for who owns the robot: what it does, needs and left unswept.
+"""The page's words for the owner of the robot: what it does, what it needs, what it left unswept.
 
-Reasons of the mission are for engineers, and stay in the page's details.
+The mission's own reasons are for engineers: the page shows them among its details.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ NEEDS = {
     "two_publishers": "Two programs send it different maps or places. Call service.",
     "no_effect": "A keep-out, its home or its dock lies where it has seen no floor. Check the map.",
 }
-"""What the owner can do, by the code of a trouble."""
+"""What the owner can do about a trouble, by its code."""
 UNSAVED = "It cannot save what it has swept: after a power cut it would start over. Call service."
 
-# Floor that is still to come, in the words of ``floor.left``.
+# Reasons in ``floor.left`` of floor that is yet to be swept.
 TO_COME = ("on the path", "to come", "not planned yet")
 CLOSED = "closed off: no way leads there that the robot fits through"
 BEHIND, OBSTACLES = "closed off by a keep-out zone", "closed off by obstacles"
@@ -77,14 +77,14 @@ LEFT = {
     "no longer free on the map": "something stands there now",
     "unknown to the map": "it has not seen that part",
 }
-"""Why floor was left, by the reason in the status."""
+"""Why floor was left, in the owner's words, by the reason in the status."""
 TRIED, OTHERWISE = "left over after", "for another reason"
 NOT_REACHED = "it could not get there"
 ENDED = "the work was ended before it got there"
-# If poses come too seldom, much floor is left, or not known to be swept.
+# Reason of the mission if poses come too seldom, and its words for the owner.
 FAR_APART = "poses are too far apart"
 SELDOM = "it may have missed that: its place was not known often enough"
-# Share of the floor in reach above which that is so.
+# Share of the reachable floor above which unswept floor has this reason.
 MUCH = 0.1
 PASSED, BESIDE = 8, 16
 MARKS = {
@@ -97,19 +97,19 @@ MARKS = {
     "not planned yet": BESIDE,
     "on the path": 32,
 }
-"""The mark in ``serve.marks.UNSWEPT_MARKS`` of each reason for which floor is left."""
+"""The mark of each reason for unswept floor, see ``serve.marks.UNSWEPT_MARKS``."""
 REST = 64
-"""A mark for free floor that is not swept, and has no other mark: no order asks for it any more."""
-# Reasons of cells that are no free floor: the areas of floor do not include them.
+"""The mark of other unswept floor, which is part of no order any more."""
+# Reasons of unreached cells that are no free floor, so that figures of floor lack them.
 NO_FLOOR = ("no longer free on the map", "unknown to the map")
-# Less is not worth a line [m2].
+# Least area that is listed [m2].
 LEAST_M2 = 0.05
-# At home, the robot is this near to it [m].
+# Distance from home up to which the robot counts as at home [m].
 NEAR_M = 0.5
 
 
 def does(status: Status) -> str:
-    """Return what the robot does now."""
+    """Return what the robot does now, in the owner's words."""
     mission, path = status.mission, status.path
     if status.state == "blocked" and mission.waits_for_room:
         return f"Waits for {mission.waits_for_room}"
@@ -128,7 +128,7 @@ def does(status: Status) -> str:
 
 
 def last_seen(status: Status) -> str:
-    """Return what the robot did when it was last seen."""
+    """Return what the robot did at its last status, in the owner's words."""
     did = does(status)
     return f"When last seen: {did[:1].lower()}{did[1:]}"
 
@@ -149,7 +149,7 @@ def _is_home(status: Status) -> bool:
 
 
 def needs(status: Status) -> list[str]:
-    """Return what the robot needs from its owner."""
+    """Return what the robot needs from its owner, in the owner's words."""
     found = [NEEDS.get(each.code, "Call service.") for each in status.troubles]
     if status.state == "blocked" and not found:
         found.append(UNKNOWN_ROOM if status.mission.waits_for_room else STUCK)
@@ -158,13 +158,13 @@ def needs(status: Status) -> list[str]:
 
 @dataclass(slots=True)
 class LeftFloor:
-    """Floor that is not swept for one reason.
+    """Unswept floor with one reason.
 
     Attributes:
+        reason: in the owner's words.
         m2: its area [m2].
-        reason: why, in the owner's words.
         marks: its marks on the map, see ``MARKS``.
-        places: where it is (x, y) [m], if it has no marks.
+        places: points (x, y) in it [m], if it has no marks.
     """
 
     reason: str
@@ -174,9 +174,9 @@ class LeftFloor:
 
 
 def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
-    """Return the floor of an order that is not swept, the largest part first.
+    """Return the unswept floor of an order, the largest part first.
 
-    ``ordered``: the newest status with an order, which may have been ended since.
+    ``ordered``: the newest status with an order, which may be over by now.
     """
     is_ended = status.mission.ordered is None
     if is_ended and (ordered is None or not (status.floor and status.floor.swept_m2)):
@@ -194,7 +194,7 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
         reason = _why_closed(of) if part.reason == CLOSED else LEFT.get(part.reason, OTHERWISE)
         _of(found, reason, MARKS.get(part.reason, 0)).m2 += part.m2
     for area in mission.unreached.areas:
-        # Where reasons of floor are known, cells are not counted, so that no spot counts twice.
+        # If the status has figures of floor, only cells outside of them count: none counts twice.
         if floor.left is None or area.reason in NO_FLOOR:
             is_tried = area.reason.startswith(TRIED)
             kind = _of(found, NOT_REACHED if is_tried else LEFT.get(area.reason, OTHERWISE))
@@ -205,7 +205,7 @@ def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
 
 
 def _why_left(part: FloorLeft, of: Status) -> tuple[str, int]:
-    """Return why a part of the floor in reach is left, in the owner's words, and its marks."""
+    """Return why a part of the reachable floor is left, in the owner's words, and its marks."""
     marks, areas = MARKS.get(part.reason, 0), of.mission.unreached.areas
     reachable_m2 = (of.floor and of.floor.reachable_m2) or math.inf
     is_far = FAR_APART in of.reason or any(FAR_APART in area.reason for area in areas)
@@ -218,7 +218,7 @@ def _why_left(part: FloorLeft, of: Status) -> tuple[str, int]:
 
 
 def _why_closed(of: Status) -> str:
-    """Return why no way leads to floor, in the owner's words: only cells tell what closes it."""
+    """Return why floor is closed off, in the owner's words, by the reasons of unreached cells."""
     m2 = {BEHIND: 0.0, OBSTACLES: 0.0}
     for area in of.mission.unreached.areas:
         if area.reason in m2:

@@ -1,4 +1,4 @@
-"""The page of a recording: for each requested time the messages that a live page had then."""
+"""The page of a recording: for a requested time, it sends the messages of a live page."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.schemas import PATH
 
 GRIDS = {"map": entities.MAP, "floor": entities.FLOOR, "field": entities.PHEROMONE}
-# The percentage of each opacity of swept floor.
+# Converts the opacity of swept floor into percent.
 PERCENT = bytes(min(round(100 * value / entities.SWEPT_OPACITY), 100) for value in range(256))
-# Points of the driven track: least distance [m], and number at most. Points farther apart than the
-# last value are a jump.
+# Driven track: least distance of its points [m], limit on their number, and distance above which
+# two points are a jump [m].
 SPACING_M, MOST_TRACK, JUMP_M = 0.03, 50_000, 1.0
-# Limit on the poses by which the progress on a path is found.
+# Limit on the poses used to find the progress along a path.
 MOST_POSES = 5_000
 
 
@@ -45,30 +45,30 @@ class RecordedView(ServedView):
     def __init__(self, robot: str) -> None:
         super().__init__(Keys())
         self.robot, self.robots = robot, {robot}
-        # Places of the drawn grids in the recording, to recognise newer ones.
+        # Place in the recording of each grid shown.
         self._drawn: dict[str, Place] = {}
 
     def silent_s(self, now: float) -> float:
-        """Return how long a recorded status is overdue [s]; 0 if it is not."""
+        """Return the age of the newest status [s]; 0 if the next one is not yet overdue."""
         silent = super().silent_s(now)
         return silent if silent > entities.STATUS_PERIOD_S + SILENCE_S else 0.0
 
     @property
     def reported_at(self) -> float:
-        """When its newest status came, since the epoch [s]."""
+        """Arrival of the newest status, since the epoch [s]."""
         return self._reported_at
 
     def _source(self, kind: str, now: float) -> object:
-        # The time to go changes with the place on the path, too.
+        # The remaining time depends on the progress along the path, too.
         return super()._source(kind, now), (self.walk.revision, self.walk.at, self.walk.beyond_m)
 
     def has(self) -> list[str]:
-        """Return the kinds of messages of which there is one."""
+        """Return the kinds of messages that have content."""
         made = {"path": self._path, "pose": self.pose} | self._grids
         return [kind for kind, content in made.items() if content is not None]
 
     def draw(self, kind: str, place: Place, timeline: Timeline) -> None:
-        """Take in a drawn grid, if it is a new one; raises as ``Timeline.grid``."""
+        """Take in a drawn grid unless it is shown already; errors as for ``Timeline.grid``."""
         if self._drawn.get(kind) == place:
             return
         self._drawn[kind] = place
@@ -89,18 +89,18 @@ class RecordedView(ServedView):
             self.take("path", Sample("", payload, PATH, attachment), now)
 
     def drive(self, poses: NDArray[np.float64], now: float) -> None:
-        """Move the robot along poses, float64 (n, 3), the last one ``now`` [s]."""
+        """Move the robot along poses, float64 (n, 3): x, y [m], yaw [rad]; the last one is now."""
         self._posed_at = now
         for x, y, yaw in poses.tolist():
             self._move(Pose2D(x, y, yaw))
 
 
 class Playback:
-    """A recording as the source of one viewer, who moves in it at will.
+    """A recording as the source of one viewer, who can seek in it.
 
     Args:
         timeline: the recording.
-        paths: its files.
+        paths: files of the recording.
     """
 
     def __init__(self, timeline: Timeline, paths: Sequence[Path]) -> None:
@@ -111,14 +111,14 @@ class Playback:
         self._rewind()
 
     def _rewind(self) -> None:
-        """Go back to before the recording."""
+        """Go back to the beginning of the recording."""
         self._view = RecordedView(self._robot)
         self._at_ns = 0
         self._path: Place | None = None
         self._abouts: dict[int, bytes] = {}
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
-        """Return the messages for the whole recording: its description, and the driven track."""
+        """Return the messages about the whole recording: its description and the driven track."""
         clock, names = self._timeline.clock, [path.name for path in self._paths]
         began_s, seconds = 1e-9 * clock.began_ns, clock.seconds(self._timeline.ended_ns)
         about = {"files": names[:2], "began_s": began_s, "seconds": seconds, "clock": clock.words}
@@ -130,12 +130,12 @@ class Playback:
         return []
 
     def at(self, at_s: float) -> list[str | bytes]:
-        """Return what changed since the time shown before, at a time since the recording began [s].
+        """Return the messages that changed from the time shown before to ``at_s``.
 
-        The time is the robot's.
+        ``at_s``: the robot's time since the recording began [s].
 
         Raises:
-            UnreadableRecording: it can no longer be read.
+            UnreadableRecording: a file can no longer be read.
         """
         timeline, clock = self._timeline, self._timeline.clock
         at_s = min(max(at_s, 0.0), clock.seconds(timeline.ended_ns))
@@ -153,8 +153,7 @@ class Playback:
             self._path, since_ns = path, path.at_ns
             line = timeline.line(path)
             view.follow(line, self._abouts.get(line.revision, b""), now)
-            # A path is known only once its message is made: then later poses move the robot along
-            # it.
+            # Making its message sets the path along which later poses move the robot.
             found = view.news(now)
         poses = timeline.poses_between(since_ns, at_ns)
         view.drive(poses[:: -(-len(poses) // MOST_POSES) or 1], now)
@@ -183,17 +182,20 @@ def _robot_of(sample: Sample) -> str:
 
 
 def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
-    """Return a path of about ``steps`` steps; a recording has its corners alone, float64 (n, 2)."""
+    """Return a path of at most ``steps`` equal steps through ``corners``, float64 (k, 2) [m].
+
+    A recording has the corners of a path only.
+    """
     ways = np.diff(corners, axis=0)
     lengths = np.hypot(*ways.T) if len(ways) else np.zeros(0)
-    # An invalid line is refused where it is encoded.
+    # The encoder refuses an invalid line.
     if len(lengths) >= steps or not np.isfinite(lengths).all():
         return corners
 
     def pieces_of(step_m: float) -> NDArray[np.int64]:
         return np.maximum(np.rint(lengths / step_m), 1.0).astype(np.int64)
 
-    # The least length of a step with which there are not more steps than that.
+    # Bisection for the least length of a step that gives at most ``steps`` steps.
     least, most = 0.0, float(lengths.sum()) or 1.0
     for _ in range(50):
         step_m = (least + most) / 2
@@ -206,7 +208,7 @@ def stepped(corners: NDArray[np.float64], steps: int) -> NDArray[np.float64]:
 
 
 def track_message(timeline: Timeline) -> bytes:
-    """Return the driven track as a message: points (x, y) [m], and when each was driven [s]."""
+    """Return the driven track as a message: points (x, y) [m], and their times [s]."""
     poses, at_s = timeline.poses, timeline.clock.all_seconds(timeline.pose_ns)
     ways = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=poses[:1, :2]).T)
     kept = np.diff(np.floor(np.cumsum(ways) / SPACING_M), prepend=-1.0) > 0

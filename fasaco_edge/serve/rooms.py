@@ -1,4 +1,4 @@
-"""The page's documents about rooms: where they are, how to tint them, and how much is swept."""
+"""The page's documents about rooms: outlines, tints and swept shares."""
 
 from __future__ import annotations
 
@@ -12,21 +12,24 @@ from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 
 Digest = dict[str, object]
 
-# Limit on what is shown of a received list.
+# Limit on the rooms shown.
 MOST_ROOMS = 250
-# The style sheet has this many tints; rooms this near to each other differ [m].
+# Number of tints in the style sheet; distance up to which two rooms get different tints [m].
 TINTS, NEAR_M = 6, 0.4
 
 
 def rooms(found: Rooms) -> Digest:
-    """Return rooms with their settings, and places of labels, without what a drive changes."""
+    """Return the document of rooms: outlines, settings, tints, and places of labels.
+
+    Swept shares have a document of their own, as they change while the robot drives.
+    """
     shown = [each for each in found.outlined[:MOST_ROOMS] if len(each.outline) <= MOST_CORNERS]
     tints = _tints(shown)
     return {"rooms": [_room(each, tints[each.id]) for each in shown]}
 
 
 def shares(found: Rooms) -> Digest:
-    """Return the swept share of each room by its number; null where nothing is to be swept."""
+    """Return the swept share of each room by its number; None if it has no floor to sweep."""
     share = {
         str(each.id): None if each.swept is None else round(each.swept, 2)
         for each in found.rooms[:MOST_ROOMS]
@@ -52,14 +55,14 @@ def _room(room: RoomReport, tint: int) -> Digest:
     }
 
 
-# Most rooms stay as they are when one changes.
+# The cache helps because most rooms stay unchanged.
 _label = lru_cache(MOST_ROOMS)(label_place)
 
 
 def _tints(found: Sequence[RoomReport]) -> dict[int, int]:
-    """Return a tint of each room, by its number, that no room near it has, if there are enough.
+    """Return a tint for each room by its number; rooms near to each other differ if possible.
 
-    A room decides after those of smaller numbers: a new room changes the tint of no older one.
+    Rooms are tinted in order of number, so that a new room does not change the tints of others.
     """
     bounds = {room.id: _bounds(room.outline) for room in found}
     tints: dict[int, int] = {}

@@ -1,4 +1,4 @@
-"""The page's view of a robot: its newest samples, as messages for browsers."""
+"""The page's view of a robot, which makes messages for browsers from its newest samples."""
 
 from __future__ import annotations
 
@@ -30,9 +30,10 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.grids import GridOctets, read_field, read_grid, with_update
 from fasaco_edge.wire.messages.path_points import PathPoints
 
-# Limit on the points shown of a path; reading a path takes some 4 us a point.
+# Limit on the points shown of a path; reading a point takes about 4 us.
 MOST_POINTS = 20_000
-# Limit on other robots, the most recently received; they publish once a second.
+# Limit on the number of other robots shown, and on the age of their positions [s]; each robot
+# publishes once a second.
 MOST_OTHERS, OTHER_LASTS_S = 50, 10.0
 # Least period of each message [s]; unchanged messages are not sent again.
 PERIODS_S = {
@@ -56,7 +57,7 @@ class ServedView(RobotState):
 
     Attributes:
         periods_s: least period of each message [s].
-        lacks_path: whether the robot is paused, and the path before that has not come.
+        lacks_path: whether the robot is paused, and the path before the pause is unknown.
     """
 
     periods_s: Mapping[str, float] = PERIODS_S
@@ -65,15 +66,15 @@ class ServedView(RobotState):
         super().__init__(keys.robot)
         self._keys = keys
         self._grids: dict[str, GridOctets] = {}
-        # The newest order by command, also after its end.
+        # The newest order given by command, kept after its end.
         self._last_order: dict[str, object] | None = None
         self._others: dict[str, tuple[float, float, float]] = {}
         self._path: Sample | None = None
-        # The newest path that leads anywhere: a paused robot goes on with it.
+        # The newest path that is not empty: a paused robot continues on it.
         self._to_drive: Sample | None = None
         self._way = Way()
         self.lacks_path = False
-        # The newest status with an order: what it left is shown after its end, too.
+        # The newest status with an order: unswept floor is shown after the order's end, too.
         self._ordered: Status | None = None
         self._readers |= {
             "map": self._read_map,
@@ -86,7 +87,7 @@ class ServedView(RobotState):
             "fleet": self._read_fleet,
         }
         self._makers: dict[str, Callable[[float], str | bytes | None]] = {
-            # The path comes first: the place on it, and the time to go, are by the newest.
+            # The path comes first: progress and remaining time refer to it.
             "path": self._path_message,
             "pose": lambda _: self._pose_message(),
             "state": lambda now: message_text(
@@ -103,12 +104,12 @@ class ServedView(RobotState):
             "others": lambda now: message_text("others", robots=list(self._near(now))),
         }
         self._made_at = dict.fromkeys(self._makers, float("-inf"))
-        # The source of the newest message of each kind.
+        # What the newest message of each kind was made from.
         self._made_of: dict[str, object] = {}
         self._sent: dict[str, str] = {}
 
     def news(self, now: float) -> dict[str, str | bytes]:
-        """Return the messages, by kind, that are due and changed."""
+        """Return the due and changed messages by kind."""
         found: dict[str, str | bytes] = {}
         for kind, make in self._makers.items():
             if now - self._made_at[kind] < self.periods_s[kind] or not self._is_new(kind, now):
@@ -129,7 +130,7 @@ class ServedView(RobotState):
         return True
 
     def _source(self, kind: str, now: float) -> object:
-        """Return the source of a message: an equal source makes an equal message."""
+        """Return what a message is made from: equal sources make equal messages."""
         made_of: dict[str, object] = {
             "pose": (self.pose, self.walk, self.walk.at),
             "path": self._shown_path,
@@ -142,7 +143,7 @@ class ServedView(RobotState):
             "unswept": self._grids.get("unswept"),
             "field": self._grids.get("field"),
         }
-        # Messages of other kinds depend on the path and the time, too.
+        # The other kinds depend on all of these.
         now_too = self.document, self.trouble, len(self.robots), self.walk, int(now)
         return made_of.get(kind, now_too)
 
@@ -163,7 +164,7 @@ class ServedView(RobotState):
         self._grids["map"] = read_grid(sample.payload)
 
     def _read_map_update(self, sample: Sample, _: float) -> None:
-        # Updates of a map sent before this process started are of no use.
+        # An update without its map is of no use: the map came before this process started.
         if "map" in self._grids:
             self._grids["map"] = with_update(self._grids["map"], sample.payload)
 
@@ -181,23 +182,23 @@ class ServedView(RobotState):
 
     @property
     def _shown_path(self) -> Sample | None:
-        """The newest path; of a paused robot, which has an empty one, that before the pause."""
+        """The newest path; for a paused robot, whose path is empty, the path before the pause."""
         is_paused = self.status is not None and self.status.state == "paused"
         is_stopped = self._path is not self._to_drive
         return self._to_drive or self._path if is_paused and is_stopped else self._path
 
     def _read_path(self, sample: Sample, _: float) -> None:
-        # Paths are frequent, so they are no events.
+        # A path makes no event, as paths are frequent.
         about = decode_document(sample.attachment or b"{}", PathAttachment)
         leads_on = PathPoints(sample.payload).left > 0
         self._path = sample
         if leads_on:
             self._to_drive = sample
-        elif not about.revision:  # a daemon begins, and goes on with no path from before
+        elif not about.revision:  # the daemon has restarted, and has no path to continue on
             self._to_drive = None
 
     def take_path_before(self, sample: Sample, now: float) -> None:
-        """Take in the path before a stop."""
+        """Take in the path before a pause."""
         try:
             if PathPoints(sample.payload).left:
                 self._to_drive = sample
@@ -246,7 +247,7 @@ class ServedView(RobotState):
         self.walk, self._way = PathProgress(xy, about.revision), Way(xy)
         if self.pose is not None:
             self.walk.join(self.pose)
-        # Far from 0, float32 does not resolve centimetres.
+        # Relative to the first point, as float32 does not resolve centimetres far from 0.
         x, y = xy[0] if xy else (0.0, 0.0)
         flat = array("f", (value for px, py in xy for value in (px - x, py - y)))
         if sys.byteorder == "big":
@@ -257,7 +258,7 @@ class ServedView(RobotState):
     def _map_message(self) -> bytes | None:
         if "map" in self._grids:
             return grid_message("map", self._grids["map"], map_marks(self.settings.map))
-        # In ROS 2, and for a map without a cache, the lattice shows free floor.
+        # Without a map, as under ROS 2, the coverage lattice shows free floor.
         cells = self._grids.get("coverage")
         return None if cells is None else grid_message("map", cells, COVERAGE_MARKS)
 

@@ -26,14 +26,14 @@ from fasaco_edge.serve.viewer import Source, Viewer, closing_on_error
 LOG = logging.getLogger(__name__)
 
 MOST_VIEWERS = 20
-# Limit on connections that are not yet authenticated: beyond it the oldest is closed. A page sends
-# its token at once, so silent connections block no page.
+# Limit on unauthenticated connections. Beyond it the oldest one is closed: a page sends its token
+# at once, so it is not affected.
 MOST_STRANGERS = 20
-# The longest order has a few hundred kilobytes.
+# Limit on a message of a page [bytes]: the longest order has a few hundred kilobytes.
 MOST_BYTES = 262_144
-# Timeout of a connection that is no page yet, and of one whose computer is gone [s].
+# Timeouts of the handshake, and of a viewer that does not answer pings [s].
 OPEN_S, PING_S = 5.0, 15.0
-# Send buffer for a viewer in this process [bytes], beside the message being sent.
+# Send buffer for each viewer, besides the message being sent [bytes].
 WAITING_BYTES = 65_536
 
 
@@ -41,8 +41,8 @@ class Server:
     """Serves one robot's page.
 
     Args:
-        guard: decides rights.
-        source_of: makes the source of a viewer's messages.
+        guard: decides the rights of clients.
+        source_of: returns the source of messages for a new viewer.
     """
 
     def __init__(self, guard: Guard, source_of: Callable[[], Source]) -> None:
@@ -50,7 +50,7 @@ class Server:
         self._source_of = source_of
         self._page = load_page()
         self._viewers: set[Viewer] = set()
-        # Connections without authentication, in order of arrival.
+        # Unauthenticated connections, in order of arrival.
         self._strangers: dict[Viewer, ServerConnection] = {}
         self._ended = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -62,10 +62,10 @@ class Server:
         *,
         ready: Callable[[], None] = lambda: None,
     ) -> None:
-        """Serve until SIGTERM or SIGINT; call ``ready`` once it listens.
+        """Serve until SIGTERM or SIGINT; call ``ready`` once the server listens.
 
         Raises:
-            OSError: it cannot listen there.
+            OSError: the server cannot listen at ``address``.
         """
         self._loop = asyncio.get_running_loop()
         stop = asyncio.Event()
@@ -76,7 +76,7 @@ class Server:
             *address,
             ssl=secured,
             process_request=self._answer,
-            compression=None,  # large messages are compressed once, for all
+            compression=None,  # large messages are compressed once, for all viewers
             server_header=None,
             open_timeout=OPEN_S,
             ping_interval=PING_S,
@@ -89,18 +89,18 @@ class Server:
             ready()
             release_unused()
             working = asyncio.create_task(asyncio.to_thread(self._work))
-            # If it fails the server ends, too: a page must not show old data for ever.
+            # If the thread fails, the server ends: a page must not show old data.
             working.add_done_callback(lambda _: stop.set())
             await stop.wait()
             self._ended.set()
         await working
 
     def _work(self) -> None:
-        """Work in a thread of its own until the server ends."""
+        """Do the server's work, in a thread of its own, until the server ends."""
         self._ended.wait()
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request that is no WebSocket; None lets one begin."""
+        """Return the response to a request; None accepts it as a WebSocket."""
         hosts = request.headers.get_all("Host")
         host = hosts[0] if len(hosts) == 1 else ""
         if not self._guard.is_ours(host):
@@ -121,7 +121,7 @@ class Server:
     def _response(self, status: HTTPStatus, body: str | bytes, host: str = "") -> Response:
         is_page = isinstance(body, bytes)
         content = body if isinstance(body, bytes) else f"{body}\n".encode()
-        # Old browsers do not count a WebSocket to 'self'.
+        # In old browsers 'self' does not include WebSockets.
         policy = f"{self._page.policy}; connect-src 'self' ws://{host} wss://{host}"
         headers = {
             "Content-Type": "text/html; charset=utf-8" if is_page else "text/plain; charset=utf-8",

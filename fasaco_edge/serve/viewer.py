@@ -1,4 +1,4 @@
-"""The connection of one browser: messages out, requests in, timeout if it hangs."""
+"""The connection of one browser: it sends messages and handles requests."""
 
 from __future__ import annotations
 
@@ -28,42 +28,42 @@ if TYPE_CHECKING:
 
 LOG = logging.getLogger(__name__)
 
-# Timeout of a client that does not identify itself, does not read, or sends no token [s].
+# Timeouts of the first message and of each message sent; delay before a token is rejected [s].
 HELLO_S, SEND_S, REFUSED_S = 5.0, 10.0, 1.0
 ANSWER_S = 8.0
-# Without news the server says this often that it is there [s]: the page takes one that is
-# silent for three times as long for gone, which no browser notices by itself.
+# Period of "alive" messages while nothing else is sent [s]. After three silent periods the page
+# takes the server for dead: a browser does not notice that by itself.
 ALIVE_S = 5.0
 # Close codes of a connection, from the range for applications.
 DENIED, MALFORMED = 4401, 4400
-# Commands that say where the robot must not drive.
+# Commands with areas that the robot must not enter.
 PLACING = ("start", "keep_out_add")
 
 
 class Source(Protocol):
-    """The source of messages, and the receiver of commands."""
+    """The source of messages, and receiver of commands."""
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:
-        """Return the newest messages: kind, number, message."""
+        """Return kind, number and content of the newest messages."""
 
     def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
         """Ask the daemon; blocks."""
 
     def at(self, at_s: float) -> list[str | bytes]:
-        """Return what a recording shows at a time since it began [s]; blocks.
+        """Return the messages of a recording at a time since its beginning [s]; blocks.
 
         Raises:
-            UnreadableRecording: it can no longer be read.
+            UnreadableRecording: a file can no longer be read.
         """
 
 
 class Viewer:
-    """A connection of one page. Nothing is queued: it gets the newest message when it is ready.
+    """The connection of one page. Nothing is queued: a page that is ready gets the newest messages.
 
     Attributes:
-        wants_field: whether it shows the pheromone field.
-        wants_unswept: whether it shows where floor is not swept.
-        news: set when there is a newer message.
+        wants_field: whether the page shows the pheromone field.
+        wants_unswept: whether the page shows unswept floor.
+        news: set when there are newer messages.
     """
 
     def __init__(self, socket: ServerConnection, source: Source, guard: Guard) -> None:
@@ -74,12 +74,12 @@ class Viewer:
         self._guard = guard
 
     async def greet(self) -> Role | None:
-        """Return its role; None if it is rejected."""
+        """Return the page's role by its first message; None if it is rejected."""
         async with asyncio.timeout(HELLO_S):
             first = from_page(await self._socket.recv())
         role = self._guard.role_of(first.token) if isinstance(first, Hello) else None
         if role is None:
-            # Rate limit for guessing tokens: one a second on each connection.
+            # Limits the rate at which tokens can be guessed.
             await asyncio.sleep(REFUSED_S)
             await self._send(
                 message_text("denied", asks=isinstance(first, Hello) and not first.token)
@@ -90,7 +90,7 @@ class Viewer:
         return role
 
     async def serve(self, role: Role) -> None:
-        """Send new messages and handle its requests, until it closes or hangs."""
+        """Send new messages and handle requests until the connection ends."""
         sending = asyncio.create_task(self._send_news())
         try:
             async for text in self._socket:
@@ -165,7 +165,7 @@ class Viewer:
 
 @contextlib.asynccontextmanager
 async def closing_on_error(socket: ServerConnection) -> AsyncIterator[None]:
-    """Close the connection if the viewer sends an invalid message, or asks for unreadable data."""
+    """Close the connection if the viewer sends an invalid message, or requests unreadable data."""
     try:
         yield
     except (msgspec.DecodeError, TimeoutError, RecursionError):

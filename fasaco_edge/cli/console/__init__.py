@@ -1,1 +1,1 @@
-"""Common parts of commands: arguments, terminal, logs, exit codes, signals."""
+"""Common parts of commands: arguments, help, terminal, logs, exit codes."""

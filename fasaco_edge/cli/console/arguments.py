@@ -1,6 +1,6 @@
-"""A command: its description, its exit codes, and the arguments that several commands share.
+"""The description of a command, exit codes, arguments that several commands share, output files.
 
-A file that a command writes is checked before the work begins, so that no work is wasted.
+Output files are checked before the work begins, so that no work is lost.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 DEFAULT_CELL_M = 0.3
 DEFAULT_RADIUS_M = 0.18
-# Environment variables in place of options that are always the same.
+# Environment variables that set the defaults of --robot and --connect.
 ROBOT, CONNECT = "FASACO_ROBOT", "FASACO_CONNECT"
 
 
@@ -48,10 +48,10 @@ class Command:
 
     Attributes:
         description: text at the start of ``--help``.
-        run: carries it out, and returns the exit code.
-        add_options: declares the options it takes.
-        epilog: text at the end of ``--help``, printed unchanged.
-        is_group: whether it has commands of its own, which take the common options in its place.
+        run: runs the command, and returns the exit code.
+        add_options: declares the options of the command.
+        epilog: text at the end of ``--help``.
+        is_group: whether the command has subcommands, each of which takes the common options.
     """
 
     description: str
@@ -70,7 +70,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         metavar="LEVEL",
         help="log on standard error: debug, info, warning or error (default: %(default)s)",
     )
-    # Given to processes that other commands start, so that they end with their parent.
+    # For processes that other commands start, so that they end with their parent.
     parser.add_argument("--with-parent", type=int, metavar="PID", help=argparse.SUPPRESS)
 
 
@@ -96,28 +96,28 @@ def pair_of_floats(text: str) -> tuple[float, float]:
         x, y = (float(part) for part in text.split(","))
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be x,y in metres, got {text!r}") from None
-    # A negated comparison, so that NaN is caught too.
+    # The comparison is negated to catch NaN.
     if not (abs(x) <= MAX_COORDINATE_M and abs(y) <= MAX_COORDINATE_M):
         raise argparse.ArgumentTypeError(f"must be within {MAX_COORDINATE_M:g} m of 0, got {text}")
     return x, y
 
 
 def seconds(text: str) -> float:
-    """Read a time to wait [s]."""
+    """Read a timeout [s]."""
     try:
         value = float(text)
     except ValueError:
         value = 0.0
-    # A negated comparison, so that NaN is caught too.
+    # The comparison is negated to catch NaN.
     if not 0 < value <= 3600:
         raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
     return value
 
 
 def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) -> None:
-    """Add the options of a robot and its bus; read them by ``robot_on_bus``.
+    """Add the options of a robot and its bus, which ``robot_on_bus`` reads.
 
-    ``config``: also ``--config``, where a command has none of its own.
+    ``config``: whether to add ``--config``, too; False for a command with its own.
     """
     if config:
         parser.add_argument(
@@ -148,12 +148,12 @@ def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) ->
 
 
 class RobotOnBus(NamedTuple):
-    """A robot on the bus, and the session that a client of it opens.
+    """A robot on the bus, and the settings of its client's session.
 
     Attributes:
-        keys: the robot's keys.
-        bus: how to join its bus.
-        config: of ``--config``; None without.
+        keys: keys of the robot.
+        bus: settings of the session.
+        config: configuration given by ``--config``; None for none.
     """
 
     keys: Keys
@@ -162,8 +162,7 @@ class RobotOnBus(NamedTuple):
 
 
 def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
-    """Return what the options of ``add_robot_on_bus`` say; else ``--config``, the environment,
-    the defaults, in this order.
+    """Return the robot and bus by options, ``--config``, environment and defaults, in this order.
 
     Raises:
         BadConfiguration: a name or an endpoint is invalid, or the configuration or the credentials
@@ -182,14 +181,14 @@ def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
             bus = _client("--connect", tuple(args.connect or bus.connect), args.security)
         return RobotOnBus(keys, bus, config)
     keys = Keys(args.robot or os.environ.get(ROBOT) or "robot", args.base or "fasaco")
-    told = [one.strip() for one in os.environ.get(CONNECT, "").split(",") if one.strip()]
-    connect = tuple(args.connect or told or (DEFAULT_ENDPOINT,))
+    listed = [one.strip() for one in os.environ.get(CONNECT, "").split(",") if one.strip()]
+    connect = tuple(args.connect or listed or (DEFAULT_ENDPOINT,))
     name = "--connect" if args.connect else f"${CONNECT}"
     return RobotOnBus(keys, _client(name, connect, args.security))
 
 
 def _client(name: str, connect: tuple[str, ...], security_file: str | None) -> BusSettings:
-    """Return the settings of a client; ``name`` is that of the option that has the endpoints."""
+    """Return the settings of a client; ``name``: source of the endpoints, for errors."""
     from fasaco_edge.bus.settings import BusSettings
     from fasaco_edge.config.endpoints import endpoint_faults
 
@@ -205,17 +204,17 @@ def _client(name: str, connect: tuple[str, ...], security_file: str | None) -> B
 
 
 def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
-    """Check that files can be written; None is no file.
+    """Check that files can be written.
 
     Args:
-        outputs: files to write.
-        inputs: files to read: none may be overwritten.
+        outputs: files to write; None is skipped.
+        inputs: files to read, which must not be overwritten.
 
     Raises:
-        BadConfiguration: one is a folder, its folder is missing or not writable, it is also an
+        BadConfiguration: a file is a folder, its folder is missing or not writable, it is also an
             input, or two outputs are the same.
     """
-    # Unlike Path's methods these do not raise on names no file system takes.
+    # The functions of os.path do not raise for invalid names, as Path's methods do.
     taken = {os.path.realpath(file): "it is read from" for file in inputs}
     for file in filter(None, outputs):
         target = os.path.realpath(file)
@@ -236,7 +235,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -
 
 @contextmanager
 def naming(place: Path) -> Iterator[None]:
-    """Raise an error that names ``place`` if the block cannot write there, as on a full disk.
+    """Turn an OSError of the block into an error that names ``place``.
 
     Raises:
         BadConfiguration: the block raised OSError.
@@ -249,10 +248,10 @@ def naming(place: Path) -> Iterator[None]:
 
 @contextmanager
 def writing(file: Path) -> Iterator[Path]:
-    """Yield the name to write ``file`` under, see ``host.outputs.whole``.
+    """Yield a temporary name under which to write ``file``, see ``host.outputs.whole``.
 
     Raises:
-        BadConfiguration: it cannot be written.
+        BadConfiguration: the file cannot be written.
     """
     with naming(file), whole(file) as new:
         yield new

@@ -16,7 +16,7 @@ _ROW = re.compile(r"( +\S.*? {2,})\S")
 
 
 class HelpText(argparse.HelpFormatter):
-    """Lays out descriptions and epilogs as well as options: prose is filled, tables are kept."""
+    """Lays out descriptions, epilogs and options: prose is filled, tables are kept."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, width=min(shutil.get_terminal_size().columns, WIDEST + 2) - 2)
@@ -29,17 +29,17 @@ class HelpText(argparse.HelpFormatter):
 
 
 def fitted(text: str, width: int) -> str:
-    """Return a text with lines of at most ``width`` characters; those that fit stay as they are.
+    """Return a text with lines of at most ``width`` characters; lines that fit are unchanged.
 
-    Lines that are not indented are prose. An indented line is a row: what it goes on with stands
-    below its second column, which follows two spaces, or further in than the row. A command stays
-    on one line, to be copied.
+    Lines without indentation are prose. An indented line is a row of a table; two or more spaces
+    separate its columns. Its continuation lines align with the second column, or are indented more
+    than the row. A command stays on one line, so that it can be copied.
     """
     return "\n".join(line for block in _blocks(text.strip("\n")) for line in _laid(block, width))
 
 
 def _blocks(text: str) -> Iterator[list[str]]:
-    """Yield the lines of each paragraph, row and gap."""
+    """Yield the lines of each paragraph, row and blank line."""
     block: list[str] = []
     for line in text.splitlines():
         if block and not _goes_on(block[0], line):
@@ -70,7 +70,7 @@ def _laid(block: list[str], width: int) -> list[str]:
     begin = row[1] if row else first
     words = words[len(begin.strip()) :].strip()
     if is_command or len(begin) > width - LEAST_COLUMN:
-        # The second column stands below the first.
+        # The second column goes below the first.
         below = inward + "    "
         return [begin.rstrip(), *_wrap(words, width, below, below)]
     return _wrap(words, width, begin, " " * len(begin))

@@ -1,7 +1,7 @@
-"""Logging: to standard error, or to the systemd journal where standard error leads there.
+"""Logging to standard error, which may be the systemd journal.
 
-Lines are rate-limited: one of a kind in ten seconds, with the number of suppressed lines. For the
-journal each begins with its priority, as sd-daemon(3) has it.
+Lines are rate-limited: one of each kind in ten seconds, with the number of suppressed lines. In the
+journal each line begins with its priority, see sd-daemon(3).
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ class _Kind:
 
 
 class RateLimiter(logging.Handler):
-    """Passes on one line of each kind in ten seconds to another handler.
+    """Passes one line of each kind in ten seconds to another handler.
 
-    The kind is the event and its code, if a line has them (``extra``), else the whole text.
-    The next line of a kind states how many were suppressed; if none follows within the ten seconds,
-    the last suppressed line is passed on, with that number.
+    The kind of a line is its event, code and state (``extra``) if it has an event, else its text.
+    After the ten seconds, the next line of the kind has the number of suppressed lines. If a line
+    of another kind comes first, the last suppressed line is passed on, with that number.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class RateLimiter(logging.Handler):
                 continue
             del self._kinds[kind]
             if known.last is not None:
-                # This line counts for its kind, too, so the ten seconds begin again.
+                # The line that is passed on begins another ten seconds.
                 self._kinds[kind] = _Kind(now + PERIOD_S)
                 _add_count(known.last, known.left_out - 1)
                 self._target.handle(known.last)
@@ -91,14 +91,14 @@ def _add_count(record: logging.LogRecord, left_out: int) -> None:
 
 
 LOG = logging.getLogger(__name__)
-# Longest text of a line: an error that lists all faults of a file, or a traceback [characters].
+# Longest message, such as all faults of a file, or a traceback [characters].
 MOST_CHARACTERS = 20_000
-# syslog(3): critical, error, warning, info, debug.
+# Log level and syslog(3) priority: critical, error, warning, info, debug.
 PRIORITIES = ((50, 2), (40, 3), (30, 4), (20, 6), (0, 7))
 
 
 def is_journal() -> bool:
-    """Return whether standard error leads to the journal, and was not redirected."""
+    """Return whether standard error is the journal."""
     try:
         there = os.fstat(sys.stderr.fileno())
     except (OSError, ValueError):
@@ -107,19 +107,19 @@ def is_journal() -> bool:
 
 
 class OneLine(logging.Formatter):
-    """Writes an entry as one line, for any text; a traceback follows, indented."""
+    """Formats an entry as one line; an indented traceback may follow."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's name
         """Return the line."""
         return one_line(super().formatMessage(record))
 
     def formatException(self, ei: Any) -> str:  # noqa: ANN401, N802 - logging's names
-        """Return a traceback none of whose lines looks like an entry of the log."""
+        """Return an indented traceback, so that no line looks like an entry."""
         return f"    {_indented(super().formatException(ei))}"
 
 
 class JournalLine(OneLine):
-    """Writes the priority before each line."""
+    """Formats an entry with the priority before each line."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return an entry, with its traceback."""
@@ -128,12 +128,12 @@ class JournalLine(OneLine):
 
 
 def begin_logging(level: str) -> None:
-    """Log entries of ``level`` and above."""
+    """Set up logging of entries of ``level`` and above."""
     target = logging.StreamHandler()
     if is_journal():
         target.setFormatter(JournalLine("%(message)s"))
         sys.excepthook = _log_uncaught
-        # If the watchdog ends a service that hangs (SIGABRT), the log shows the place.
+        # Logs a traceback when the watchdog ends a hanging service by SIGABRT.
         faulthandler.enable()
     else:
         target.setFormatter(OneLine("%(levelname)s %(name)s: %(message)s"))
@@ -146,7 +146,7 @@ def report_error(error: FasacoError) -> None:
         text = f"{error} ({error.hint})" if error.hint else str(error)
         LOG.error("%s", text, extra={"event": "failure", "code": error.code})
         return
-    # Further lines of a message are indented more than the hint, so that none looks like one.
+    # Further lines of a message are indented more than the hint, so that none looks like a hint.
     print("fasaco-edge:", _indented(str(error)), file=sys.stderr)
     if error.hint:
         print("  hint:", _indented(error.hint), file=sys.stderr)

@@ -1,58 +1,57 @@
-"""A parser of command lines that says first what is wrong, and what was perhaps meant."""
+"""A parser of command lines whose errors suggest what was probably meant."""
 
 from __future__ import annotations
 
 import argparse
 import re
 import sys
-from collections.abc import Iterable, Sequence
-from difflib import get_close_matches
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from fasaco_edge.cli.console.help import HelpText
+from fasaco_edge.text import nearest
 
 USAGE = 2
 """Exit code of a wrong command line."""
 
 
 class Parser(argparse.ArgumentParser):
-    """Parses a command line; parsers of its commands are of this class, too."""
+    """Parses a command line; the parsers of commands have this class, too."""
 
     def __init__(self, **options: Any) -> None:  # noqa: ANN401 - those of argparse
         super().__init__(**{"formatter_class": HelpText} | options)
-        # Values such as -1,2 are places, too, and no options.
+        # A value such as -1,2 is a position, and no option.
         self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Return the arguments and unknown ones; ``parser`` is that of the innermost command."""
+        """Return the arguments, and unknown words; ``parser``: parser of the innermost command."""
         found, unknown = super().parse_known_args(args, namespace)
         if not hasattr(found, "parser"):
             found.parser = self
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong, and exit."""
+        """Print an error, and exit."""
         print(f"{self.prog}: {message}\nsee: {self.prog} --help", file=sys.stderr)
         sys.exit(USAGE)
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
-        """Say which arguments are unknown, and what was perhaps meant, and exit."""
+        """Print the unknown arguments and a suggestion, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
-        meant = "".join(f"did you mean {name}?" for name in _close(names[:1], options))
+        meant = _suggestion(names[0], options) if names else ""
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401
         if action.choices is None or value in action.choices:
             return
         names = [str(choice) for choice in action.choices]
-        meant = "".join(f"did you mean {name}?" for name in _close([str(value)], names))
-        meant = meant or f"there are {', '.join(names)}"
+        meant = _suggestion(str(value), names) or f"there are {', '.join(names)}"
         raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {meant}")
 
 
-def _close(words: Iterable[str], names: Sequence[str]) -> list[str]:
-    """Return the name closest to each word that is close to one."""
-    return [name for word in words for name in get_close_matches(word, names, 1)]
+def _suggestion(word: str, names: Sequence[str]) -> str:
+    """Return a question for the name that ``word`` resembles; "" for none."""
+    return "".join(f"did you mean {name}?" for name in nearest(word, names)[:1])

@@ -17,12 +17,11 @@ WORDS = (
 
 
 def add_passes(group: argparse._ActionsContainer, help_text: str) -> None:
-    """Add the option, a tuple of passes; None if it is not given."""
+    """Add the option: its value is a tuple of passes, None if it is not given."""
     group.add_argument("--passes", type=_passes, metavar="N|PASS,...", help=help_text)
 
 
 def _passes(text: str) -> tuple[Pass, ...]:
-    """Read passes."""
     try:
         return read_passes(text)
     except BadConfiguration as error:

@@ -1,4 +1,4 @@
-"""The files of a recording, as the command line names them: of several runs the newest."""
+"""The choice of the newest run among the recordings named on the command line."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.errors import DifferentRuns
 from fasaco_edge.recording.read.frames import is_fleet_recording, recording_id
 
-# run00002-20261130T064945Z-robot: which one, when, and of what robot.
+# Number, time and robot of a run: run00002-20261130T064945Z-robot.
 _NAME = re.compile(r"(run\d+|)-?\d{8}T\d{6}Z-(?P<robot>.*)")
 
 
 def files_of_a_run(paths: Sequence[Path]) -> list[Path]:
-    """Return the files of the newest run, and say that there are others.
+    """Return the files of the newest run; print a note if there are other runs.
 
-    The recording of a whole fleet goes before those of its robots.
+    If there is a fleet's recording, those of its robots are ignored.
 
     Raises:
-        DifferentRuns: they are of several robots.
+        DifferentRuns: the files are of several robots.
         UnreadableRecording: a file is missing, or is no recording.
     """
     fleets = [path for path in paths if is_fleet_recording(path)]
     runs: dict[str, list[Path]] = {}
     for path in fleets or paths:
         runs.setdefault(recording_id(path), []).append(path)
-    # A recorder that was killed just after it began a part left no name in it.
+    # A part has no name if its recorder was killed just after it began.
     nameless = runs.pop("", [])
     robots = {match["robot"] if (match := _NAME.match(run)) else run for run in runs}
     if len(robots) > 1:

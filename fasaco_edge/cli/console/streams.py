@@ -1,7 +1,7 @@
-"""Clean standard output and error: no text that is printed can control a terminal.
+"""Sanitized standard output and error: no printed text can control a terminal.
 
-Tracebacks and the parser's errors go through here, too; tables and progress bars, which have
-escapes of their own, through ``cli.console.terminal``.
+Tracebacks and the parser's errors are sanitized here. Tables and progress bars, which need escape
+sequences, are sanitized by ``cli.console.terminal``.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from fasaco_edge.text import json_line, lines
 class CleanStream:
     """A text stream that escapes control characters, except line ends and tabs.
 
-    While a progress bar is drawn on the terminal, the bar's console prints the lines, above it.
-    The stream stays the same object meanwhile: the handler of the log keeps it, too.
+    While a progress bar is shown, the bar's console prints the lines above it. The stream stays the
+    same object, as the handler of the log refers to it.
     """
 
     def __init__(self, stream: TextIO) -> None:
-        # Rich finds the stream itself by this name: the escapes that Rich writes must stay.
+        # Rich writes to the stream of this name, so that its escape sequences are kept.
         self.rich_proxied_file = stream
         self._print: Callable[[str], None] | None = None
         self._begun = ""
         self._lock = threading.RLock()
 
     def write(self, text: str) -> int:
-        """Write; return how much of ``text`` that was, all of it."""
+        """Write ``text``; return its length."""
         with self._lock:
             if self._print is None:
                 self.rich_proxied_file.write(lines(text))
@@ -44,7 +44,7 @@ class CleanStream:
 
     @contextmanager
     def printed_by(self, print_lines: Callable[[str], None]) -> Iterator[None]:
-        """Pass whole lines to ``print_lines`` at once; an unfinished line waits for the end."""
+        """Within the context, pass whole lines to ``print_lines``; a last partial line follows."""
         with self._lock:
             self._print = print_lines
         try:
@@ -55,7 +55,7 @@ class CleanStream:
                 self.rich_proxied_file.write(begun)
 
     def writelines(self, texts: Iterable[str]) -> None:
-        """Write one after the other."""
+        """Write all texts."""
         for text in texts:
             self.write(text)
 
@@ -64,15 +64,15 @@ class CleanStream:
 
 
 def open_missing_streams() -> None:
-    """Stand in for standard streams that the caller has closed.
+    """Open /dev/null for each standard stream that the caller has closed.
 
-    Else the next file or socket that is opened has a stream's number, and gets what is printed.
+    Otherwise the next opened file or socket gets the stream's number, and what is printed.
     """
     for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
         try:
             os.fstat(number)
         except OSError:
-            # The opened file gets the lowest free number, which is this one.
+            # open returns the lowest free number, which is this one.
             os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
@@ -83,7 +83,7 @@ def clean_streams() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, CleanStream):
-            # Characters that the locale lacks are shown as escapes: names may hold any text.
+            # Characters that the locale lacks are escaped: names may have any.
             if isinstance(stream, TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
             setattr(sys, name, cast("TextIO", CleanStream(stream)))
@@ -91,7 +91,7 @@ def clean_streams() -> None:
 
 @contextmanager
 def printed_by(print_lines: Callable[[str], None]) -> Iterator[None]:
-    """Pass the lines of each output that leads to a terminal to ``print_lines``."""
+    """Within the context, pass lines printed to a terminal to ``print_lines``."""
     with ExitStack() as stack:
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, CleanStream) and stream.isatty():
@@ -100,5 +100,5 @@ def printed_by(print_lines: Callable[[str], None]) -> Iterator[None]:
 
 
 def print_json(document: object) -> None:
-    """Print a document as one line of JSON, which needs no escapes but its own."""
+    """Print a document as one line of JSON."""
     print(json_line(document))

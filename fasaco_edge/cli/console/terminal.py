@@ -34,10 +34,11 @@ from fasaco_edge.cli.console.streams import printed_by
 from fasaco_edge.host.processes import first_signal_calls
 from fasaco_edge.text import lines, one_line
 
-# Widths of the columns of progress, without the space before each [characters].
+# Usual width of a terminal, and widths of the columns of progress, without the space before each
+# [characters].
 USUAL_WIDTH, WIDE_BAR, NARROW_BAR, CLOCK, COUNT = 80, 32, 16, 7, 13
 LEAST_DESCRIPTION = 8
-# Room for the ``^C`` that a terminal adds.
+# Space for the ``^C`` that a terminal prints [characters].
 RIGHT_MARGIN = 2
 
 
@@ -47,18 +48,18 @@ class CleanConsole(Console):
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
         if self.is_dumb_terminal and self.file.isatty() and "COLUMNS" not in os.environ:
-            # Rich takes each of these for one of 80 columns.
+            # Rich assumes 80 columns for such a terminal.
             size = os.get_terminal_size(self.file.fileno())
             self.width, self.height = size.columns or self.width, size.lines or self.height
 
     def render_str(self, text: str, **options: Any) -> Text:  # noqa: ANN401 - as rich has them
-        """Return a string as text; before it is laid out, so that its width is right."""
+        """Return a string as sanitized text; done before the layout, which needs its width."""
         return super().render_str(one_line(text), **options)
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Yield the sanitized output, also of text from other renderables."""
+        """Yield the sanitized output of any renderable."""
         for segment in super().render(renderable, options):
             yield segment if segment.control else segment._replace(text=lines(segment.text))
 
@@ -71,7 +72,7 @@ def out() -> Console:
 
 @cache
 def err() -> Console:
-    """Return the console for progress and remarks; all share one, which knows of the bar."""
+    """Return the console for progress and remarks, shared so that lines go above a progress bar."""
     return CleanConsole(stderr=True)
 
 
@@ -82,10 +83,10 @@ def can_draw(console: Console) -> bool:
 
 
 class ProgressLines(Progress):
-    """Lines at the lower end of the terminal that show progress, and leave nothing behind.
+    """Lines at the bottom of the terminal that show progress, and vanish at the end.
 
-    What is printed and logged meanwhile appears above them. Without a terminal that can move its
-    cursor they are ``disable``d, and nothing is written.
+    Printed and logged text appears above them. On a terminal that cannot move its cursor they are
+    ``disable``d, and nothing is written.
     """
 
     def __init__(self, *columns: ProgressColumn | str, expand: bool = False) -> None:
@@ -95,7 +96,7 @@ class ProgressLines(Progress):
             console=console,
             expand=expand,
             transient=True,
-            # Rich would put a stream of its own before ours, and then write escapes into ours.
+            # Rich's own redirection would write escape sequences into CleanStream.
             redirect_stdout=False,
             redirect_stderr=False,
             disable=not can_draw(console),
@@ -108,7 +109,7 @@ class ProgressLines(Progress):
             return
         super().start()
         self._while_shown.enter_context(printed_by(self._print_above))
-        # By default SIGTERM ends the process at once, and nothing would show the cursor again.
+        # SIGTERM would end the process at once, and leave the cursor hidden.
         if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
             self._while_shown.enter_context(first_signal_calls(signal.SIGTERM, self._terminate))
 
@@ -119,7 +120,7 @@ class ProgressLines(Progress):
             self._while_shown.close()
 
     def get_renderable(self) -> RenderableType:
-        """Return the text shown, with room beside it for the ``^C`` that a terminal adds."""
+        """Return the text shown, with space beside it for ``^C``."""
         return Constrain(super().get_renderable(), max(err().width - RIGHT_MARGIN, 1))
 
     def _print_above(self, text: str) -> None:
@@ -131,18 +132,15 @@ class ProgressLines(Progress):
 
 
 class Description(TextColumn):
-    """What is done, cut where it would take the room of the columns beside it.
-
-    Rich would make these narrower instead: the bar, and the clock.
-    """
+    """The description of a task, truncated so that bar and clock keep their width."""
 
     def __init__(self, beside: int, style: StyleType = "none") -> None:
-        """``beside`` is the width of the other columns, each with the space before it."""
+        """``beside``: width of the other columns, with the space before each [characters]."""
         super().__init__("{task.description}", style=style, markup=False)
         self._beside = beside
 
     def render(self, task: Task) -> Text:
-        """Return the text, cut."""
+        """Return the truncated text."""
         text = super().render(task)
         room = err().width - RIGHT_MARGIN - self._beside
         text.truncate(max(room, LEAST_DESCRIPTION), overflow="ellipsis")
@@ -150,7 +148,7 @@ class Description(TextColumn):
 
 
 def progress(*, counted: bool = True) -> Progress:
-    """Return a progress bar; ``counted`` shows how much is done."""
+    """Return a progress bar; ``counted``: whether it shows numbers."""
     count = (MofNCompleteColumn(),) if counted else ()
     bar = WIDE_BAR if err().width >= USUAL_WIDTH else NARROW_BAR
     return ProgressLines(
@@ -172,7 +170,7 @@ def figures(rows: Iterable[tuple[str, str]]) -> Table:
 
 
 def known(document: Mapping[str, object]) -> list[tuple[str, str]]:
-    """Return names and values of a document's members as text, without those that are null."""
+    """Return names and values of a document's members as text, without null ones."""
     return [
         (name, ", ".join(f"{key} {part}" for key, part in value.items()))
         if isinstance(value, Mapping)
@@ -183,7 +181,7 @@ def known(document: Mapping[str, object]) -> list[tuple[str, str]]:
 
 
 def summary(rows: Iterable[tuple[str, str]]) -> Table:
-    """Return names and words of a few figures, without lines between them."""
+    """Return a table of names and values without borders."""
     table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     table.add_column(style="cyan", no_wrap=True)
     table.add_column()
@@ -193,7 +191,7 @@ def summary(rows: Iterable[tuple[str, str]]) -> Table:
 
 
 def command(name: str = "fasaco-edge") -> str:
-    """Return what a person types in this folder to run a program of this installation."""
+    """Return the command that runs a program of this installation in the current folder."""
     path, found = Path(sysconfig.get_path("scripts"), name), shutil.which(name)
     if not path.exists() or (found is not None and path.samefile(found)):
         return name
@@ -202,12 +200,12 @@ def command(name: str = "fasaco-edge") -> str:
 
 
 def may_ask() -> bool:
-    """Return whether a person can read a question, and answer it."""
+    """Return whether a user can read and answer a question."""
     return sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def agrees(*facts: str) -> bool:
-    """Show facts, and ask whether to go on; all answers but yes mean no."""
+    """Print facts, and ask whether to continue; any answer but yes means no."""
     console = err()
     for fact in facts:
         console.print(fact)

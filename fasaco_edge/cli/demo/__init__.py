@@ -1,4 +1,4 @@
-"""``fasaco-edge demo``: a mission of simulated robots, one or several, in an unknown building."""
+"""``fasaco-edge demo``: a mission of one or more simulated robots in an unknown building."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the mission; 0 if every reachable cell was covered, or the user quits it."""
+    """Run the mission; return 0 if every reachable cell was covered, or the user quits."""
     from fasaco_edge.cli.demo.mission import DemoMission
     from fasaco_edge.cli.demo.robots import demo_robots
     from fasaco_edge.cli.demo.summary import print_summary, summarise
@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
     out: Path = args.out or RUNS / f"{datetime.now():%Y-%m-%dT%H-%M-%S}"
     with naming(out):
         if args.out is None:
-            # The user did not choose this folder, and another user may have created it.
+            # Another user may have created this folder: the name is not chosen by the user.
             make_own_folder(RUNS)
             make_own_folder(out)
         out.mkdir(parents=True, exist_ok=True)
@@ -116,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     err().print(f"kernels ready ({seconds:.1f} s); results go to {out}; {simulated}")
     robots = demo_robots(args, out)
     for robot in robots:
-        # A demo writes this file, and must not overwrite one that no demo wrote.
+        # Overwrite a configuration only if a demo wrote it.
         if robot.config.exists() and not (robot.folder / "daemon.log").exists():
             raise BadConfiguration(
                 f"--out {out}: {robot.config} exists, and is not from a demo",

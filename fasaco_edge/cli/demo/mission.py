@@ -1,4 +1,4 @@
-"""The processes of the demo: daemons with recorders, and robots; from their start to their end."""
+"""The processes of a demo, daemons with recorders and robots, from start to end."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from fasaco_edge.wire.keys import Keys
 
 STOP_TIMEOUT_S = 8.0
 RECORDERS_WITHIN_S = 60.0
-# "Done" has to hold for some maps [simulated s]: the last one may still be on its way.
+# Time for which the state must stay "done" [simulated s]: a last map may still arrive.
 SETTLE_SIM_S = 3.0
-# Programs that subscribe to the robots, by the names of their logs.
+# Programs that end after the robots, as they record them, by the names of their logs.
 LAST = ("daemon", "fleet")
 AT_WORK = ("planning", "covering", "degraded")
 
@@ -44,9 +44,9 @@ class Ending:
 
     Attributes:
         statuses: the last status of each daemon.
-        wall_s: how long it took [s].
-        timed_out: whether time ran out first.
-        makespan_s: from when the first robot worked until the last was done, in simulated time.
+        wall_s: duration by this computer's clock [s].
+        timed_out: whether the time limit ended the demo.
+        makespan_s: time from the first robot's start of work to the last one's end [simulated s].
     """
 
     statuses: tuple[Status, ...]
@@ -56,7 +56,7 @@ class Ending:
 
 
 class DemoMission:
-    """Starts everything on entry, ends everything on exit."""
+    """Starts all processes on entry, ends them on exit."""
 
     def __init__(self, args: argparse.Namespace, robots: Sequence[DemoRobot]) -> None:
         self._args, self._robots = args, robots
@@ -64,7 +64,7 @@ class DemoMission:
         self._view = demo_view([robot.name for robot in robots], self._endpoint)
         self._processes: list[tuple[Path, subprocess.Popen[bytes]]] = []
         self._stack = ExitStack()
-        # Robots that have not started: log and words of each; keys of absent recorders.
+        # Log and arguments of each robot to start; keys of recorders that are not there yet.
         self._waiting: list[tuple[Path, list[str]]] = []
         self._silent: set[str] = set()
         self._newest = [LatestSlot[Sample]() for _ in robots]
@@ -89,7 +89,7 @@ class DemoMission:
         self._stack.close()
 
     def watch(self) -> Ending | None:
-        """Show the mission until all is covered; return how it ended, None if the user quits.
+        """Show the mission until its end, and return the ending; None if the user quits.
 
         Raises:
             KeyboardInterrupt: a signal ends it.
@@ -108,7 +108,7 @@ class DemoMission:
         )
 
     def _step(self, timeout_s: float) -> bool:
-        """Take in statuses, waiting up to ``timeout_s`` [s]; return whether the mission is over."""
+        """Take in statuses for up to ``timeout_s`` [s]; return whether the mission is over."""
         now = time.monotonic()
         self._check_processes()
         if self._waiting:
@@ -145,7 +145,7 @@ class DemoMission:
         self._silent = {Keys(robot.name).of(topics.RECORDER_ALIVE) for robot in self._robots}
 
     def _let_start(self, bus: Bus, now: float) -> None:
-        """Start the robots once all recorders listen, which start more slowly, or after a while."""
+        """Start the robots once all recorders listen, or after ``RECORDERS_WITHIN_S``."""
         self._silent = {key for key in self._silent if not bus.alive(key)}
         if self._silent and now - self._started < RECORDERS_WITHIN_S:
             return
@@ -157,8 +157,7 @@ class DemoMission:
         program = python_program("fasaco_edge", *words)
         program += ["--with-parent", str(os.getpid())]
         with log.open("wb") as file:
-            # Ctrl-C in the terminal is for the demo, which ends them in order: one that dies of it
-            # first would be a failure.
+            # A process group of its own keeps Ctrl-C away: the demo ends its processes in order.
             process = subprocess.Popen(program, stdout=file, stderr=file, process_group=0)
         self._processes.append((log, process))
 
@@ -172,7 +171,7 @@ class DemoMission:
                 )
 
     def _stop(self) -> None:
-        """End the robots first, so that the recordings hold their last messages."""
+        """End the robots first, so that the recordings have their last messages."""
         for is_last in (False, True):
             ending = [one for log, one in self._processes if (log.stem in LAST) == is_last]
             for process in ending:

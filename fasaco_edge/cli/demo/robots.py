@@ -1,4 +1,4 @@
-"""The robots of a demo: where each starts, its configuration, and the programs it consists of."""
+"""The robots of a demo: start, configuration and programs of each."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class DemoRobot:
     """A simulated robot and its daemon.
 
     Attributes:
-        name: on the bus.
-        start: where it starts, x, y [m].
-        folder: of its configuration, recording, trail and logs.
+        name: name on the bus.
+        start: start position (x, y) [m].
+        folder: folder of its configuration, recording, trail and logs.
     """
 
     name: str
@@ -36,16 +36,16 @@ class DemoRobot:
 
     @property
     def config(self) -> Path:
-        """File of its daemon's configuration."""
+        """File of the daemon's configuration."""
         return self.folder / "config.yaml"
 
     @property
     def trail(self) -> Path:
-        """File of the places it drove through."""
+        """File of the driven positions."""
         return self.folder / "trail.csv"
 
     def write_config(self, args: argparse.Namespace, endpoint: str) -> None:
-        """Write the configuration of a daemon that joins the router at ``endpoint``."""
+        """Write the daemon's configuration; ``endpoint``: the router to join."""
         simulated = SimulationConfig()
         config: dict[str, object] = {
             "robot": {
@@ -70,10 +70,9 @@ class DemoRobot:
         self.config.write_text(yaml.safe_dump(config), encoding="utf-8")
 
     def programs(self, args: argparse.Namespace, endpoint: str) -> list[tuple[str, list[str]]]:
-        """Return the programs to start: for each its name, and the arguments of `fasaco-edge`."""
+        """Return the name of each program to start, and its arguments for `fasaco-edge`."""
         daemon = ["run", "--config", str(self.config), "--record", str(self.folder)]
-        # The daemon gets a fresh state folder of its own: no progress of another daemon or an
-        # earlier demo.
+        # A fresh state folder has no progress of another daemon or demo.
         daemon += ["--state", str(self.folder / "state"), "--fresh"]
         robot = ["simulate", str(find_map(args.map)), "--driver", args.driver]
         robot += ["--connect", endpoint, "--robot", self.name, "--speed", str(args.speed)]
@@ -95,10 +94,10 @@ def fleet_recorder(out: Path, endpoint: str) -> list[str]:
 
 
 def demo_robots(args: argparse.Namespace, out: Path) -> list[DemoRobot]:
-    """Return the robots: one with the default name; or several with numbers, far from one another.
+    """Return the robots: one with the default name, or several that start far from each other.
 
     Raises:
-        StartBlocked: there are fewer places to start from than robots.
+        StartBlocked: there are fewer start positions than robots.
     """
     file = find_map(args.map)
     truth = read_map(file)

@@ -1,4 +1,4 @@
-"""The result of a demo, checked against the building itself, not by the daemon's figures."""
+"""The result of a demo; floor is measured in the true building, not by the daemon."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from fasaco_edge.wire.documents.replies import CoverageReport
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Truth:
-    """The building, and the floor swept along the robots' trails: by all together, and by each."""
+    """The building, the robots' trails (n, 2) [m], and the floor swept by all, and by each."""
 
     grid: OccupancyGrid
     trails: list[NDArray[np.float64]]
@@ -45,14 +45,14 @@ class _Truth:
 
     @property
     def swept_twice_m2(self) -> float:
-        """Floor that more than one robot swept [m2]."""
+        """Floor swept by two or more robots [m2]."""
         times = sum(floor.swept.astype(np.int8) for floor in self.floors)
         return float(np.count_nonzero(times > 1) * self.floor.geometry.resolution**2)
 
 
 @dataclass(frozen=True, slots=True)
 class RobotFigures:
-    """What one robot of a demo did; ``drive_s`` is driving and turning, in simulated seconds."""
+    """Figures of one robot; ``drive_s``: time of driving and turning [simulated s]."""
 
     name: str
     driven_m: float
@@ -62,9 +62,9 @@ class RobotFigures:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """The figures of a demo; areas are of floor, by the true building and tracks.
+    """The figures of a demo; areas of floor are by the true building and tracks.
 
-    Cells are counted by the daemons; of several, by the one with the most cells left.
+    Cells are counted by the daemon, of several daemons by the one with the most cells left.
     """
 
     map: str
@@ -89,7 +89,7 @@ class Summary:
 def summarise(
     args: argparse.Namespace, out: Path, robots: Sequence[DemoRobot], ending: Ending
 ) -> Summary:
-    """Return the figures of a demo, and draw and write them into ``out``."""
+    """Return the figures of a demo; write them and a picture into ``out``."""
     truth = _truth(args, robots)
     reports = [status.coverage for status in ending.statuses if status.coverage is not None]
     cells = max(reports, key=lambda each: each.coverable - each.covered, default=CoverageReport())
@@ -129,7 +129,7 @@ def summarise(
 
 
 def print_summary(summary: Summary, *, as_json: bool) -> None:
-    """Print a table, or JSON."""
+    """Print the figures as a table or as JSON."""
     if as_json:
         print_json(asdict(summary))
         return
@@ -146,16 +146,16 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
 
 
 def _openers(summary: Summary) -> Iterator[tuple[str, str]]:
-    """Yield the commands that open the recording, and what each does."""
+    """Yield the commands that open the recording, each with its purpose."""
     recordings = summary.fleet_recording or summary.recording
     if not recordings:
         return
-    # All recordings of a robot alone, or of the fleet, lie in this folder; no name is as short.
+    # This folder has no other recordings, so a short pattern is enough.
     files = f"{shlex.quote(str(Path(recordings[0]).parent))}/*.rrd"
     yield "review it:", f"{terminal.command()} review {files}"
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         if not summary.fleet_recording:
-            # From another computer's.
+            # The browser runs on another computer.
             options = "--listen 0.0.0.0:8465 --tokens tokens"
             yield "in browser:", f"{terminal.command()} serve {files} {options}"
         yield "in Rerun:", f"copy {files} to a computer with a desktop"
@@ -185,7 +185,7 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
 
 
 def _swept(summary: Summary) -> str:
-    # Daemon and review know the robot's map and poses only, and differ by a percent or so.
+    # Daemon and review use the robot's map and poses, so their figures differ by about 1 %.
     return f"{swept_words(summary.swept_m2, summary.reachable_m2)}, by the true building and track"
 
 
@@ -198,7 +198,7 @@ def _truth(args: argparse.Namespace, robots: Sequence[DemoRobot]) -> _Truth:
     x, y = trails[0][0].tolist()
     sweeper = SweepingRobot(args.cell, args.robot_radius)
     floors = [judge_floor(grid, trail, sweeper, stands_at=(x, y)) for trail in trails]
-    # No robot drives from the end of one trail to the start of the next.
+    # The segments from the end of one trail to the start of the next are not driven.
     driven = np.ones(sum(map(len, trails)) - 1, np.bool_)
     driven[np.cumsum([len(trail) for trail in trails])[:-1] - 1] = False
     floor = judge_floor(grid, np.vstack(trails), sweeper, driven=driven, stands_at=(x, y))

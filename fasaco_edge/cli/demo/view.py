@@ -1,4 +1,4 @@
-"""The view of a demo: the page of ``watch`` on a terminal that can show it, else lines of text."""
+"""The view of a demo: the screen of ``watch`` if the terminal can show it, else lines of text."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 LINE_EVERY_S = 5.0
 WAIT_S = 0.25
-# Size of a terminal from which a map in it can be read [characters].
+# Least size of a terminal in which a map is readable [characters].
 LEAST_COLUMNS, LEAST_LINES = 60, 20
 
 
 def demo_view(robots: Sequence[str], endpoint: str) -> LinesView | LiveView:
-    """Return the view that fits the terminal.
+    """Return the view that suits the terminal.
 
     Args:
-        robots: names of the robots on the bus.
-        endpoint: where their bus can be joined.
+        robots: names of the robots.
+        endpoint: endpoint of their bus.
     """
     if _is_screen():
         try:
@@ -48,7 +48,7 @@ def demo_view(robots: Sequence[str], endpoint: str) -> LinesView | LiveView:
 
 
 def _is_screen() -> bool:
-    """Return whether standard error is a terminal for a map, and this process may type there."""
+    """Return whether standard error is a terminal that can show a map, in the foreground."""
     if not can_draw(err()):
         return False
     terminal = err().file.fileno()
@@ -63,20 +63,20 @@ def _is_screen() -> bool:
 
 
 class LinesView:
-    """Prints the state of each robot, every few seconds."""
+    """Prints the state of each robot every few seconds."""
 
     def __init__(self, robots: Sequence[str]) -> None:
         self._names = robots
         self._printed_at = [0.0] * len(robots)
 
     def run(self, step: Callable[[float], bool]) -> bool:
-        """Call ``step`` until it returns True, each time with how long it may wait [s]."""
+        """Call ``step`` with a timeout [s] until it returns True."""
         while not step(WAIT_S):
             pass
         return True
 
     def show(self, robot: int, status: Status, elapsed_s: float) -> None:
-        """Print a line, if the one before is old enough."""
+        """Print a line, unless the robot's last line is too recent."""
         now = time.monotonic()
         if now - self._printed_at[robot] < LINE_EVERY_S:
             return
@@ -90,7 +90,7 @@ class LinesView:
 class LiveView:
     """Shows a demo on the alternate screen of the terminal.
 
-    What is printed meanwhile stands among the events of the page, and afterwards above the summary.
+    Text printed meanwhile is shown among the events, and again above the summary.
     """
 
     def __init__(self, robots: Sequence[str], endpoint: str) -> None:
@@ -100,10 +100,10 @@ class LiveView:
         self._unseen: deque[str] = deque()
 
     def run(self, step: Callable[[float], bool]) -> bool:
-        """Show pages until ``step`` returns True, or q is typed; return whether it is over.
+        """Show the demo until ``step`` returns True or the user quits; return whether it is over.
 
         Raises:
-            KeyboardInterrupt: a signal ends it.
+            KeyboardInterrupt: a signal ended the view.
         """
         from fasaco_edge.watch.live import watch_on_screen
 
@@ -126,7 +126,7 @@ class LiveView:
         return is_over
 
     def show(self, robot: int, status: Status, elapsed_s: float) -> None:
-        """Do nothing: what is watched comes by the bus."""
+        """Do nothing: the view receives statuses from the bus itself."""
 
     def _print_again(self) -> None:
         for text in self._printed:

@@ -1,4 +1,4 @@
-"""``fasaco-edge mission``: commands to a daemon, or to each of a fleet, and its progress."""
+"""``fasaco-edge mission``: commands to one daemon or to all of a fleet, and their progress."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def _add_commands(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_receiver(parser: argparse.ArgumentParser) -> None:
-    """Add the options of all commands: which robots, and how to show their answers."""
+    """Add the options of all commands: the robots, and the form of their answers."""
     add_common(parser)
     parser.add_argument(
         "--fleet",
@@ -180,7 +180,7 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Ask, and show the answer."""
+    """Send the command, and show the answer."""
     command = "cancel" if args.mission_command == "stop" else args.mission_command
     asked: dict[str, object] = {"command": command}
     if args.mission_command == "start":
@@ -215,7 +215,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _answer(args: argparse.Namespace, asked: dict[str, object]) -> Answer | None:
-    """Return the answer to a command; None if it would forget cells and has no consent."""
+    """Return the answer to a command; None if it would forget cells and the user declines."""
     try:
         return ask(args, "mission", payload=encode_json(asked))
     except RefusedError as error:
@@ -228,7 +228,7 @@ def _answer(args: argparse.Namespace, asked: dict[str, object]) -> Answer | None
 
 
 def _order(args: argparse.Namespace) -> dict[str, object]:
-    """Return the order as a document, checked: faults are reported without a daemon."""
+    """Return the order as a document; it is checked here, so that faults need no daemon."""
     options = {
         "zones": args.zone,
         "keep_out": args.keep_out,
@@ -237,7 +237,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
         "keep_covered": args.keep_covered,
         "until_min": args.until_min,
     }
-    # Options are compared with None and False, not by truth: 0 passes are a mistake to report.
+    # Not by truth: 0 passes are a fault to report.
     given = {
         name: value for name, value in options.items() if value is not None and value is not False
     }
@@ -252,7 +252,7 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
 
 def _zone(text: str) -> dict[str, object]:
     name, colon, corners = text.partition(":")
-    if not name or (not colon and ";" in name):  # corners, the name forgotten
+    if not name or (not colon and ";" in name):  # corners without a name
         raise argparse.ArgumentTypeError(f"must be NAME or NAME:x,y;x,y;..., got {text!r}")
     return {"name": name, "polygon": polygon(corners)} if colon else {"name": name}
 

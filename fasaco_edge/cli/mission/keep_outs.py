@@ -39,7 +39,7 @@ ACTIONS = {
 def add_actions(
     parser: argparse.ArgumentParser, add_options: Callable[[argparse.ArgumentParser], None]
 ) -> None:
-    """Add the commands of ``keep-out``; ``add_options`` is for all."""
+    """Add the commands of ``keep-out``; ``add_options`` adds their common options."""
     parser.epilog = EPILOG
     actions = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     for name, text in ACTIONS.items():
@@ -61,7 +61,7 @@ def add_actions(
 
 
 def polygon(text: str) -> list[list[float]]:
-    """Read ``X,Y;X,Y;X,Y``, three corners at least [m]."""
+    """Read three or more corners [m], ``X,Y;X,Y;X,Y``."""
     try:
         corners = [[float(value) for value in pair.split(",")] for pair in text.split(";")]
     except ValueError:
@@ -72,17 +72,17 @@ def polygon(text: str) -> list[list[float]]:
 
 
 def asked_by(args: argparse.Namespace) -> dict[str, object]:
-    """Return the command as a document, checked: faults are reported without a daemon.
+    """Return the command as a document; it is checked here, so that faults need no daemon.
 
     Raises:
-        OrderError: the area or its name is not valid.
+        OrderError: the area or its name is invalid.
     """
     if args.keep_out_action == "list":
         return {"command": "status"}
     keep_out = {"name": args.name}
     if args.keep_out_action == "add":
         try:
-            # Corners in one word, or a word for each.
+            # The corners may be one argument, or one argument each.
             keep_out["polygon"] = polygon(";".join(map(str.strip, args.corners)))
         except argparse.ArgumentTypeError as error:
             args.parser.error(f"argument X,Y: {error}")
@@ -104,7 +104,7 @@ def show_keep_outs(answer: replies.Reply) -> None:
     out().print(table)
 
 
-# Shown of one keep-out; `--json` has all.
+# Limit on the corners shown of a keep-out; `--json` has all.
 MOST_CORNERS = 8
 
 

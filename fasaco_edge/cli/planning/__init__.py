@@ -1,1 +1,1 @@
-"""The command ``plan``, part by part."""
+"""Parts of the command ``plan``: options, request, results."""

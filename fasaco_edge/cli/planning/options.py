@@ -286,7 +286,7 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
 
 
 def _planner(text: str) -> str:
-    """Read the name of a planner, or the place of one of the user's own."""
+    """Read the name of a planner, or the place of a user's own planner."""
     if text not in PLANNER_NAMES and not is_place(text):
         names = ", ".join(PLANNER_NAMES)
         raise argparse.ArgumentTypeError(f"must be {names}, {SHAPE}, got {text!r}")
@@ -294,7 +294,7 @@ def _planner(text: str) -> str:
 
 
 def _end(text: str) -> str | tuple[int, int]:
-    """Read where to end."""
+    """Read the end of the walk."""
     if text in (ANYWHERE, HOME):
         return text
     try:
@@ -306,7 +306,7 @@ def _end(text: str) -> str | tuple[int, int]:
 
 
 def _alignment(text: str) -> str | float:
-    """Read the alignment of cells."""
+    """Read the direction of the cells' rows."""
     if text in (WALLS, AXES):
         return text
     try:

@@ -1,4 +1,4 @@
-"""Request of ``fasaco-edge plan``: robot, search and line by the options; display of progress."""
+"""The request of ``fasaco-edge plan`` (robot, search, line) and the display of its progress."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from fasaco_edge.offline.maps import Map
 
 
-# A terminal shows no more pictures a second; drawing them costs the search time.
+# Least time between two updates of the display [s]: drawing takes time from the search.
 LEAST_INTERVAL_S = 0.05
 
 
@@ -37,8 +37,8 @@ def watching(
     """Yield a display of the progress of a search.
 
     Args:
-        total: budget of the search [s], or with ``counted`` its number of ants.
-        counted: whether progress counts ants instead of time.
+        total: budget of the search [s], or its number of ants if ``counted``.
+        counted: whether progress is counted in ants instead of time.
     """
     with terminal.progress(counted=counted) as bar:
         task = bar.add_task("ants", total=total)
@@ -78,14 +78,14 @@ SEARCH_OPTIONS = {
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """What the options ask for.
+    """The plan that the options request.
 
     Attributes:
-        robot: its size, and its driving times.
-        search: how to search.
-        line: which line is made.
-        own: the user's planner in place of the search; None for none.
-        sources: files that this was read from.
+        robot: size, speeds and turning times of the robot.
+        search: settings of the search.
+        line: kind of the line.
+        own: the user's own planner; None for none.
+        sources: files from which the request was read.
     """
 
     robot: RobotConfig
@@ -96,11 +96,11 @@ class PlanRequest:
 
 
 def read_request(args: argparse.Namespace) -> PlanRequest:
-    """Return the request of the options; other values are those of ``--config``, if given.
+    """Return the request of the options; missing values come from ``--config``, else defaults.
 
     Raises:
         BadConfiguration: a value is invalid; the error names it.
-        PlannerFailed: the file of the user's planner raised.
+        PlannerFailed: the file of the user's planner raised an exception.
     """
     config = None if args.config is None else load_config(args.config)
     given, own = _given(args, SEARCH_OPTIONS), None
@@ -117,12 +117,12 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         )
     robot = config.robot if config else RobotConfig()
     if config is None and line == CELLS:
-        robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as the paper counts
+        robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as in the paper
     changes = _given(args, ROBOT_OPTIONS)
     for fault in section_faults(RobotConfig, changes):
         option = next(name for name, member in ROBOT_OPTIONS.items() if member == fault.key)
-        said = str(fault.error).removeprefix(fault.key)
-        raise BadConfiguration(f"--{option.replace('_', '-')}{said}")
+        text = str(fault.error).removeprefix(fault.key)
+        raise BadConfiguration(f"--{option.replace('_', '-')}{text}")
     if args.turn_s is not None:
         changes["turn_deg_s"] = None
     if args.forward_only:
@@ -138,10 +138,10 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
 
 
 def require_frame(map: Map, xy_out: Path | None) -> None:
-    """Check that a map has a frame if points in it are to be written.
+    """Check that a map has a frame, which ``xy_out`` requires.
 
     Raises:
-        BadConfiguration: it is a coverage grid.
+        BadConfiguration: the map is a coverage grid.
     """
     if xy_out is not None and map.grid is None:
         raise BadConfiguration(
@@ -151,7 +151,7 @@ def require_frame(map: Map, xy_out: Path | None) -> None:
 
 
 def _search(config: DaemonConfig | None) -> Search:
-    """Return the search settings of a daemon's configuration; the defaults of ``plan`` for None."""
+    """Return the search settings of a configuration; the defaults of ``plan`` for None."""
     if config is None:
         return Search()
     planner = msgspec.structs.asdict(config.planner)
@@ -160,6 +160,6 @@ def _search(config: DaemonConfig | None) -> Search:
 
 
 def _given(args: argparse.Namespace, members: Mapping[str, str]) -> dict[str, Any]:
-    """Return the values of the given options, with the member that each sets as key."""
+    """Return the values of the given options by the members that they set."""
     values = {member: getattr(args, option) for option, member in members.items()}
     return {member: value for member, value in values.items() if value is not None}

@@ -1,4 +1,4 @@
-"""Results of ``fasaco-edge plan``: its files, and its figures as JSON or in words."""
+"""The results of ``fasaco-edge plan``: files, and figures as JSON or text."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from fasaco_edge.offline.rooms import RoomsUnderLine
     from fasaco_edge.planners.planner import ColonySnapshot
 
-# Figures of the walk from cell to cell; the line that is made from it has others.
+# Figures of the walk from cell to cell, in contrast to those of the line.
 OF_WALK = frozenset(
     (
         *("steps", "revisits", "recovered_cells", "n_r_paper", "turns_90", "turns_180"),
@@ -38,10 +38,10 @@ OF_WALK = frozenset(
 def write_files(
     args: argparse.Namespace, planned: Plan | PassPlans, trails: Sequence[ColonySnapshot]
 ) -> None:
-    """Write the files that the options ask for; rows of several passes begin with their number.
+    """Write the requested files; with several passes, each row begins with the pass's number.
 
     Raises:
-        BadConfiguration: one cannot be written.
+        BadConfiguration: a file cannot be written.
     """
     from fasaco_edge.offline.passes import PassPlans
 
@@ -65,7 +65,7 @@ def write_files(
 
 
 def _write_lines(file: Path, plans: Sequence[Plan], is_several: bool) -> None:
-    """Write the lines of passes, or poses along a curve, as CSV or GeoJSON by the file's name."""
+    """Write the lines of passes, or poses along a curve, as CSV or GeoJSON (by the suffix)."""
     curve = plans[0].curve
     lines, header = [plan.xy for plan in plans], ["x_m", "y_m"]
     if curve is not None:
@@ -87,7 +87,7 @@ def _write_lines(file: Path, plans: Sequence[Plan], is_several: bool) -> None:
 
 
 def _numbered(tables: Sequence[NDArray[Any]], is_several: bool) -> NDArray[Any]:
-    """Return tables as one; of several each row with the number of its table, from 1."""
+    """Return all tables as one; if ``is_several``, each row begins with its table's number."""
     if not is_several:
         return tables[0]
     numbers = np.repeat(np.arange(1, len(tables) + 1), [len(rows) for rows in tables])
@@ -107,7 +107,7 @@ def _draw_pheromone(file: Path, planned: Plan, trails: Sequence[ColonySnapshot])
 
 
 def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
-    """Print the figures as JSON, those that matter in some lines, or all as a table."""
+    """Print the figures: all as JSON, all as a table, or the most important ones."""
     from fasaco_edge.offline.figures import floor_words
     from fasaco_edge.offline.passes import PassPlans
     from fasaco_edge.offline.summary import line_words, pass_words, rows_of, rows_of_passes
@@ -154,7 +154,7 @@ def _table(under: RoomsUnderLine) -> Table:
 
 
 def say_written(args: argparse.Namespace) -> None:
-    """Print where the files are that were asked for, or how to have a picture."""
+    """Print the names of written files, and the options for more output."""
     console = terminal.out()
     for name in ("path_out", "xy_out", "png", "pheromone_png"):
         if (file := getattr(args, name)) is not None:

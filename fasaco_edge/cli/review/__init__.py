@@ -1,4 +1,4 @@
-"""``fasaco-edge review``: the report of a recorded mission, of two compared, or of a fleet."""
+"""``fasaco-edge review``: the report of a recorded mission, of two in comparison, or of a fleet."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _time(text: str) -> float:
             value = 60.0 * value + float(part)
     except ValueError:
         value = -1.0
-    # A negated comparison, so that NaN is caught too.
+    # The comparison is negated to catch NaN.
     if not 0 <= value < 1e9:
         raise argparse.ArgumentTypeError(f"must be MM:SS, H:MM:SS or seconds, got {text!r}")
     return value
@@ -134,11 +134,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Review."""
+    """Print the report, and write the requested files."""
     recordings = [*args.recordings, *(args.against or ())]
     check_outputs((args.png,), recordings)
     for file in recordings:
-        with open_part(file):  # reports a file that is no recording before loading the rest
+        with open_part(file):  # raises for a file that is no recording, before slow imports
             pass
     from fasaco_edge.cli.console.recordings import files_of_a_run
     from fasaco_edge.recording.read.frames import is_fleet_recording
@@ -187,7 +187,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _answer(args: argparse.Namespace, review: Review) -> int:
-    """Answer questions about a moment, and about spots."""
+    """Print the answers about a moment and about spots; draw them on request."""
     import msgspec
 
     from fasaco_edge.recording.read.robot_clock import clock
@@ -253,7 +253,7 @@ def _by_others(
 
 
 def _epilog() -> str:
-    """Return a description of the JSON document: the same text for help and for readers."""
+    """Return examples, and a description of the JSON document from its docstring."""
     lines = [
         EXAMPLES,
         "the JSON document holds, with times in the robot's seconds since the recording began:",

@@ -1,4 +1,4 @@
-"""The screens of ``fasaco-edge review``: a run in short, in full, or two side by side."""
+"""The screens of ``fasaco-edge review``: one run in short or in full, or two side by side."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MOST_VERDICTS = 4
 
 
 def print_review(review: Review, document: ReviewDocument, *, full: bool) -> None:
-    """Print a review and its document: in ``full``, or as much as fits on a screen."""
+    """Print a review and its document, in full or on one screen."""
     console = terminal.out()
     colours = {True: "green", False: "red", None: "yellow"}
     every = verdicts(document)
@@ -77,12 +77,12 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
 def _fitting(
     console: Console, found: list[tuple[str, str]], above: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Return the first rows, which matter most: as many as a terminal shows with all the rest."""
+    """Return the first rows, without those for which the terminal has no space."""
 
     def height(shown: RenderableType) -> int:
         return len(console.render_lines(shown))
 
-    # Title and times of the curve; the last line, and that of the prompt.
+    # 2 lines for title and times of the curve, and 2 for the last line and the prompt.
     room = console.height - sum(map(height, above)) - (2 + SCREEN_PLOT_HEIGHT) - 2
     shown = list(found)
     while console.is_terminal and len(shown) > 1 and height(terminal.summary(shown)) > room:
@@ -136,7 +136,7 @@ def _print_remarks(console: Console, document: ReviewDocument) -> None:
 
 
 def _say(console: Console, text: str, style: str = "") -> None:
-    """Print a sentence; it is wrapped only in a terminal."""
+    """Print a text, wrapped only on a terminal."""
     console.print(text, style=style, soft_wrap=not console.is_terminal)
 
 
@@ -162,20 +162,20 @@ def curve(
     height: int,
     marks: str = EIGHTHS,
 ) -> list[str]:
-    """Return a curve of a share over time as lines of text, the top one first.
+    """Return a curve of a share over time as lines of text, from top to bottom.
 
     Args:
-        at_s: float64 (n,), times of its changes [s], ascending.
-        shares: float64 (n,), its values from then on, 0 to 1; before the first time it is 0.
-        end_s: the right end of the picture [s]; the left one is 0.
-        width, height: of the picture [characters].
-        marks: nine characters, from an empty one to a full one.
+        at_s: float64 (n,), ascending times at which the share changes [s].
+        shares: float64 (n,), values from these times on, 0 to 1; before the first time it is 0.
+        end_s: time at the right end [s]; the left end is 0.
+        width, height: size of the curve [characters].
+        marks: nine characters, from empty to full.
     """
     places = (np.arange(width) + 1) / width * end_s
     index = np.searchsorted(at_s, places, side="right")
     levels = np.concatenate(([0.0], shares))[index]
     eighths = np.rint(np.clip(levels, 0, 1) * height * 8).astype(int)
-    # A value above 0 never looks like 0, and a value below 1 never like 1.
+    # Only a value of 0 is drawn empty, and only a value of 1 full.
     eighths[(levels > 0) & (eighths == 0)] = 1
     eighths[(levels < 1) & (eighths == 8 * height)] -= 1
     return [

@@ -159,7 +159,7 @@ class FleetRecorder:
 
     @property
     def hangs(self) -> bool:
-        """Whether rerun would hang when the interpreter exits."""
+        """Whether Rerun would hang when the interpreter exits."""
         return self._writer.hangs
 
     def note(self, line: str) -> None:

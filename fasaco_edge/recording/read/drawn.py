@@ -1,4 +1,4 @@
-"""Grids, lines, labels and poses as they were drawn in a recording; all are read on demand."""
+"""Readers of the grids, lines, labels and poses drawn in a recording."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class DrawnGrid:
     Attributes:
         at_ns: time by the recorder's clock [ns].
         geometry: its size and place in the map frame.
-        pixels: uint8 (rows, cols), row 0 with the smallest y; of tinted pixels their opacity.
+        pixels: uint8 (rows, cols), row 0 has the smallest y; the opacity, if the pixels are RGBA.
     """
 
     at_ns: int
@@ -48,7 +48,7 @@ class DrawnGrid:
 
 
 def grids_in(batch: pa.RecordBatch, anchor: NDArray[np.float64]) -> Iterator[DrawnGrid]:
-    """Yield the grid of each row of a batch; ``anchor``: the origin of drawings, (x, y) [m].
+    """Yield the grid of each row of a batch; ``anchor``: the origin of drawings (x, y) [m].
 
     Raises:
         ValueError: the batch holds something else.
@@ -84,7 +84,7 @@ class DrawnLine:
     Attributes:
         at_ns: time by the recorder's clock [ns].
         revision: of the path in force then; 0 for none.
-        xy: float64 (n, 2), its corners in the map frame [m]; n is 0 if a line was removed.
+        xy: float64 (n, 2), its corners in the map frame [m]; n is 0 if the line was removed.
     """
 
     at_ns: int
@@ -94,7 +94,7 @@ class DrawnLine:
 
 @dataclass(frozen=True, slots=True)
 class DrawnLabel:
-    """A drawn text and its time [ns]; "" if one was removed."""
+    """A drawn text and its time [ns]; "" if the text was removed."""
 
     at_ns: int
     text: str
@@ -104,9 +104,9 @@ Drawn = DrawnLine | DrawnLabel | DrawnGrid
 
 
 def drawings(paths: Sequence[Path], *wanted: str) -> Iterator[tuple[str, Drawn]]:
-    """Yield each entity and its drawing, for paths, labels and the pheromone field.
+    """Yield the drawings of paths, labels and the pheromone field, each with its entity.
 
-    A part begins with the drawings in force before it; these are yielded again.
+    Each part repeats the drawings in force at its beginning; these are yielded again.
 
     Args:
         paths: the parts of one run, in order.
@@ -139,7 +139,7 @@ def _drawn(chunk: Chunk, anchor: NDArray[np.float64]) -> Iterator[Drawn]:
 
 
 def lines_in(batch: pa.RecordBatch, anchor: NDArray[np.float64]) -> Iterator[DrawnLine]:
-    """Yield the line of each row of a batch; as ``grids_in``."""
+    """Yield the line of each row of a batch; arguments and errors as for ``grids_in``."""
     strips, times = column(batch, "LineStrips3D:strips", _STRIPS), wall_ns(batch)
     numbers = [0] * len(times)
     if entities.REPLAN in batch.schema.names:
@@ -151,7 +151,7 @@ def lines_in(batch: pa.RecordBatch, anchor: NDArray[np.float64]) -> Iterator[Dra
 
 
 def poses_in(batch: pa.RecordBatch) -> NDArray[np.float64]:
-    """Return the poses in a batch from the origin of drawings, float64 (n, 3): x, y [m], yaw [rad].
+    """Return the poses in a batch, float64 (n, 3): x, y [m] from the origin of drawings, yaw [rad].
 
     Raises:
         ValueError: the batch holds something else.
@@ -164,12 +164,12 @@ def poses_in(batch: pa.RecordBatch) -> NDArray[np.float64]:
 
 
 def _yaw_in(batch: pa.RecordBatch) -> NDArray[np.float64] | None:
-    """Return the yaw of each pose [rad], float64 (n,); None without any."""
+    """Return the yaw of each pose [rad], float64 (n,); None if the batch has no rotations."""
     turns = column(batch, "Transform3D:quaternion", _TURN)
     if turns is not None:
         turned = np.asarray(turns.flatten().flatten(), np.float64).reshape(batch.num_rows, -1)
         return 2.0 * np.arctan2(turned[:, 2], turned[:, 3])
-    # First recorders drew a turn about the vertical axis.
+    # The first releases recorded the rotation as an angle about the vertical axis.
     turns = column(batch, "Transform3D:rotation_axis_angle", _AXIS_TURN)
     if turns is None:
         return None
@@ -178,6 +178,6 @@ def _yaw_in(batch: pa.RecordBatch) -> NDArray[np.float64] | None:
 
 
 def anchor_in(batch: pa.RecordBatch, before: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the origin of drawings, (x, y) [m], in static data of ``world``; else ``before``."""
+    """Return the origin of drawings (x, y) [m] in static data of ``world``; else ``before``."""
     place = column(batch, "Transform3D:translation", _PLACE)
     return before if place is None else np.array(place[0].as_py()[0][:2])

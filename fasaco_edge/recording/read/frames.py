@@ -1,9 +1,9 @@
-"""The chunks of a recording, read without Rerun, which trusts the sizes stated in a file.
+"""The chunks of a recording, read without Rerun.
 
-A chunk is a compressed Arrow message in a Protobuf message in a frame
-(``recording.read.repair``). Each states the size of the inner one, which is checked before memory
-is allocated. Rerun's own reader allocates first, and aborts the process if memory is short or a
-message is malformed. The footer, an index, is not needed for sequential reading.
+A chunk is a compressed Arrow message in a Protobuf message in a frame (``recording.read.repair``).
+Each message states the size of the message inside. This reader checks the size before it allocates
+memory; Rerun's allocates first, and aborts the process if memory is short or a message is
+malformed. The footer, an index, is not read.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, open_part
 
 CHUNK_KIND = 2
-# Limit of an uncompressed chunk: the largest that a recorder writes is a map of 64 million pixels.
+# Limit of an uncompressed chunk. The largest chunk of a recorder is a map of 64 million pixels.
 MOST_CHUNK_BYTES = 128 * 1024 * 1024
 # Largest ratio of LZ4 compression.
 LZ4_RATIO = 255
 
-# Fields of a chunk's frame, and of its store.
+# Field numbers of a chunk's Protobuf message, and of its store.
 STORE, PACKING, UNPACKED, ARROW, IS_STATIC = 1, 2, 3, 5, 7
 STORE_KIND, STORE_ID = 1, 2
 RECORDING = 1
@@ -46,12 +46,12 @@ class Chunk:
     """Some rows of an entity.
 
     Attributes:
-        recording_id: of its recording.
-        entity: without its leading slash.
-        is_static: whether it has no times.
+        recording_id: id of the recording.
+        entity: name without the leading slash.
+        is_static: whether the rows have no times.
         batch: the rows, validated.
-        bytes: its uncompressed size.
-        offset: of its frame in the file, for ``chunk_at``.
+        bytes: uncompressed size.
+        offset: position of its frame in the file, for ``chunk_at`` [bytes].
     """
 
     recording_id: str
@@ -63,7 +63,7 @@ class Chunk:
 
 
 def chunks(recording: BinaryIO, scan: Scan) -> Iterator[Chunk | None]:
-    """Yield the chunk of each complete frame; None for a frame without one.
+    """Yield the chunk of each complete frame; None for a frame without a chunk.
 
     Raises:
         ValueError: a frame is malformed.
@@ -106,7 +106,7 @@ def column(batch: pa.RecordBatch, name: str, kind: pa.DataType) -> pa.Array | No
     """Return a column of a batch; None if there is none.
 
     Raises:
-        ValueError: it is of another type than ``kind``, or has nulls in it.
+        ValueError: its type is not ``kind``, or it has nulls.
     """
     if name not in batch.schema.names:
         return None
@@ -117,7 +117,7 @@ def column(batch: pa.RecordBatch, name: str, kind: pa.DataType) -> pa.Array | No
 
 
 def wall_ns(batch: pa.RecordBatch) -> list[int]:
-    """Return when the rows of a record batch were logged [ns].
+    """Return the times at which the rows of a batch were logged [ns].
 
     Raises:
         ValueError: they have no times.
@@ -155,7 +155,7 @@ def _unpacked(message: Fields) -> pa.Buffer:
 
 
 def _batch(content: pa.Buffer) -> pa.RecordBatch:
-    """Return the one batch of rows in an Arrow stream."""
+    """Return the batch of rows in an Arrow stream."""
     messages = pa.ipc.MessageReader.open_stream(content)
     schema = pa.ipc.read_schema(messages.read_next_message())
     rows = messages.read_next_message()
@@ -168,7 +168,7 @@ def _batch(content: pa.Buffer) -> pa.RecordBatch:
 
 
 def _check_not_compressed(flat: bytes) -> None:
-    """Raise ValueError for compressed columns, which would expand to any stated size."""
+    """Raise ValueError for compressed columns: their uncompressed size has no limit."""
     message = struct.unpack_from("<I", flat)[0]
     header = _slot(flat, message, _HEADER)
     rows = header + struct.unpack_from("<I", flat, header)[0]
@@ -177,7 +177,7 @@ def _check_not_compressed(flat: bytes) -> None:
 
 
 def _slot(flat: bytes, table: int, number: int) -> int:
-    """Return the offset of a field of a Flatbuffers table; 0 if it is left out."""
+    """Return the offset of a field of a Flatbuffers table; 0 if the field is missing."""
     about = table - struct.unpack_from("<i", flat, table)[0]
     size = struct.unpack_from("<H", flat, about)[0]
     place = 4 + 2 * number
@@ -200,7 +200,7 @@ def _number(message: Fields, number: int, unless: int) -> int:
 
 
 def _fields(message: bytes) -> Fields:
-    """Return the fields of a Protobuf message by their numbers: integers, and bytes."""
+    """Return the fields of a Protobuf message, integers and bytes, by their numbers."""
     found: Fields = {}
     at = 0
     while at < len(message):
@@ -233,10 +233,10 @@ def _varint(message: bytes, at: int) -> tuple[int, int]:
 
 
 def recording_id(path: Path) -> str:
-    """Return the id of the run that a file is a part of; "" if it has no whole frame.
+    """Return the id of the run that a file belongs to; "" if the file has no complete frame.
 
     Raises:
-        UnreadableRecording: it is missing, or is no recording.
+        UnreadableRecording: the file is missing, or is no recording.
     """
     with open_part(path) as (recording, scan):
         found = (chunk.recording_id for chunk in chunks(recording, scan) if chunk is not None)
@@ -244,10 +244,10 @@ def recording_id(path: Path) -> str:
 
 
 def is_fleet_recording(path: Path) -> bool:
-    """Return whether a file is a fleet's recording, by its first frames.
+    """Return whether a file is the recording of a fleet.
 
     Raises:
-        UnreadableRecording: it is missing, or is no recording.
+        UnreadableRecording: the file is missing, or is no recording.
     """
     with open_part(path) as (recording, scan):
         for chunk in chunks(recording, scan):

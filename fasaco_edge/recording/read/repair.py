@@ -1,9 +1,8 @@
 """Repair of recordings torn by a crash: each is truncated after its last complete frame.
 
-A power failure or a full disk leaves a torn frame at the end, and a reader refuses the
-whole file for it. The format: 12 bytes of header, then frames, each two little-endian u64
-(kind, length) and ``length`` bytes; kind 0 is the footer. Rerun never calls fsync, so more
-than the last frame may be missing.
+A power failure or a full disk leaves a torn frame at the end, and Rerun then refuses the whole
+file. A file has a header of 12 bytes, then frames: each is two little-endian u64 (kind, length) and
+``length`` bytes; kind 0 is the footer. Rerun never calls fsync, so several frames may be missing.
 """
 
 from __future__ import annotations
@@ -25,8 +24,8 @@ HEADER_BYTES = 12
 FRAME = struct.Struct("<QQ")
 FOOTER_KIND = 0
 LAST_KIND = 3
-# A power failure leaves a file of full size with zeros for data not written yet. A complete frame
-# may end with a zero, too, and the data after the footer with three.
+# After a power failure a file has its full size, and zeros in place of data not yet written. A
+# complete frame may also end with a zero, and the data after the footer with three zeros.
 MOST_ZEROS = 3
 _BLOCK = 65536
 HINT = "name the .rrd files that a recorder has written"
@@ -69,10 +68,11 @@ class Repair:
 
 
 def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan | None:
-    """Walk the frames of ``recording``; None if it does not even begin as one.
+    """Return the scan of the frames of ``recording``; None if the file is no recording.
 
-    A part whose writer was killed before it wrote its header is a recording without frames.
-    The first ``known_bytes`` are known to be header and complete frames; those are not counted.
+    A file with less than a header, whose writer was killed, counts as a recording without frames.
+    The first ``known_bytes`` are header and complete frames, which the scan skips and does not
+    count.
     """
     total = os.fstat(recording.fileno()).st_size
     data = _end_of_data(recording, total)
@@ -102,7 +102,7 @@ def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan
 
 @contextmanager
 def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
-    """Open a part of a recording; errors while it is read are raised with its name.
+    """Open a part of a recording; add its name to errors raised within the context.
 
     Raises:
         UnreadableRecording: the file is missing, is no recording, or is damaged.
@@ -121,7 +121,7 @@ def open_part(path: Path) -> Iterator[tuple[BinaryIO, Scan]]:
 
 
 def _end_of_data(recording: BinaryIO, total: int) -> int:
-    """Return the offset of the zeros at the end of a file [bytes]."""
+    """Return the offset at which the zeros at the end of a file begin [bytes]."""
     while total:
         start = max(total - _BLOCK, 0)
         recording.seek(start)
@@ -134,8 +134,8 @@ def _end_of_data(recording: BinaryIO, total: int) -> int:
 def repair_recording(path: Path) -> Repair | None:
     """Truncate ``path`` after its last complete frame; None if nothing was torn.
 
-    A recording with a live writer, which holds a lock on the file, is left alone. So is one
-    with a footer, one without a header, and a file that is no recording.
+    These are left unchanged: a file that a writer has locked, a recording with a footer or without
+    a header, and any other file.
     """
     with open(path, "r+b", opener=_open_no_link) as recording:
         try:
@@ -156,8 +156,8 @@ def _open_no_link(path: str, flags: int) -> int:
 def repair_folder(folder: Path) -> list[Repair]:
     """Truncate every torn recording in ``folder``; return the repairs in order of name.
 
-    A file that cannot be read or truncated is returned with the reason: that must not prevent
-    new recordings.
+    For a file that cannot be read or truncated, the repair holds the reason: such a file must not
+    prevent new recordings.
 
     Raises:
         OSError: the folder cannot be read.

@@ -1,9 +1,9 @@
-"""The robot's clock in a recording: simulated seconds, where a robot was simulated.
+"""The robot's clock in a recording: simulated seconds for a simulated robot.
 
-A recording has the times at which the recorder received the samples. A simulated robot may be
-faster than those (`robot.time_scale` of its configuration), and slower than intended on a busy
-computer: the stamps of its poses say what its time was. Before the first pose and after the last
-one, its seconds are as long as those of the recorder.
+A recording holds the times at which the recorder received the samples. A simulated robot's clock
+may run faster (`robot.time_scale` of its configuration), and on a busy computer slower than
+configured: the stamps of the poses give its time. Before the first pose and after the last one,
+both clocks run at the same rate.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 Seconds = NDArray[np.float64]
-# Stamps that go back, or on by more than this many times the expected time and a second, are of
-# another simulation: the recorder's seconds count between them.
+# The recorder's clock replaces two successive stamps (the simulation was restarted) if they go
+# back, or advance by more than this many times the expected time plus a second.
 MOST_TIMES = 10.0
 
 
@@ -38,8 +38,8 @@ class RobotClock:
     Attributes:
         began_ns: beginning of the recording, by the recorder's clock [ns].
         scale: simulated seconds per second, as configured; 1 for a real robot.
-        recorder_s, robot_s: both times of each pose [s], float64 (n,), not decreasing; just (0,)
-            for a real robot, whose seconds are the recorder's.
+        recorder_s, robot_s: times of each pose by both clocks [s], float64 (n,), non-decreasing;
+            a single 0 for a real robot, whose clock is the recorder's.
     """
 
     began_ns: int
@@ -49,7 +49,7 @@ class RobotClock:
 
     @classmethod
     def of(cls, statuses: Iterable[Arrival], poses: Iterable[Arrival], began_ns: int) -> RobotClock:
-        """Return the clock of a recording with these samples; poses of real robots are not read."""
+        """Return the clock of a recording; ``poses`` are read only for a simulated robot."""
         known = next(filter(None, map(_settings, statuses)), KnownSettings())
         scale = known.robot.time_scale
         if scale == 1.0 or not 0.0 < scale < math.inf:
@@ -73,7 +73,7 @@ class RobotClock:
     def by_stamps(
         cls, began_ns: int, scale: float, came_s: Seconds, stamps_s: Seconds
     ) -> RobotClock:
-        """Return the clock of poses, one or more: when each came, and its stamp [s], (n,)."""
+        """Return the clock given by arrival and stamp of each pose [s], float64 (n,), n >= 1."""
         passed_s, stamped_s = np.diff(came_s), np.diff(stamps_s)
         is_valid = (stamped_s >= 0.0) & (stamped_s <= MOST_TIMES * scale * (passed_s + 1.0))
         steps_s = np.where(is_valid, stamped_s, passed_s)
@@ -85,16 +85,16 @@ class RobotClock:
         return scale_words(self.scale)
 
     def seconds(self, at_ns: int) -> float:
-        """Return a time of the recorder [ns] in the robot's seconds since the beginning."""
+        """Convert a time of the recorder [ns] to the robot's time since the beginning [s]."""
         return float(self.all_seconds(np.array([at_ns]))[0])
 
     def all_seconds(self, at_ns: NDArray[np.int64]) -> Seconds:
-        """Return times of the recorder (n,) [ns] as ``seconds`` does, float64 (n,)."""
+        """Convert times of the recorder (n,) [ns] as ``seconds`` does, float64 (n,)."""
         recorder_s: Seconds = 1e-9 * (at_ns - self.began_ns).astype(np.float64)
         return _converted(recorder_s, self.recorder_s, self.robot_s)
 
     def wall_ns(self, robot_s: float) -> int:
-        """Return the recorder's time [ns] of the robot's seconds since the beginning."""
+        """Convert the robot's time since the beginning [s] to the recorder's time [ns]."""
         (recorder_s,) = _converted(np.array([robot_s]), self.robot_s, self.recorder_s)
         return self.began_ns + round(1e9 * float(recorder_s))
 
@@ -114,6 +114,6 @@ def _settings(arrival: Arrival) -> KnownSettings | None:
 
 
 def _converted(at_s: Seconds, these: Seconds, those: Seconds) -> Seconds:
-    """Return times of one clock by another one; outside of the known times both run alike."""
+    """Convert times of one clock to another one; both run at the same rate outside known times."""
     before, after = np.minimum(at_s - these[0], 0.0), np.maximum(at_s - these[-1], 0.0)
     return np.asarray(np.interp(at_s, these, those) + before + after, np.float64)

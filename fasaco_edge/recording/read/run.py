@@ -1,7 +1,7 @@
 """Content of the parts of a run: samples byte for byte, plots, states and log.
 
-The files are not changed: of a torn file, or one being written, the complete frames are read.
-Pictures are skipped chunk by chunk, so that memory does not grow with them.
+Of a file that is torn or still being written, the complete frames are read; no file is changed.
+Drawings are skipped chunk by chunk, so they take no memory.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ class Batch:
 
 
 class RecordedSamples:
-    """The samples in the parts of a recording, and of the recordings after it.
+    """The samples in the parts of one or more runs, in order of time.
 
     Args:
-        paths: the files, in any order. If parts are missing at the beginning, the samples
-            begin with the map that was in force.
-        batches: those that were read of the files already, in any order; None to read them.
-        topics: those to decode, without counting any as missing; None for all.
+        paths: the files, in any order. If the first parts are missing, the samples begin with the
+            map in force.
+        batches: batches already read from the files, in any order; None to read them here.
+        topics: topics to decode, in which case missing samples are not counted; None for all.
 
     Raises:
         UnreadableRecording: a file is no recording, or none has samples.
@@ -63,16 +63,16 @@ class RecordedSamples:
     ) -> None:
         if batches is None:
             batches = [batch for path in paths for batch in _batches(path)]
-            # A single part may have none: its recorder was killed just after it began.
+            # A single part may have no batches, if its recorder was killed just after the start.
             if not batches:
                 raise _no_samples(paths)
         self._topics = topics
-        # Runs are numbered by their beginning, so later ones follow.
+        # A run's number is the time of its beginning.
         self._batches = sorted(batches, key=lambda batch: (batch.place.run, batch.place.first))
         self.missing = 0
 
     def __iter__(self) -> Iterator[Arrival]:
-        """Yield all samples in order; ``missing`` counts those lost in between.
+        """Yield all samples in order; ``missing`` counts the samples lost between them.
 
         Raises:
             UnreadableRecording: a batch is malformed.
@@ -88,7 +88,7 @@ class RecordedSamples:
             except MalformedMessage as error:
                 raise UnreadableRecording(f"{batch.path}: {error}", hint=HINT) from error
             for numbered in samples:
-                # A part begins with samples in force that the part before it may have already.
+                # A part repeats the samples in force at its beginning.
                 if numbered.number < following:
                     continue
                 # Samples from before the first given part do not count as missing.
@@ -126,7 +126,7 @@ def _no_samples(paths: Sequence[Path]) -> UnreadableRecording:
 
 
 def _is_drawn(path: Path) -> bool:
-    """Return whether a file has a robot or a map: a daemon was recorded."""
+    """Return whether a file shows a robot or a map, so that a daemon was recorded."""
     with open_part(path) as (recording, scan):
         found = (chunk.entity for chunk in chunks(recording, scan) if chunk is not None)
         return any(entity in (entities.MAP, entities.ROBOT) for entity in found)
@@ -155,7 +155,7 @@ Row = tuple[int, float | str]
 
 @dataclass(frozen=True, slots=True)
 class PartFile:
-    """A file of a recording: its size, torn bytes, whether it was closed properly."""
+    """A file of a recording: its size, torn bytes, and whether it was closed properly."""
 
     path: Path
     bytes: int
@@ -168,16 +168,16 @@ class RunRecord:
     """Content of the parts of one run.
 
     Attributes:
-        recording_id: the id common to all parts.
+        recording_id: id of the run.
         parts: the files, by name.
         began_ns, ended_ns: first and last time on the timeline ``wall`` [ns].
-        clock: the robot's time at any time on that timeline.
-        plots: float64 (n, 2) of each plotted entity: the robot's time since the beginning [s], and
-            value.
+        clock: converts times on that timeline to the robot's.
+        plots: points of each plotted entity, float64 (n, 2): the robot's time since the beginning
+            [s], and value.
         states: times and names of the states of each state entity.
         log: times and texts of each log entity.
-        field_ns: times of the drawings of the pheromone field.
-        batches: for ``RecordedSamples``.
+        field_ns: times of the drawings of the pheromone field [ns].
+        batches: the samples, for ``RecordedSamples``.
     """
 
     recording_id: str
@@ -223,10 +223,7 @@ def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRe
 
 
 def read_clock(paths: Sequence[Path]) -> RobotClock:
-    """Return the clock of the parts of a run, as that of its ``RunRecord``; raises as above.
-
-    Of several runs it is that of the first.
-    """
+    """Return the clock of the first run in ``paths``; errors as for ``read_run_record``."""
     ids = {path: recording_id(path) for path in paths}
     first = min(filter(None, ids.values()), default="")
     return read_run_record([path for path in paths if ids[path] == first], lambda: None).clock

@@ -1,7 +1,7 @@
 """A recording by time: what was in force at any moment.
 
-Grids and paths are large: of each drawing only its place in the file is kept, and it is read when
-it is to be shown. Poses, statuses and commands are kept.
+Poses, statuses and commands are kept in memory. Grids and paths are large: only their places in
+the file are kept, and each is read on request.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 
 GRIDS = (entities.MAP, entities.FLOOR, entities.PHEROMONE)
 KEPT = ("status", "command", "rooms", PATH_DIGEST)
-# Rows of poses and drawings in a file: at least this many bytes each, beyond these few.
+# Limit on the rows of poses and drawings of a file: one per ``ROW_BYTES``, plus ``FEW_ROWS``.
 ROW_BYTES, FEW_ROWS = 8, 100_000
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a drawing is: its time [ns], its open file, its frame and its row there."""
+    """Place of a drawing: its time [ns], open file, offset of the frame [bytes], row."""
 
     at_ns: int
     descriptor: int
@@ -54,11 +54,11 @@ class Place:
 
 @dataclass(slots=True)
 class Timeline:
-    """What was drawn, and what came, in order of time.
+    """Drawings and samples of a recording, in order of time.
 
     Attributes:
-        clock: the robot's time at any of the recording's times.
-        ended_ns: of the recording, since the epoch [ns].
+        clock: converts the recording's times to the robot's.
+        ended_ns: end of the recording, since the epoch [ns].
         samples: statuses, commands, rooms and digests of paths.
         pose_ns, poses: times int64 (n,) [ns], and float64 (n, 3): x [m], y [m], yaw [rad].
     """
@@ -72,17 +72,17 @@ class Timeline:
 
     @property
     def began_ns(self) -> int:
-        """When the recording began, since the epoch [ns]."""
+        """Beginning of the recording, since the epoch [ns]."""
         return self.clock.began_ns
 
     def newest(self, entity: str, at_ns: int) -> Place | None:
-        """Return the last drawing of an entity up to a time; None before the first."""
+        """Return the last drawing of an entity up to a time [ns]; None before the first one."""
         places = self._drawn.places.get(entity, [])
         index = bisect_right(places, at_ns, key=lambda place: place.at_ns)
         return places[index - 1] if index else None
 
     def samples_between(self, since_ns: int, until_ns: int) -> Sequence[Arrival]:
-        """Return the samples that came after one time, up to another [ns]."""
+        """Return the samples received after ``since_ns`` and up to ``until_ns``."""
         first, last = (
             bisect_right(self.samples, at_ns, key=lambda one: one.wall_ns)
             for at_ns in (since_ns, until_ns)
@@ -90,7 +90,7 @@ class Timeline:
         return self.samples[first:last]
 
     def poses_between(self, since_ns: int, until_ns: int) -> NDArray[np.float64]:
-        """Return the poses after one time, up to another [ns]."""
+        """Return the poses after ``since_ns`` and up to ``until_ns``, float64 (n, 3)."""
         first, last = np.searchsorted(self.pose_ns, (since_ns, until_ns), side="right")
         return self.poses[first:last]
 
@@ -98,12 +98,12 @@ class Timeline:
         """Read a drawn grid.
 
         Raises:
-            UnreadableRecording: it is damaged, or its file was changed.
+            UnreadableRecording: the file is damaged, or was changed.
         """
         return _first(partial(grids_in, anchor=self._drawn.anchor), place)
 
     def line(self, place: Place) -> DrawnLine:
-        """Read a drawn line; raises as ``grid``."""
+        """Read a drawn line; errors as for ``grid``."""
         return _first(partial(lines_in, anchor=self._drawn.anchor), place)
 
 

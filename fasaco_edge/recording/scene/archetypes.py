@@ -1,9 +1,7 @@
 """Rerun archetypes of messages: metres, z up, rows flipped.
 
-A grid's row 0 has the smallest y, an image's row 0 is its top: every grid is
-flipped here, and nowhere else.
-
-The colours of states are static, logged once.
+A grid's row 0 has the smallest y, an image's row 0 is its top: every grid is flipped here, and
+nowhere else.
 """
 
 from __future__ import annotations
@@ -33,14 +31,14 @@ COVERED_COLOUR: Colour = (56, 152, 222)
 RECOVERED_COLOUR: Colour = (245, 140, 40)
 SWEPT_COLOUR: Colour = (45, 212, 191)
 LABEL_COLOUR: Colour = (255, 255, 255)
-# Bright, as their names are written in them on a dark ground.
+# Bright colours: the labels have them, too, on a dark background.
 START_COLOUR: Colour = (74, 222, 128)
 END_COLOUR: Colour = (251, 113, 133)
-# Arrows along the trail stand out from its field, which goes from black over red to yellow.
+# Arrows along the trail; the field below them goes from black over red to yellow.
 UNDECIDED_COLOUR: Colour = (70, 80, 130)
 DECIDED_COLOUR: Colour = (94, 234, 255)
 
-# Heights [m] only order the layers: the eye looks down from far above.
+# Heights [m] only order the layers: the camera looks straight down.
 ARROW_Z, ROBOT_Z, LABEL_Z = 0.03, 0.06, 0.1
 # Sizes on the screen [points].
 ARROW_WIDTH = 1.0
@@ -63,7 +61,7 @@ class LineStyle:
 
 
 WINDOW = LineStyle((219, 39, 119), z=0.055, width=2.0)
-# They lie below all that moves; the colour is also that of their names, on dark labels.
+# Rooms lie below all that moves; their names have the same colour, on dark labels.
 ROOM = LineStyle((251, 146, 60), z=0.015, width=1.0)
 OLD_PATH = LineStyle((196, 181, 253), z=0.03, width=0.8)
 PATH = LineStyle((124, 58, 237), z=0.04, width=1.2)
@@ -89,7 +87,7 @@ def map_archetype(grid: OccupancyGrid) -> rr.GridMap:
 
 
 def floor_archetype(grid: OccupancyGrid) -> rr.GridMap:
-    """Return swept floor as a layer over the map, the denser the more of a square is swept."""
+    """Return swept floor as a layer over the map, whose opacity is the swept share of a pixel."""
     tints = np.zeros((256, 4), np.uint8)
     tints[:101, :3] = SWEPT_COLOUR
     tints[:101, 3] = np.linspace(0, entities.SWEPT_OPACITY, 101)
@@ -104,21 +102,21 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
 
 
 def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
-    """Return the label over the living trail: its path, and how decided it is."""
+    """Return the label over the living trail: its path, and its branching factor."""
     text = f"pheromone at path {about.revision}, "
     if message.best_steps:
         text += f"{message.best_steps} steps to drive; "
         text += f"ants see {about.branching:.1f} ways in a cell (1: sure, 4: undecided)"
     else:
-        # Without a way to drive it says nothing how many ways a cell has.
+        # Without a path the branching factor means nothing.
         text += "nothing left to drive"
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 
 
 def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
-    """Return points [m] float64 (n, 2) as a line; nothing for fewer than two points.
+    """Return points [m], float64 (n, 2), as a line; an empty one for fewer than two points.
 
-    Its colour and width are logged once, see ``style_archetype``.
+    ``style_archetype`` has its colour and width, which are logged once.
     """
     points = np.column_stack((xy, np.full(len(xy), style.z)))
     return rr.LineStrips3D.from_fields(strips=[points] if len(points) >= 2 else [])
@@ -129,7 +127,7 @@ def arrows_archetype(flows: Flows) -> rr.Arrows3D:
     count = len(flows.origins)
     origins = np.column_stack((flows.origins, np.full(count, ARROW_Z))).astype(np.float32)
     vectors = np.column_stack((flows.vectors, np.zeros(count))).astype(np.float32)
-    # A cell with four equal directions has a quarter, a decided cell all.
+    # The share is a quarter in a cell with four equal directions, and 1 in a decided cell.
     sure = np.clip((flows.share - 0.25) / 0.75, 0.0, 1.0)[:, np.newaxis]
     low, high = np.array(UNDECIDED_COLOUR), np.array(DECIDED_COLOUR)
     colours = np.rint(low + sure * (high - low)).astype(np.uint8)
@@ -139,7 +137,7 @@ def arrows_archetype(flows: Flows) -> rr.Arrows3D:
 def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3D:
     """Return text over the upper edge of a rectangle (x_min, y_min, x_max, y_max) [m].
 
-    ``above``: distance above it, as a share of the rectangle's height.
+    ``above``: distance to the edge, as a share of the rectangle's height.
     """
     x0, y0, x1, y1 = bounds
     place = ((x0 + x1) / 2, y1 + above * (y1 - y0), LABEL_Z)
@@ -163,9 +161,9 @@ def style_archetype(style: LineStyle) -> rr.LineStrips3D:
 
 
 def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the corners of a line, float64 (n, 2).
+    """Return the corners of a line (n, 2), float64 (k, 2).
 
-    A path over the lattice is mostly straight lanes: a tenth of its points draw the same line.
+    A path over the lattice is mostly straight lanes: the corners are a tenth of its points.
     """
     if len(xy) < 3:
         return xy
@@ -178,7 +176,7 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def pose_archetype(pose: Pose2D) -> rr.Transform3D:
-    """Return the robot's pose, to the millimetre: it is logged with each pose."""
+    """Return the robot's pose, rounded to the millimetre to save space."""
     half = pose.yaw / 2
     return rr.Transform3D.from_fields(
         translation=[round(pose.x, 3), round(pose.y, 3), ROBOT_Z],
@@ -189,7 +187,7 @@ def pose_archetype(pose: Pose2D) -> rr.Transform3D:
 def body_archetypes(
     radius_m: float, colour: Colour = ROBOT_COLOUR
 ) -> tuple[rr.Ellipsoids3D, rr.LineStrips3D]:
-    """Return a robot of ``radius_m`` [m] around its own origin: the body, and its heading."""
+    """Return body and heading of a robot, in the robot's frame."""
     body = rr.Ellipsoids3D(
         half_sizes=[[radius_m, radius_m, 0.01]], colors=[colour], fill_mode="solid"
     )
@@ -208,7 +206,7 @@ def box_archetype(bounds: Bounds, style: LineStyle) -> rr.LineStrips3D:
 def polygons_archetype(
     polygons: Sequence[tuple[str, NDArray[np.float64]]], style: LineStyle
 ) -> rr.LineStrips3D:
-    """Return the borders of named polygons, each of corners (n, 2) [m]; nothing for none."""
+    """Return the outlines of named polygons, each of corners (n, 2) [m]."""
     closed = [np.vstack([corners, corners[:1]]) for _, corners in polygons]
     strips = [np.column_stack((xy, np.full(len(xy), style.z))) for xy in closed]
     names = [name for name, _ in polygons]
@@ -232,8 +230,8 @@ def grid_archetype(
 ) -> rr.GridMap:
     """Return pixels, uint8 (rows, cols) or (rows, cols, 4) in RGBA, as a layer of the map."""
     origin = geometry.origin
-    # All components with every message: size and origin change while the map grows, and
-    # a component once logged as static would hide later ones.
+    # Every message has all components: size and origin change while the map grows, and a static
+    # component would hide later ones.
     return rr.GridMap(
         data=pixels[::-1].tobytes(),
         format=rr.components.ImageFormat(

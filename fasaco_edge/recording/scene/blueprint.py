@@ -1,4 +1,4 @@
-"""The blueprint of a recording: a page of what happened, and a page of details."""
+"""The blueprint of a recording, its layout in Rerun: a page for the mission, one for details."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
 
-# Bounds before there is a map [m].
+# Bounds of the view without a map [m].
 NO_MAP: Bounds = (-5.0, -5.0, 5.0, 5.0)
-# Space for the map to grow a little before the eye moves, and for a label above the field.
+# Space for the map to grow a little without a new view, and for a label above the field.
 MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
-# Rerun's vertical field of view, and the shapes (width / height) that the spatial views have
-# in this layout at 1280 x 720.
+# Rerun's vertical field of view, and the aspect ratios (width / height) of the spatial views in
+# this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
 VIEW_ASPECT, PHEROMONE_ASPECT = 1.3, 2.2
-# The plot of the gap ends here: that of the last metres says nothing of the mission.
+# Upper end of the gap's plot: larger gaps, of the last metres, say nothing about the mission.
 MOST_GAP = 2.0
 
 MAP_BACKGROUND = [38, 41, 48]
 PHEROMONE_BACKGROUND = [10, 10, 14]
-# The path over the field: its colour, and its width [points], so thin that the field is seen.
+# The path over the field: its colour, and its width [points], thin enough to see the field.
 PATH_ON_FIELD, PATH_WIDTH = [255, 255, 255], 0.8
 
 
 def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
-    """Return the layout, its eyes over ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
+    """Return the layout; its spatial views show ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
     bounds = bounds or NO_MAP
     return rrb.Blueprint(
         rrb.Tabs(
@@ -88,9 +88,9 @@ def plot_view(
     top: float = 0.0,
     contents: Sequence[str] = ("$origin/**",),
 ) -> rrb.TimeSeriesView:
-    """Return a view of curves over the whole time, from 0 to ``top`` if that is given."""
+    """Return a view of curves over the whole time; a ``top`` above 0 limits values to 0..top."""
     axis = rrb.ScalarAxis(range=(0.0, top)) if top else None
-    # The whole mission, whatever its length: the default is a minute.
+    # The whole mission; Rerun's default is a minute.
     whole = rrb.TimeAxis(
         view_range=rr.TimeRange(
             start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite()
@@ -139,7 +139,7 @@ def _states() -> rrb.StateTimelineView:
 
 def log_view() -> rrb.TextLogView:
     """Return a view of all logs, without the lines of level DEBUG."""
-    # A column of times would be a digit wide; the cursor shows the time.
+    # The view is too narrow for a column of times; the cursor shows the time.
     columns = rrb.TextLogColumns(
         timeline_columns=[rrb.encodings.TimelineColumn(entities.WALL_CLOCK, visible=False)],
         text_log_columns=[rrb.encodings.TextLogColumn("Body")],
@@ -153,14 +153,14 @@ def _card() -> rrb.TextDocumentView:
 
 
 def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D:
-    """Return an eye that looks down on ``bounds`` from above, in a view of ``aspect``."""
+    """Return a camera that looks down on ``bounds``, in a view of width / height ``aspect``."""
     x0, y0, x1, y1 = bounds
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     reach = max((y1 - y0) / 2, (x1 - x0) / 2 / aspect, 0.5)
     height = margin * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
-        # Straight down the eye's up axis would be undefined.
+        # Exactly straight down, the camera's up axis would be undefined.
         position=[x, y - 1e-3 * height, height],
         look_target=[x, y, 0.0],
         eye_up=[0.0, 1.0, 0.0],
@@ -168,7 +168,7 @@ def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D
 
 
 def last_seconds(seconds: float) -> rrb.VisibleTimeRanges:
-    """Return the range of this many seconds up to the cursor."""
+    """Return the range of the last ``seconds`` [s] before the cursor."""
     return rrb.VisibleTimeRanges(
         timeline=entities.WALL_CLOCK,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),

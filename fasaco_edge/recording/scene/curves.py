@@ -1,7 +1,7 @@
-"""Curves of figures over time: a figure is drawn only where it changes.
+"""Curves of figures over time: a figure is drawn only when it changes.
 
-An entity drawn once a second takes five megabytes an hour, whatever its content: the recording is
-flushed as often, and each flush begins a chunk for each entity.
+Each flush, once a second, begins a chunk for each entity drawn since the last one: an entity drawn
+once a second takes five megabytes an hour, whatever its content.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.status import Status
 
-# Curves are drawn as staircases (``CURVES``). Each value is repeated at least this often, so
-# that a new part, or the time after a gap, shows every curve within a minute.
+# Longest time between two drawings of a figure: a new part, or the time after a gap, shows every
+# curve within a minute.
 PERIOD_NS = 60_000_000_000
-# Latencies and memory: relative changes below this are ignored.
+# Relative changes of latencies and memory up to this are ignored.
 NOISE = 0.1
 BATTERY_NOISE = 0.02
 
-# Entity, name in the legend, colour; a curve that is in no plot needs none.
+# Entity, name in the legend, colour of each curve in a plot.
 CURVES: tuple[tuple[str, str, Colour], ...] = (
     (entities.COVERED_FRACTION, "covered", COVERED_COLOUR),
     (entities.RECOVERED_FRACTION, "again", RECOVERED_COLOUR),
@@ -68,8 +68,8 @@ class Curves:
 
         Args:
             entity: the entity to draw.
-            value: the present figure.
-            noise: least relative change to draw.
+            value: the current figure.
+            noise: relative change up to which it is not drawn.
             spacing_ns: least time between two drawings [ns].
         """
         now_ns = self._writer.wall_ns
@@ -94,13 +94,13 @@ class Curves:
         self._writer.log(entity, rr.Scalars(curve.last))
 
 
-# The shares of the coverage change with almost every sample of it, once a second.
+# Least time between drawings of the covered share, which changes about once a second.
 SHARE_SPACING_NS = 2_000_000_000
-# Ever-growing counts are drawn no more often than this.
+# Least time between drawings of counts that grow all the time.
 COUNT_SPACING_NS = 30_000_000_000
-# Processor time is averaged over at least this many seconds.
+# Shortest period over which processor time is averaged [s].
 LEAST_SHARE_S = 30.0
-# The contract has dozens of codes; a foreign daemon's must not fill the recording.
+# Limit on the error codes drawn: a faulty daemon must not fill the recording.
 MOST_CODES = 50
 _CODE = re.compile(r"[a-z_]{1,40}")
 
@@ -112,7 +112,7 @@ class StatusFigures:
 
     def __init__(self, curves: Curves) -> None:
         self._curves = curves
-        # Uptime and processor time [s] at the beginning of the current average.
+        # Uptime and processor time [s] at the beginning of the current period.
         self._since: tuple[float, float] | None = None
         # Time saved by ants and by local search, over all plans [s].
         self._saved = [0.0, 0.0]
@@ -135,7 +135,7 @@ class StatusFigures:
             self._curves.draw(entity, by_code[code], spacing_ns=COUNT_SPACING_NS)
 
     def add_path(self, about: PathAttachment) -> None:
-        """Draw the quality of a planned path; steps, bound, cost are in the log and the inputs."""
+        """Draw the quality of a planned path."""
         if about.gap is not None:
             self._curves.draw(entities.GAP, about.gap)
         if about.saved_by_ants_s is not None and about.saved_by_local_search_s is not None:
@@ -145,7 +145,7 @@ class StatusFigures:
                 self._curves.draw(entity, seconds)
 
     def _add_process(self, status: Status) -> None:
-        """Draw memory and processor time of the daemon; 0 means that it does not send them."""
+        """Draw memory and processor time of the daemon; 0 means unknown."""
         if status.rss_mb:
             self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
         if status.uptime_s:

@@ -23,7 +23,7 @@ from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.reasons import plain
 
-# Bytes of a point in the file; each path is drawn twice, the second time as the previous path.
+# Bytes of a path's point in the file: each path is drawn twice, also as the previous path.
 POINT_BYTES = 2 * 12
 
 
@@ -40,11 +40,11 @@ class PathDrawing:
         self.catch_up, self.finish = self._log.catch_up, self._log.finish
         self._revision = -1
         self._has_window = False
-        # Revision and line of the path that is drawn.
+        # Revision and line of the path drawn last.
         self._drawn: tuple[int, Line | None] = (-1, None)
 
     def add(self, message: PathMessage, about: PathAttachment) -> None:
-        """Draw a path; a path that is published again is not drawn anew."""
+        """Draw a path, and log it unless it was published before."""
         revision = about.revision
         if revision:
             self._writer.sequence(entities.REPLAN, revision)
@@ -62,7 +62,7 @@ class PathDrawing:
         self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._writer.wall_ns)
 
     def _draw_window(self, changed: Rectangle | None, reason: str) -> None:
-        """Draw the part of the map that led to the path, if any."""
+        """Draw the changed part of the map that caused the path, if any."""
         if changed is not None:
             bounds: Bounds = astuple(changed)
             box = draw.box_archetype(bounds, draw.WINDOW)
@@ -81,13 +81,13 @@ class PathDrawing:
         self._writer.log(entity, archetype, latched=True, size=line.nbytes)
 
 
-# Plans of one kind that follow each other for this long are one line of the log.
+# Successive plans of one kind share a line of the log for this long.
 GROUP_NS = 60_000_000_000
 
 
 @dataclass(slots=True)
 class _Group:
-    """Plans of one kind: when the first came [ns], how many came since, the newest revision."""
+    """Successive plans of one kind: time of the first [ns], number of others, newest revision."""
 
     kind: str
     since_ns: int
@@ -96,10 +96,11 @@ class _Group:
 
 
 class PathLog:
-    """Logs paths: each planned path with a new kind of reason at once, those after it as a group.
+    """Logs paths: successive plans with the same kind of reason are summed up in one line.
 
-    Every path has a line. Those of a group, and of paths without a plan, such as a polished line,
-    have the level DEBUG, which the layout leaves out.
+    The first plan of a kind is logged at once, the others form a group. Each path of a group, and
+    each path without a plan (such as a polished line), has a line of level DEBUG, too, which the
+    layout does not show.
     """
 
     def __init__(self, writer: RecordingWriter) -> None:
@@ -121,7 +122,7 @@ class PathLog:
             self._write(line, "INFO")
 
     def catch_up(self) -> None:
-        """Log a group that is old enough; call it often."""
+        """Log the group once it is old enough; call it often."""
         if self._group is not None and self._writer.wall_ns - self._group.since_ns >= GROUP_NS:
             self.finish()
 
@@ -139,7 +140,7 @@ class PathLog:
 
 def _path_line(message: PathMessage, about: PathAttachment) -> str:
     named = f"path {about.revision}" if about.revision else "path"
-    # Of a plan its figures when it was made; part of the path may have been driven since.
+    # The figures of a plan are those at planning time; part of its path may be driven by now.
     planned = about.planned_steps
     facts = [f"{max(len(message.xy) - 1, 0) if planned is None else planned} steps"]
     if about.planned_cost_s is not None:
@@ -152,7 +153,7 @@ def _path_line(message: PathMessage, about: PathAttachment) -> str:
 
 
 SPACING_M = 0.02
-# If it were drawn with each flush, the driven path would be a twentieth of an hour's recording.
+# Period of drawing the driven path: drawn with each flush, it would be 5 % of the recording.
 PERIOD_NS = 2_000_000_000
 
 
@@ -172,7 +173,7 @@ class DrivenPathDrawing:
         self.catch_up()
 
     def catch_up(self) -> None:
-        """Draw a piece that has waited long enough; call it often."""
+        """Draw the waiting piece once it is due; call it often."""
         if self._writer.wall_ns - self._drawn_ns >= PERIOD_NS:
             self.finish()
 
@@ -191,19 +192,19 @@ Named = tuple[str, Polygon | None]
 
 
 class AreaDrawing:
-    """Outlines the rooms, the zones of the order, its keep-outs and the operator's.
+    """Draws the outlines of rooms, of zones, and of the keep-outs of order and operator.
 
     Args:
-        writer: what to draw with.
-        layers: that limit the rate of the rooms.
-        anchored: returns the origin of drawings, for a first place.
+        writer: writes the drawings.
+        layers: limits the rate of the rooms.
+        anchored: returns the origin of drawings; the first call sets it near the given pose.
     """
 
     def __init__(
         self, writer: RecordingWriter, layers: Layers, anchored: Callable[[Pose2D], Anchor]
     ) -> None:
         self._writer, self._layers, self._anchored = writer, layers, anchored
-        # The order, by the last command, and the operator's keep-outs, by the last status.
+        # The order of the last command, and the operator's keep-outs and zones of the last status.
         self._order = EVERYTHING_ONCE
         self._kept_out: list[Named] = []
         self._zones: list[Named] = []
@@ -241,7 +242,7 @@ class AreaDrawing:
 
     def _draw(self) -> None:
         order = self._order
-        # An order may name a standing zone or a room in place of a polygon.
+        # The order may name a zone or room; the status then has its polygon.
         zones = self._zones or [(zone.name, zone.polygon) for zone in order.zones]
         keep_out = [*(("keep out", polygon) for polygon in order.keep_out), *self._kept_out]
         for entity, style, polygons in (

@@ -12,7 +12,7 @@ from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.kernels import COL_STEP, EAST, NORTH, ROW_STEP
 
-# A run is cut where the trail's share differs by this much from that at its beginning.
+# A run ends where the share of its direction changes by more than this from one cell to the next.
 DECIDED_APART = 0.2
 # Bytes of an arrow in the file: origin, vector, colour.
 ARROW_BYTES = 2 * 12 + 4
@@ -25,7 +25,7 @@ class Flows:
     Attributes:
         origins: float64 (n, 2) [m].
         vectors: float64 (n, 2) [m].
-        share: float64 (n,), the share of the cells' pheromone in their direction.
+        share: float64 (n,), mean share of a cell's pheromone in the arrow's direction.
     """
 
     origins: NDArray[np.float64]
@@ -34,7 +34,7 @@ class Flows:
 
     @property
     def size_bytes(self) -> int:
-        """Their size in a file."""
+        """Size in a file [bytes]."""
         return ARROW_BYTES * len(self.origins)
 
 
@@ -43,20 +43,19 @@ def flows_of(
 ) -> Flows:
     """Return an arrow for each straight run of cells with the same direction.
 
-    It leads from the centre of the first cell to that of the cell after the last one. A cell
-    with four equal directions has no arrow.
+    An arrow leads from the centre of the first cell to the centre of the cell after the last one.
+    A cell with four equal directions has no arrow.
 
     Args:
-        geometry: of the cells.
+        geometry: size and place of the grid of cells.
         pointed: int8 (rows, cols), direction 0..3 of the trail, -1 for none.
-        share: float32 (rows, cols), its share of the cell's pheromone.
+        share: float32 (rows, cols), share of the cell's pheromone in that direction.
     """
     rows, cols = pointed.shape
     begins: list[tuple[int, int, int, int, float]] = []
     for direction in (EAST, NORTH, EAST + 2, NORTH + 2):
         up, right = ROW_STEP[direction], COL_STEP[direction]
-        # The cell behind each cell, against its direction: it belongs to another run if it points
-        # elsewhere.
+        # A cell begins a run if the cell behind it has another direction.
         marked = np.pad((pointed == direction) & (share > 0.25 + 1e-6), 1)
         decided = np.pad(share, 1)
         before = (slice(1 - up, rows + 1 - up), slice(1 - right, cols + 1 - right))

@@ -1,11 +1,10 @@
 """Layers of a recording: their origin and rate limits.
 
-A viewer draws in float32, whose resolution at a UTM northing is 0.5 m: far from 0 everything is
-drawn relative to whole kilometres near the first pose.
+A viewer draws in float32, whose resolution at a UTM northing is 0.5 m. If the first pose is far
+from 0, everything is drawn relative to an anchor near it, in whole kilometres.
 
-Maps of a million pixels and paths of ten thousand cells are drawn no faster than a recording may
-grow. Each layer has a rate limit, a token bucket. While tokens are left, a drawing is made at once;
-otherwise the newest waits for tokens, and those before it are skipped.
+A token bucket limits the rate of each layer, in bytes per second. While tokens are left, a drawing
+is made at once; otherwise it waits for tokens, and the next drawing replaces it.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class Anchor:
 
     @classmethod
     def near(cls, x: float, y: float) -> Anchor:
-        """Return the anchor of a drawing around a point [m]; 0 on an axis where it is near 0."""
+        """Return the anchor for drawings around a point [m]; 0 along an axis if near 0."""
         return cls(*(0.0 if abs(at) < NEAR_M else STEP_M * round(at / STEP_M) for at in (x, y)))
 
     def __bool__(self) -> bool:
@@ -52,28 +51,28 @@ class Anchor:
 
     @property
     def xy(self) -> tuple[float, float]:
-        """Its position [m]."""
+        """Position (x, y) [m]."""
         return self.x, self.y
 
     def pose(self, pose: Pose2D) -> Pose2D:
-        """Return a pose as it is drawn."""
+        """Return a pose relative to the anchor."""
         return replace(pose, x=pose.x - self.x, y=pose.y - self.y)
 
     def grid(self, grid: Grid) -> Grid:
-        """Return a grid as it is drawn."""
+        """Return a grid relative to the anchor."""
         if not self:
             return grid
         geometry = grid.geometry
         return replace(grid, geometry=replace(geometry, origin=self.pose(geometry.origin)))
 
     def path(self, message: PathMessage) -> PathMessage:
-        """Return a path as it is drawn."""
+        """Return a path relative to the anchor."""
         if not self:
             return message
         return replace(message, xy=message.xy - np.array((self.x, self.y)), yaw=message.yaw)
 
     def attachment(self, about: PathAttachment) -> PathAttachment:
-        """Return a path's attachment, with the rectangle of its reason shifted."""
+        """Return a path's attachment, its rectangle relative to the anchor."""
         changed = about.changed
         if not self or changed is None:
             return about
@@ -83,7 +82,7 @@ class Anchor:
 
 
 def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:
-    """Return whether bounds have moved away from ``framed`` by more than a share of its size."""
+    """Return whether ``bounds`` differ from ``framed`` by more than a share of its size."""
     size = max(framed[2] - framed[0], framed[3] - framed[1])
     moved = max(abs(a - b) for a, b in zip(framed, bounds, strict=True))
     return moved > share * size
@@ -107,7 +106,7 @@ LOOSER = 1.5
 
 @dataclass(slots=True)
 class _Layer:
-    """Tokens of a layer [bytes] at a time [ns], and the waiting drawing: its size and function."""
+    """Tokens of a layer [bytes] at a time [ns], and the waiting drawing: size and function."""
 
     allowance: float
     at_ns: int = 0
@@ -115,26 +114,26 @@ class _Layer:
 
 
 class Layers:
-    """Decides when each layer is drawn; on the writer's thread, by its clock."""
+    """Decides when each layer is drawn; for the writer's thread and clock only."""
 
     def __init__(self, rates: Mapping[str, float] = RATES) -> None:
         self._rates = dict(rates)
         self._layers = {name: _Layer(BURST_S * rate) for name, rate in rates.items()}
 
     def limit(self, rates: Mapping[str, float]) -> None:
-        """Set the rates of layers; those that are new are added."""
+        """Set the rates of layers, existing or new [bytes/s]."""
         self._rates |= rates
         for name, rate in rates.items():
             layer = self._layers.setdefault(name, _Layer(BURST_S * rate))
             layer.allowance = min(layer.allowance, BURST_S * rate)
 
     def draw(self, name: str, size: int, draw: Callable[[], None], now_ns: int) -> None:
-        """Call ``draw`` now or later, in place of a waiting drawing.
+        """Call ``draw`` now or later; it replaces a waiting drawing of the layer.
 
         Args:
-            name: of the layer, one of those with a rate.
+            name: a layer that has a rate.
             size: approximate size in the file [bytes].
-            draw: draws, at any later time.
+            draw: makes the drawing.
             now_ns: monotonic time [ns].
         """
         self._layers[name].waiting = size, draw

@@ -1,4 +1,4 @@
-"""The run card: the outcome of a run, a legend and its settings, beside the map."""
+"""The run card, a text beside the map: the outcome of a run, a legend, and the settings."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class RunDescription:
 
     Attributes:
         robot: name of the robot.
-        began: when the recording began, UTC, as text.
-        version: of the planner; "" while unknown.
-        config: its configuration from its status.
-        anchor: point (x, y) [m] of the map frame that is drawn at 0; None for 0 itself.
-        outcome: of the mission, as far as known.
+        began: beginning of the recording, UTC, as text.
+        version: version of the planner; "" while unknown.
+        config: configuration in the planner's status.
+        anchor: point (x, y) [m] of the map frame that is drawn at 0; None for the origin.
+        outcome: outcome of the mission so far.
     """
 
     robot: str
@@ -98,19 +98,19 @@ def flat_settings(config: Settings, prefix: str = "") -> Iterator[tuple[str, str
 
 
 def markdown_cell(value: object) -> str:
-    """Return a value escaped for Markdown: no link, no picture, no HTML, no further cell."""
+    """Return a value as one line of plain text in a table of Markdown."""
     return MARK_UP.sub(r"\\\g<0>", one_line(str(value)))
 
 
-# States in which there is no outcome yet.
+# States without an outcome.
 UNDER_WAY = ("planning", "covering")
 
 
 class Outcome:
-    """The outcome of a mission, as far as known at the time.
+    """The outcome of a mission so far.
 
     Attributes:
-        text: its line in the run card; "" before the first status.
+        text: line in the run card; "" before the first status.
     """
 
     def __init__(self) -> None:
@@ -119,11 +119,11 @@ class Outcome:
         self._state = ""
 
     def add_pose(self, stamped: StampedPose) -> None:
-        """Note the robot's clock; a robot without one has stamps of 0."""
+        """Note the time of the robot's clock; all stamps are 0 if it has none."""
         self._began_ns, self._now_ns = self._began_ns or stamped.stamp_ns, stamped.stamp_ns
 
     def add_status(self, status: Status) -> None:
-        """Note the mission's state, once when it is entered."""
+        """Note a change of the mission's state."""
         if status.state == self._state:
             return
         self._state, self.text = status.state, "**under way**"
@@ -134,8 +134,8 @@ class Outcome:
             words += f" after {duration(1e-9 * (self._now_ns - self._began_ns))}"
         if simulated := scale_words(known_settings(status.config).robot.time_scale):
             words += f" ({simulated})"
-        said = [plain(status.reason)] if status.reason else []
+        facts = [plain(status.reason)] if status.reason else []
         floor = status.floor
         if floor is not None and floor.reachable_m2 and "swept" not in status.reason:
-            said.append(f"{floor.swept_m2:.1f} of {floor.reachable_m2:.1f} m2 swept")
-        self.text = ": ".join([words, *filter(None, ["; ".join(said)])])
+            facts.append(f"{floor.swept_m2:.1f} of {floor.reachable_m2:.1f} m2 swept")
+        self.text = ": ".join([words, *filter(None, ["; ".join(facts)])])

@@ -45,8 +45,8 @@ from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 from fasaco_edge.wire.reasons import plain
 
 DEFAULT_RADIUS_M = 0.2
-# The view follows the growing map in steps of this fraction of its size: each blueprint
-# takes 120 kB.
+# The view follows the growing map in steps of this fraction of its size, as each blueprint takes
+# 120 kB.
 REFRAME_FRACTION = 0.15
 
 
@@ -56,7 +56,7 @@ class Scene:
     def __init__(self, writer: RecordingWriter, description: RunDescription) -> None:
         self._writer = writer
         self._run = description
-        # The anchor; known with the first pose or map.
+        # Set by the first pose, map or path.
         self._anchor: Anchor | None = None
         self._map: OccupancyGrid | None = None
         self._known: Bounds | None = None
@@ -65,7 +65,7 @@ class Scene:
         self._robot: Pose2D | None = None
         self._states: dict[str, str] = {}
         self._troubles: set[str] = set()
-        # What was drawn last of the grids that a daemon publishes again unchanged.
+        # The last drawn content of each grid: a daemon publishes unchanged grids again.
         self._drawn: dict[str, object] = {}
         self._outcome = Outcome()
         self._layers = Layers()
@@ -97,7 +97,7 @@ class Scene:
         """Apply a patch to the map.
 
         Raises:
-            PatchWithoutBase: it fits no earlier map.
+            PatchWithoutBase: the patch lies outside the map, or there is no map.
         """
         if self._map is None:
             raise PatchWithoutBase("a map update came before any map")
@@ -123,11 +123,11 @@ class Scene:
         which += f" {command.room.id!r}" if command.room else ""
         self.add_line(entities.MISSION_LOG, f"command: {command.name}{which}")
         if command.name in ("start", "cancel", "reset"):
-            # Only a start has an order; other commands remove its zones.
+            # The order of the other two commands is empty: the zones are removed.
             self._areas.begin(command.order)
 
     def add_rooms(self, found: Rooms) -> None:
-        """Draw the outlines of the rooms, with their names; a drive alone changes neither."""
+        """Draw the outlines of the rooms, with their names."""
         self._areas.add_rooms([(room.title, room.outline) for room in found.outlined])
 
     def add_path(self, message: PathMessage, about: PathAttachment) -> None:
@@ -150,12 +150,12 @@ class Scene:
         if self._comes_again(entities.FLOOR, grid.geometry, grid.cells):
             return
         grid = self._anchored(grid.geometry.origin).grid(grid)
-        # Drawn with four bytes a pixel, it is twice as large.
+        # With four bytes a pixel, it is twice as large after compression.
         size, drawn = 2 * size_in_file(grid.cells), 4 * grid.cells.size
         self._draw(entities.FLOOR, size, lambda: draw.floor_archetype(grid), drawn)
 
     def add_pheromone(self, message: PheromoneMessage, about: TrailAttachment) -> None:
-        """Draw the living trail; plot how decided it is."""
+        """Draw the living trail; plot its branching factor."""
         if self._comes_again(entities.PHEROMONE, (message.geometry, about), message.levels):
             return
         message = self._anchored(message.geometry.origin).grid(message)
@@ -168,7 +168,7 @@ class Scene:
 
         size = size_in_file(message.levels)
         self._draw(entities.PHEROMONE, size, draw_pheromone, message.levels.size)
-        # The scale of the levels, to decode them into trails.
+        # These limits are needed to convert levels to pheromone.
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
 
@@ -189,7 +189,7 @@ class Scene:
         self._add_restored(status.ledger.restored_cells)
         self._areas.add_report(status.mission)
         if status.state not in UNDER_WAY:
-            # The plans came before, and a viewer orders lines of one time by entity.
+            # A later time puts the plans first: a viewer sorts lines of the same time by entity.
             self._paths.finish()
             self._writer.at(self._writer.wall_ns + 1)
         self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
@@ -238,7 +238,7 @@ class Scene:
     def _draw(
         self, entity: str, in_file: int, drawn: Callable[[], rr.AsComponents], size: int = 0
     ) -> None:
-        """Draw a layer once its rate allows; ``in_file``, ``size``: compressed, and not [bytes]."""
+        """Draw a layer once its rate allows; ``in_file``: its compressed size [bytes]."""
 
         def log() -> None:
             self._writer.log(entity, drawn(), latched=True, size=size)
@@ -246,13 +246,13 @@ class Scene:
         self._layers.draw(entity, in_file, log, self._writer.wall_ns)
 
     def _comes_again(self, entity: str, about: object, pixels: NDArray[np.generic]) -> bool:
-        """Return whether the newest grid of an entity is the one that was drawn last."""
+        """Return whether the newest grid of an entity equals the grid before it."""
         before, newest = self._drawn.get(entity), (about, hash(pixels.tobytes()))
         self._drawn[entity] = newest
         return before == newest
 
     def _anchored(self, place: Pose2D) -> Anchor:
-        """Return the origin of drawings, logged with the first pose if that is far from 0."""
+        """Return the anchor; the first ``place`` sets it, and logs it if it is far from 0."""
         if self._anchor is None:
             self._anchor = anchor = Anchor.near(place.x, place.y)
             if anchor:
@@ -287,7 +287,7 @@ class Scene:
 
     def _describe(self) -> None:
         card = rr.TextDocument(self._run.markdown(), media_type="text/markdown")
-        # With a time, as the outcome is not known before the end.
+        # Not static: the outcome changes.
         self._writer.log(entities.RUN_CARD, card, latched=True)
         self._writer.describe(self._run.name)
 
@@ -302,7 +302,7 @@ class Scene:
             self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
 
     def _add_troubles(self, status: Status) -> None:
-        """Log the troubles that began and ended; a degraded mission's own trouble is its reason."""
+        """Log troubles that began or ended, except a trouble that is the reason of the state."""
         present = {each.code: each.text for each in status.troubles[: len(TROUBLES)]}
         for code, text in present.items():
             if code not in self._troubles and text != status.reason:
@@ -312,7 +312,7 @@ class Scene:
         self._troubles = set(present)
 
     def _add_errors(self, errors: ErrorCounts) -> None:
-        # Fewer errors than before: the planner was restarted.
+        # The count falls when the planner restarts.
         if errors.total > self._errors:
             last = errors.last or "no text"
             self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")

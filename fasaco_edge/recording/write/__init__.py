@@ -1,1 +1,1 @@
-"""The recorder: samples from the bus, written to parts of a recording."""
+"""The recorder, which writes samples from the bus to the parts of a recording."""

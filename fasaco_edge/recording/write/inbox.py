@@ -1,15 +1,15 @@
 """The queue between Zenoh's threads and the writer thread, and the clock of a recording.
 
-The queue's size bounds the recorder's memory: a sample as large as the queue is held in up to ten
-copies by Zenoh, the drawing, the inputs and Rerun, and allocators keep some freed memory. With the
-largest maps that fit, however often they are sent, it takes at most
+The queue's capacity bounds the recorder's memory. Zenoh, the drawing, the inputs and Rerun hold up
+to ten copies of a sample, and allocators keep some freed memory. With the largest maps that fit
+into the queue, at any publishing rate, the recorder takes at most
 
     BASE_BYTES + COPIES * capacity
 
-``MemoryHigh=`` of its unit is this sum for ``QUEUE_BYTES``, ``MemoryMax=`` a tenth more (a test
-checks the unit); under another limit the queue is smaller. Measured for a minute each, x86-64,
-random maps at 10 Hz, each followed by a map update of full size: idle 136 MB, 25 million pixels
-488, 31 million 622.
+``MemoryHigh=`` of the recorder's systemd unit is this sum for ``QUEUE_BYTES``, ``MemoryMax=`` is
+10 % more (a test checks the unit). Under a lower limit the queue is smaller. Measured on x86-64
+for a minute each, with random maps at 10 Hz, each followed by an update of the whole map: idle
+136 MB; 25 million pixels 488 MB; 31 million pixels 622 MB.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from fasaco_edge.wire.topics import TOPICS
 
 
 class RunClock:
-    """Monotonic UTC [ns]: setting the clock during a run must not break its timeline."""
+    """Monotonic UTC [ns]: the timeline continues if the system clock is set during a run."""
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
 
     def now_ns(self) -> int:
-        """Return the time since the epoch [ns], by the clock's setting when the run began."""
+        """Return the time since the epoch [ns]; later settings of the system clock are ignored."""
         return self._offset_ns + time.monotonic_ns()
 
     def arrival(self, topic: str, sample: Sample) -> Arrival:
@@ -56,10 +56,11 @@ def afforded_bytes(limit: int | None) -> int:
     return min(max((limit - BASE_BYTES) // COPIES, LEAST_QUEUE_BYTES), QUEUE_BYTES)
 
 
-# With this many waiting samples the writer is behind: some ten seconds of poses.
+# Number of waiting samples at which the writer is behind: about ten seconds of poses.
 BEHIND_SAMPLES = 1024
 
-# Samples superseded by a newer one when the writer is behind; a full map also supersedes updates.
+# For each topic: when the writer is behind, a new sample replaces waiting ones of these topics. A
+# map replaces map updates, too.
 SUPERSEDED = {
     topic.name: frozenset({topic.name}) for topic in TOPICS if topic.queues.recorder == NEWEST
 }
@@ -67,10 +68,10 @@ SUPERSEDED["map"] |= {"map_update"}
 
 
 class Inbox:
-    """Samples in order of arrival, at most ``capacity_bytes`` of them.
+    """A queue of samples in order of arrival, of at most ``capacity_bytes``.
 
-    Once the writer is behind, a sample replaces the older ones that it supersedes; once the
-    capacity is used up, samples are dropped. Both are counted as lost.
+    While the writer is behind, a sample replaces older ones (``SUPERSEDED``). While the queue is
+    full, new samples are dropped. Both kinds are counted as lost.
     """
 
     def __init__(self, capacity_bytes: int, stamp: Callable[[str, Sample], Arrival]) -> None:
@@ -82,10 +83,10 @@ class Inbox:
         self._lost: Counter[str] = Counter()
 
     def post(self, topic: str, sample: Sample) -> None:
-        """Add a sample; safe from any thread, never waits for the writer."""
+        """Add a sample; thread-safe, never waits for the writer."""
         size = sample.size
         with self._changed:
-            # Stamped here, so that samples of several threads have increasing times.
+            # The lock is held: samples of several threads get increasing times.
             arrival = self._stamp(topic, sample)
             if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
                 self._drop(SUPERSEDED.get(arrival.topic, frozenset()))
@@ -97,7 +98,7 @@ class Inbox:
             self._changed.notify()
 
     def take(self, timeout_s: float) -> list[Arrival]:
-        """Return all waiting samples; wait up to ``timeout_s`` [s] for the first."""
+        """Return all waiting samples; wait up to ``timeout_s`` [s] for the first one."""
         with self._changed:
             if not self._waiting:
                 self._changed.wait(timeout_s)
@@ -108,7 +109,7 @@ class Inbox:
 
     @property
     def lost(self) -> Counter[str]:
-        """Number of samples of each topic that never reached the writer."""
+        """Number of lost samples of each topic."""
         with self._changed:
             return self._lost.copy()
 

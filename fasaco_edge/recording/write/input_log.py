@@ -1,8 +1,8 @@
 """The mission's inputs in a recording, byte for byte, beside their drawings.
 
-Samples are gathered for almost a second and written as one blob, without rerun's own batching: a
-kill loses no more than that. Each part begins with all samples in force, so that it can be read
-without the parts before it.
+Samples are gathered for almost a second, and then written as one blob, without Rerun's batching:
+``kill -9`` loses at most that second. Each part begins with all samples in force, so that it can be
+read without the parts before it.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.topics import RECORDED_INPUTS
 
-# Inputs that have an effect only when they arrive; all other inputs stay in force.
+# Topics whose samples have an effect only on arrival; samples of all others stay in force.
 TRANSIENT: Final = ("pose", "command", "turns")
 PERIOD_NS = 900_000_000
 STATUS_PERIOD_NS = round(1e9 * entities.STATUS_PERIOD_S)
 WAITING_BYTES = 4_000_000
-# Limit on the kept samples of static transforms: each node publishes its own once.
+# Limit on the kept samples of static transforms: each node publishes its transforms once.
 MOST_STATIC = 64
-# Limit on the updates since the last full map; with more of them a part begins without the map.
+# Limit on the updates since the last map; beyond it a part begins without the map [bytes].
 IN_FORCE_BYTES = 8_000_000
 
 
 class InputLog:
     """Writes samples into a writer; for the writer's thread only.
 
-    Of paths only a digest is kept; of statuses and rooms the changed ones, one in
-    ``STATUS_PERIOD_NS``, so that the progress of the mission is known at that rate, and the last.
+    Inputs are written in full, paths as a digest. A status or a message about rooms is written when
+    its content changes, else once in ``STATUS_PERIOD_NS`` to show progress, and at the end.
     """
 
     def __init__(self, writer: RecordingWriter, run: int) -> None:
@@ -49,13 +49,14 @@ class InputLog:
         self._part = 0
         self._lost = 0
         self._next_ns = 0
-        # Of statuses and rooms: what the last kept one said, and when; and one after it.
+        # Of status and rooms: content and time of the last written sample, and the newest sample
+        # since.
         self._kept: dict[str, tuple[object, int]] = {}
         self._late: dict[str, Arrival] = {}
         self._now_ns = (0, 0)
 
     def add(self, arrival: Arrival) -> None:
-        """Take a sample, if it is an input of the mission, or tells how it went."""
+        """Take a sample; ignore a topic that is not recorded."""
         self._now_ns = arrival.at_ns, arrival.wall_ns
         if arrival.topic == "path":
             arrival = _path_digest(arrival)
@@ -78,10 +79,10 @@ class InputLog:
             self.write()
 
     def finish(self) -> None:
-        """Write the remaining samples; a part begun just before the end gets a batch, too."""
+        """Write the remaining samples; a part that has just begun gets a batch in any case."""
         at_ns, wall_ns = self._now_ns
         for late in self._late.values():
-            # Samples are in order of time.
+            # The times of samples have to increase.
             self._in_force.note(self._encoder.add(replace(late, at_ns=at_ns, wall_ns=wall_ns)))
         part = self._writer.part_number
         self._write(in_any_case=part > 1 and part != self._part)
@@ -96,11 +97,11 @@ class InputLog:
             self._encoder.restart(self._in_force.samples())
         batch = self._encoder.take(in_any_case=in_any_case)
         if batch and not self._writer.write_blob(batch):
-            # No digest may refer to a sample that was not written.
+            # Samples may refer only to written ones: the next batch starts anew.
             self._part = 0
 
     def _is_due(self, arrival: Arrival) -> bool:
-        """Return whether a status or rooms say something new, or the last kept ones are old."""
+        """Return whether a status or rooms have new content, or the last written one is old."""
         topic = arrival.topic
         if topic not in ("status", "rooms"):
             return False
@@ -120,7 +121,7 @@ class InputLog:
 def _status_news(arrival: Arrival) -> object:
     status = decode_tolerant(arrival.sample.payload, Status)
     return (
-        # A batch with a map: the mission has begun.
+        # The first status with a map shows that the mission has begun.
         *(status.state, status.map is not None, status.version, status.config),
         sorted(status.errors.by_code),
         [trouble.code for trouble in status.troubles],
@@ -135,7 +136,7 @@ def _rooms_news(arrival: Arrival) -> object:
 
 
 def _path_digest(arrival: Arrival) -> Arrival:
-    """Return a digest in place of a path: its points are many bytes and no input."""
+    """Return the digest of a path, whose points are large and no input of the mission."""
     payload = arrival.sample.payload
     with contextlib.suppress(MalformedMessage):
         payload = decode_path(payload).xy.tobytes()
@@ -145,9 +146,9 @@ def _path_digest(arrival: Arrival) -> Arrival:
 
 
 class _InForce:
-    """The newest map, its updates, and the newest sample of each other latched topic.
+    """The samples in force: the map, its updates, the newest sample of each other latched topic.
 
-    Static transforms come from several nodes, and all of them hold.
+    Several nodes publish static transforms: each different one is in force.
     """
 
     def __init__(self) -> None:
@@ -173,7 +174,7 @@ class _InForce:
         self._updates.append(numbered)
         self._updates_bytes += len(numbered.arrival.sample.payload)
         if self._updates_bytes > IN_FORCE_BYTES:
-            # Without its updates the map would be wrong: it is left out.
+            # Without its updates the map would be wrong.
             del self._newest["map"]
             self._updates, self._updates_bytes = [], 0
 

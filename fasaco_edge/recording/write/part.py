@@ -22,9 +22,9 @@ from fasaco_edge.recording.sdk import rr
 
 LOG = logging.getLogger(__name__)
 
-# Rows gather until the writer flushes, or at most this long [s].
+# Rerun's own flush period [s]; the writer flushes more often.
 FLUSH_TICK_S = 10.0
-# Timeout of the disk for the first message of a part [s].
+# Timeout for writing the first message of a part [s].
 BEGIN_TIMEOUT_S = 10.0
 
 
@@ -36,7 +36,7 @@ class Flush(enum.Enum):
     STALLED = "stalled"
     """Writing takes longer than the timeout."""
     BROKEN = "broken"
-    """Rerun's writer has given up on the file, for good."""
+    """Rerun's writer has closed the file after an error."""
 
 
 class Part:
@@ -45,17 +45,17 @@ class Part:
     Rerun's logging calls never fail: only ``flush`` shows whether the data were written.
 
     Attributes:
-        refused: why the first message was not written; then only ``abandon`` may be called.
+        refused: why the first message was not written ("" if it was): only ``abandon`` may follow.
 
     Raises:
-        OSError: the file cannot be made.
+        OSError: the file cannot be created.
     """
 
     def __init__(self, path: Path, recording_id: str) -> None:
         self.path = path
         self.refused = ""
         self._flushed_bytes = 0
-        # Held while the part is written, so that no other recorder repairs it.
+        # The lock keeps other recorders from repairing the part.
         self._lock = _locked(path)
         self.stream = rr.RecordingStream(
             entities.APPLICATION,
@@ -66,17 +66,17 @@ class Part:
         self._attach()
 
     def _attach(self) -> None:
-        """Let rerun write to the file.
+        """Let Rerun write to the file.
 
-        The call waits until the first message is written, and never returns if the disk fails or
-        stalls (rerun 0.41). So it is made on a thread, which is abandoned then.
+        ``set_sinks`` returns after the first message is written, and never if the disk fails or
+        stalls (Rerun 0.41). So a thread calls it, which is abandoned in that case.
         """
         errors = list[RuntimeError]()
 
         def attach() -> None:
             try:
-                # Without a blueprint: one given here is also written before the call returns.
-                # The file is opened by its descriptor: another file may have that name by now.
+                # No blueprint here: the call would wait for it, too.
+                # The path names the descriptor, as another file may have the name by now.
                 self.stream.set_sinks(rr.FileSink(f"/proc/self/fd/{self._lock}"))
             except RuntimeError as error:
                 errors.append(error)
@@ -88,7 +88,7 @@ class Part:
             thread.join(0.02)
             if not thread.is_alive():
                 break
-            # The file's header is written before there is a writer.
+            # A header without a writer: the writer has died.
             if self.size and not self._has_writer():
                 self.refused = "its first message cannot be written"
             elif time.monotonic() > deadline:
@@ -104,7 +104,7 @@ class Part:
 
     @property
     def is_deleted(self) -> bool:
-        """Whether the file was unlinked: its data are gone when it is closed."""
+        """Whether the file was unlinked, so that closing it deletes the data."""
         return os.fstat(self._lock).st_nlink == 0
 
     def write_blob(self, blob: bytes, wall_ns: int, entity: str = entities.INPUTS) -> None:
@@ -121,25 +121,21 @@ class Part:
         try:
             self.stream.flush(timeout_sec=timeout_s)
         except RuntimeError as error:
-            # Both failures raise the same exception: a flush whose writer has died also times out
-            # (rerun 0.41).
+            # A dead writer and a slow disk raise the same exception (Rerun 0.41).
             slow = "timed out" in str(error) and self._has_writer()
             return Flush.STALLED if slow else Flush.BROKEN
         self._flushed_bytes = self.size
         return Flush.DONE
 
     def close(self) -> None:
-        """Write the footer and close the file; call it only after a successful flush.
-
-        Flushed data can be read without a footer, too.
-        """
+        """Write the footer and close the file; call it only after a successful flush."""
         self.stream.disconnect()
         if not self._has_footer():
             LOG.warning("%s: its footer could not be written", self.path.name)
         os.close(self._lock)
 
     def _has_footer(self) -> bool:
-        """Return whether the file has its footer; rerun does not report a failure."""
+        """Return whether the file has its footer: Rerun does not report a failure."""
         try:
             with os.fdopen(os.dup(self._lock), "rb") as file:
                 if not stat.S_ISREG(os.fstat(self._lock).st_mode):
@@ -153,9 +149,8 @@ class Part:
     def abandon(self) -> None:
         """Truncate a broken part to its flushed data.
 
-        After a partly written frame, rerun may have written more frames once there was space again:
-        they cannot be distinguished from the rest of that frame.
-        The stream is kept: disconnecting or releasing it may hang (rerun 0.41).
+        Frames that Rerun wrote after a partly written frame cannot be told from the rest of that
+        frame. The stream stays open: disconnecting or releasing it may hang (Rerun 0.41).
         """
         os.close(self._lock)
         if not self._flushed_bytes:
@@ -165,10 +160,7 @@ class Part:
         self.cut()
 
     def cut(self) -> None:
-        """Truncate a broken part again: rerun may write to it long after it has given up on it.
-
-        If that fails, the next call retries.
-        """
+        """Truncate a broken part again, as Rerun may write to it much later; retry on failure."""
         with suppress(OSError):
             if self.path.is_file() and self.path.stat().st_size > self._flushed_bytes:
                 with open(self.path, "r+b", opener=open_own) as file:
@@ -176,14 +168,14 @@ class Part:
                 repair_recording(self.path)
 
     def _has_writer(self) -> bool:
-        """Return whether rerun still holds the file open: its writer closes it when it dies."""
+        """Return whether Rerun's writer is alive: it closes the file when it dies."""
         file = os.fstat(self._lock)
         others = {int(name) for name in os.listdir("/proc/self/fd")} - {self._lock}
         return any(_is_same_file(descriptor, file) for descriptor in others)
 
 
 def _disk_error(error: RuntimeError, path: Path) -> OSError:
-    """Return the system's error from rerun's text: "... (os error 28)"."""
+    """Return the system's error from Rerun's text: "... (os error 28)"."""
     number = re.search(r"\(os error (\d+)\)", str(error))
     if number is None:
         return OSError(str(error))

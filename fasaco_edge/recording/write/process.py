@@ -1,4 +1,4 @@
-"""The recording process: what all recorders share, from the repair of a folder to the exit code."""
+"""The recording process, common to the recorders of robots and fleets."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ class BusRecorder(Protocol):
     """Connects the bus to a writer."""
 
     def note(self, line: str) -> None:
-        """Log a fault from before the recording began."""
+        """Log a fault in the recording."""
 
     def listen(self) -> None:
-        """Subscribe to all that is recorded."""
+        """Subscribe to all recorded topics."""
 
     def step(self, timeout_s: float) -> None:
-        """Record what arrives within ``timeout_s`` [s], and what is due."""
+        """Record samples that arrive within ``timeout_s`` [s], and drawings that are due."""
 
     def end(self) -> bool:
-        """Write what waits, and the footer; False if the disk fails."""
+        """Write waiting samples and the footer; False if the disk fails."""
 
     @property
     def hangs(self) -> bool:
-        """Whether rerun would hang when the interpreter exits."""
+        """Whether Rerun would hang when the interpreter exits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,15 +48,15 @@ class Output:
     """Where and how a recorder writes.
 
     Attributes:
-        folder: for the recordings; made if missing.
-        budget: of the disk.
+        folder: folder of the recordings; created if missing.
+        budget: limits of disk space.
     """
 
     folder: Path
     budget: DiskBudget
 
     def begin(self, name: str, blueprint: rrb.Blueprint) -> Recording:
-        """Begin a recording, named after a robot or fleet, and return it."""
+        """Begin a recording of a robot or fleet; ``name``: its name."""
         clock = RunClock()
         began_ns = clock.now_ns()
         began = datetime.fromtimestamp(began_ns / 1e9, UTC)
@@ -71,9 +71,9 @@ class Recording:
     """A recording that has begun.
 
     Attributes:
-        writer: writes it.
-        clock: its timeline.
-        began_ns, began: when it began: since the epoch [ns], and as text, UTC.
+        writer: writer of its parts.
+        clock: clock of its timeline.
+        began_ns, began: its beginning: since the epoch [ns], and as text, UTC.
     """
 
     writer: RecordingWriter
@@ -87,12 +87,12 @@ def record(
 ) -> int:
     """Record until SIGTERM or SIGINT; return the process's exit code.
 
-    If the disk fails, the process exits here (``os._exit``): rerun would block a normal exit.
+    If the disk fails, the process exits here (``os._exit``): Rerun would block a normal exit.
 
     Args:
-        folder: of the recordings; interrupted recordings are repaired first.
-        bus_settings: how to join the bus.
-        recorder_on: makes the recorder.
+        folder: folder of the recordings; torn recordings are repaired first.
+        bus_settings: settings of the bus session.
+        recorder_on: returns the recorder on a bus.
 
     Raises:
         BusUnavailable: nothing listens at the endpoints.
@@ -110,13 +110,13 @@ def record(
             recorder.step(TAKE_TIMEOUT_S)
         code = 0 if recorder.end() else EXIT_STALLED
     if recorder.hangs:
-        # All recoverable data are saved; rerun would block a normal exit for ever.
+        # All recoverable data are saved.
         os._exit(code)
     return code
 
 
 def _repaired(folder: Path) -> list[str]:
-    """Repair the recordings in a folder; return what was repaired, in words."""
+    """Repair the recordings in a folder; return a line of text for each repair."""
     try:
         repairs = repair_folder(folder)
     except OSError as error:

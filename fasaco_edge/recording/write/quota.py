@@ -1,8 +1,8 @@
 """Disk space for recordings: names and age of runs, deletion of old parts, free space.
 
-A run's name begins with a number above the highest existing one: clocks go backward (without a
-clock battery at each boot), numbers do not. Deletes only parts named by this robot's recorder that
-no recorder is writing; never another file.
+A run's name begins with a number above the highest existing one, as clocks may go backward (at each
+boot without a clock battery). Only parts of this robot's recordings are deleted, and none that is
+still being written.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from fasaco_edge.errors import BadConfiguration
 
 MEGABYTE = 1_000_000
 NUMBERED = re.compile(r"run(\d{5,9})-.*\.rrd")
-# No recorder counts this far: a name with a larger number is not from a recorder.
+# Upper limit of a run's number; a file with a larger one is not from a recorder.
 MOST_RUNS = 900_000_000
 TIME = "%Y%m%dT%H%M%SZ"
-# Free space above the minimum before recording resumes: the disk must not fill again at once.
+# Free space above the minimum that is required to resume recording [bytes].
 RESUME_BYTES = 1_000_000
 
 LOG = logging.getLogger(__name__)
 
 
 def next_run(folder: Path, robot: str, began: datetime) -> str:
-    """Return the name of a run of ``robot`` that begins now, after all existing ones.
+    """Return the name of a new run of ``robot``, numbered after all existing ones.
 
     Raises:
         BadConfiguration: the folder cannot be read.
@@ -48,7 +48,7 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
 
 
 def delete_oldest(folder: Path, robot: str, most_bytes: int) -> list[Path]:
-    """Delete the oldest of ``robot``'s parts until they take ``most_bytes``; return them.
+    """Delete the oldest of ``robot``'s parts until they take at most ``most_bytes``; return them.
 
     Raises:
         OSError: the folder cannot be read, or a file cannot be deleted.
@@ -67,12 +67,11 @@ def delete_oldest(folder: Path, robot: str, most_bytes: int) -> list[Path]:
 def oldest_first(folder: Path, robot: str) -> list[tuple[Path, int]]:
     """Return the parts of a robot's recordings, each with its size [bytes], the oldest first.
 
-    Runs named by earlier releases, without a number, come first, by the times in their names.
+    Runs of early releases, whose names have no number, come first, in order of their time.
 
     Raises:
         OSError: the folder cannot be read.
     """
-    # The numbers of runs count on, whatever the clock says; parts have numbers, too.
     named = re.compile(rf"(?:run(\d{{5,9}})-)?(\d{{8}}T\d{{6}}Z)-{re.escape(robot)}-part(\d+)\.rrd")
     found = []
     for path in folder.iterdir():
@@ -103,9 +102,10 @@ class DiskBudget:
     Attributes:
         part_bytes: size at which the next part begins.
         least_free_bytes: space that must stay free on the disk.
-        part_s: age at which the next part begins [s]; 0 for never. Until the footer of a part is
-            written, rerun's index of it grows by a megabyte a minute.
-        robot, quota_bytes: name of the robot, and limit of all its recordings; 0 for none.
+        part_s: age at which the next part begins [s]; 0 for never. Rerun's index of a part grows by
+            a megabyte a minute until the part's footer is written.
+        robot: name of the robot.
+        quota_bytes: limit of all its recordings; 0 for none.
     """
 
     part_bytes: int
@@ -123,11 +123,11 @@ class DiskBudget:
         return _free_bytes(folder) >= self.least_free_bytes + RESUME_BYTES
 
     def keep_quota(self, folder: Path) -> None:
-        """Delete the oldest parts in ``folder`` above the quota."""
+        """Delete the oldest parts in ``folder`` that exceed the quota."""
         if not self.quota_bytes:
             return
         try:
-            # The part that is being written may become as large as any.
+            # Leave space for the part being written.
             deleted = delete_oldest(folder, self.robot, self.quota_bytes - self.part_bytes)
         except OSError as error:
             LOG.warning("recordings above their quota stay: %s", error)
@@ -137,7 +137,7 @@ class DiskBudget:
 
 
 def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
-    """Return the budget of a configuration, for the recordings of its robot or those of ``name``.
+    """Return the budget of a configuration for recordings of ``name``, by default its robot.
 
     Raises:
         BadConfiguration: a size is invalid, or the robot's name is no key.

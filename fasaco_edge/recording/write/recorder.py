@@ -1,7 +1,7 @@
-"""The recorder, a process that records the samples on the bus.
+"""The recorder of a robot, a process that records the samples on the bus.
 
-Nothing it does, or fails to do, can delay the planner. Zenoh's threads only post; one thread
-decodes, draws and writes.
+It cannot delay the planner. Zenoh's threads only add samples to a queue; one thread decodes, draws
+and writes them.
 """
 
 from __future__ import annotations
@@ -44,19 +44,14 @@ from fasaco_edge.wire.reasons import SILENT
 REPORT_PERIOD_NS = 1_000_000_000
 # The daemon publishes a status once a second.
 SILENCE_NS = 3_500_000_000
-# Timeout for drawing the waiting samples at the end [ns].
+# Time for drawing waiting samples at the end [ns].
 LAST_DRAWN_NS = 300_000_000
 
 
 def run_recorder(config: DaemonConfig, bus_settings: BusSettings, output: Output) -> int:
-    """Record a robot until SIGTERM or SIGINT; return the process's exit code, see ``record``.
+    """Record a robot until SIGTERM or SIGINT; return the exit code. Errors as for ``record``.
 
-    Importing this module raises MissingExtra where rerun is not installed.
-
-    Args:
-        config: configuration of the daemon: robot, keys, poses and ROS 2 topics.
-        bus_settings: how to join the bus.
-        output: where and how to write.
+    Importing this module raises MissingExtra if Rerun is not installed.
     """
     return record(output.folder, bus_settings, lambda bus: Recorder(config, bus, output))
 
@@ -107,9 +102,9 @@ class Recorder:
         """Subscribe to all recorded topics, and declare the recorder's token."""
         keys = self._config.keys()
         if ros := self._config.ros2:
-            for name, heard in ros.inputs.items():
+            for name, source in ros.inputs.items():
                 self._subscribe(
-                    name, ros.input_key(heard), heard.latched, heard.depth, heard.schema
+                    name, ros.input_key(source), source.latched, source.depth, source.schema
                 )
         for topic in topics.RECORDED:
             self._subscribe(topic.name, keys.of(topic), topic.is_latched)
@@ -119,10 +114,10 @@ class Recorder:
         """Write samples that arrive within ``timeout_s`` [s], check the writer, report."""
         arrivals = deque(self._inbox.take(timeout_s))
         heard_ns = arrivals[-1].at_ns if arrivals else time.monotonic_ns()
-        while arrivals:  # release written samples
+        while arrivals:  # popleft frees the memory of written samples
             self._write(arrivals.popleft())
             self._sync()
-            # A long backlog is no silence.
+            # Report during a long backlog, too.
             self._report_writing()
         self._inputs.note_lost(self._inbox.lost)
         self._writer.at(self._clock.now_ns())
@@ -149,18 +144,18 @@ class Recorder:
 
     @property
     def hangs(self) -> bool:
-        """Whether rerun would hang when the interpreter exits."""
+        """Whether Rerun would hang when the interpreter exits."""
         return self._writer.hangs
 
     def note(self, line: str) -> None:
-        """Log a fault from before the recording began."""
+        """Log a fault in the recording."""
         self._scene.add_line(entities.RECORDER_LOG, line, "WARN")
 
     def _subscribe(
         self, topic: str, key: str, latched: bool = False, depth: int = 1, schema: str = ""
     ) -> None:
         def post(sample: Sample) -> None:
-            # As in the daemon: ROS sends no type with a sample.
+            # ROS sends no type with a sample: it comes from the configuration.
             self._inbox.post(topic, sample.as_type(schema) if schema else sample)
 
         in_order = topic in topics.IN_ORDER
@@ -172,7 +167,7 @@ class Recorder:
         self._writer.sync(now_ns)
 
     def _write(self, arrival: Arrival, *, is_drawn: bool = True) -> None:
-        """Write a sample; one without a drawing is still an input for a replay."""
+        """Write a sample as an input for a replay; draw it if ``is_drawn``."""
         self._messages += 1
         self._writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):
@@ -185,12 +180,12 @@ class Recorder:
         if not is_drawn:
             return
         try:
-            # A sample without a drawing, as the turn log, is only an input for a replay.
+            # Some topics, such as the turn log, have no drawing.
             if (draw := self._drawers.get(arrival.topic)) is not None:
                 draw(arrival.sample)
         except FasacoError as error:
             self._malformed += 1
-            # A faulty publisher may send only malformed ones.
+            # A faulty publisher may send malformed samples at a high rate.
             if is_reported(self._malformed):
                 line = f"{self._malformed} malformed, the last on {arrival.sample.key}: {error}"
                 self._scene.add_line(entities.BUS_LOG, line, "WARN")
@@ -209,7 +204,7 @@ class Recorder:
         self._scene.add_pheromone(decode_pheromone(sample.payload), about)
 
     def _watch_planner(self, heard_ns: int) -> None:
-        """Report a planner that was silent for long, up to a time [ns]."""
+        """Report a planner that has been silent for too long at ``heard_ns`` [ns]."""
         last = self._last_status_ns
         if last is not None and heard_ns - last > SILENCE_NS:
             self._scene.enter(entities.MISSION_STATE, "silent", SILENT)
@@ -218,7 +213,7 @@ class Recorder:
         self._report_state(self._writer.state.value, self._writer.reason)
 
     def _report_state(self, state: str, reason: str) -> None:
-        """Report on the bus and in the recording: on change, and once a second."""
+        """Report on the bus and in the recording, on change and once a second."""
         now_ns = time.monotonic_ns()
         last = self._report
         if last is not None and last.state == state and now_ns < self._next_report_ns:
@@ -246,8 +241,8 @@ def _draw_grid(draw: Callable[[OccupancyGrid], None], sample: Sample) -> None:
 
 
 def _is_rival(payload: bytes) -> bool:
-    """Return whether a status is of a second daemon of the robot's name, which does not plan."""
+    """Return whether a status comes from a second daemon of the same robot, which does not plan."""
     try:
         return decode_tolerant(payload, Status).claim.stand != "plans"
     except MalformedMessage:
-        return False  # its reader reports that
+        return False  # the drawer reports it

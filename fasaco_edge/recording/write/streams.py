@@ -1,7 +1,7 @@
-"""Rerun's streams: their initial data, and their leaks (rerun 0.41).
+"""Rerun's streams: their initial data, and how their memory is freed (Rerun 0.41).
 
-A stream that is no longer referenced keeps two threads and half a megabyte until ``sweep``. Each
-blueprint that is sent leaves a stream that references itself: a leak, unless disconnected.
+An unreferenced stream keeps two threads and half a megabyte until ``sweep``. Rerun's function that
+sends a blueprint leaves a stream that references itself, a leak; ``send_blueprint`` disconnects it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from fasaco_edge.recording.sdk import rr, rrb
 
 
 class LatchedState:
-    """Initial data of each part: static data, newest latched data, name, layout, times.
+    """Initial data of each part: static data, newest latched data, name, blueprint, times.
 
     Attributes:
         wall_ns: the time of the next log call [ns].
@@ -30,13 +30,13 @@ class LatchedState:
         self._missed_ns: dict[str, int] = {}
 
     def latch(self, entity: str, archetype: rr.AsComponents, *, missed: bool) -> None:
-        """Keep data in force from now on; ``missed``: they were not written."""
+        """Set the data in force of an entity; ``missed``: whether they could not be written."""
         self._latched[entity] = archetype
         if missed:
             self._missed_ns[entity] = self.wall_ns
 
     def begin(self, stream: rr.RecordingStream) -> None:
-        """Begin a part with all data in force."""
+        """Write all data in force to a new part."""
         send_blueprint(stream, self.blueprint)
         stream.send_recording_name(self.name)
         for entity, archetypes in self.static.items():
@@ -44,16 +44,15 @@ class LatchedState:
         self.send_latched(stream)
 
     def send_latched(self, stream: rr.RecordingStream) -> None:
-        """Write latched data, missed ones at their time of arrival."""
+        """Write latched data; those that could not be written before, at their time of arrival."""
         for entity, archetype in self._latched.items():
-            # Data that arrived while nothing was written are in force since then.
             self._set_times(stream, self._missed_ns.get(entity, self.wall_ns))
             stream.log(entity, archetype)
         self._missed_ns.clear()
         self.set_times(stream)
 
     def set_times(self, stream: rr.RecordingStream) -> None:
-        """Set the times of the next log calls."""
+        """Set the times of the next log calls in a stream."""
         self._set_times(stream, self.wall_ns)
 
     def _set_times(self, stream: rr.RecordingStream, wall_ns: int) -> None:
@@ -79,5 +78,5 @@ def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None
 
 
 def sweep() -> None:
-    """Free unreferenced streams; flushes all streams, so none may hang."""
+    """Free unreferenced streams. This flushes all streams: call it only if no writer hangs."""
     bindings.flush_and_cleanup_orphaned_recordings()

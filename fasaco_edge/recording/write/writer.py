@@ -1,7 +1,7 @@
-"""The writer of a recording in parts: data survive rotation, and a full or stalled disk.
+"""The writer of a recording in parts; it survives a full or stalled disk.
 
-The writer keeps static data and the newest latched values. Each part begins with them, so that it
-can be read alone; all share one recording id, so that a viewer shows them as one run.
+Each part begins with all static data and the newest latched data, so that it can be read alone. All
+parts share one recording id, so that a viewer shows them as one run.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from fasaco_edge.recording.write.streams import LatchedState, send_blueprint, sw
 
 LOG = logging.getLogger(__name__)
 
-# Flush period: data lost by kill -9, plus the time of a flush. Each entity begins a chunk with each
-# flush, and a chunk takes more than a kilobyte.
+# Flush period: ``kill -9`` loses the data of this period and of one flush. Each flush begins a
+# chunk of more than a kilobyte for each entity.
 FLUSH_PERIOD_NS = 900_000_000
 # Retry period while nothing can be written.
 RETRY_PERIOD_NS = 1_000_000_000
-# Each abandoned part leaks threads and memory: retries back off.
+# Each abandoned part leaks threads and memory: the period doubles with each, up to this often.
 MOST_DOUBLINGS = 5
-# Rerun's own queue has no bound: this limits it between two flushes.
+# Limit on the data between two flushes: Rerun's own queue has none.
 FLUSH_BYTES = 8_000_000
-# Timeout for a disk that pauses, as memory cards do, or for a slow computer: samples that arrive
-# meanwhile wait in the recorder's queue.
+# Timeout of a flush: memory cards pause, and computers may be slow. Meanwhile samples wait in the
+# recorder's queue.
 FLUSH_TIMEOUT_S = 4.0
-# Timeout of a probe whether a stalled disk is back.
+# Timeout of a flush that checks whether a stalled disk works again.
 PROBE_TIMEOUT_S = 0.2
-# A slow computer takes long; a supervisor does not wait for a hanging writer.
+# Timeout of the last flush: shorter than a supervisor's timeout for the whole process.
 CLOSE_TIMEOUT_S = 4.0
 
 
 class WriterState(enum.Enum):
-    """State of the writer: whether logged data are written."""
+    """State of the writer."""
 
     RECORDING = "recording"
     DISK_FULL = "disk full"
@@ -48,7 +48,7 @@ class WriterState(enum.Enum):
 class RecordingWriter:
     """Writes to the parts ``<recording_id>-part<n>.rrd`` in ``folder``; for one thread only.
 
-    Rerun keeps the time per thread, and logs data of a thread without a time as static.
+    Rerun keeps times per thread, and logs data of a thread without a time as static.
 
     Raises:
         BadConfiguration: the folder cannot be made or written to.
@@ -91,7 +91,7 @@ class RecordingWriter:
 
     @property
     def hangs(self) -> bool:
-        """Whether rerun would hang when the interpreter exits."""
+        """Whether Rerun would hang when the interpreter exits."""
         return bool(self._abandoned) or self.state is WriterState.STALLED
 
     @property
@@ -110,10 +110,9 @@ class RecordingWriter:
         return self._part.size if self._part else 0
 
     def message(self, wall_ns: int) -> None:
-        """Begin logging a message received at ``wall_ns``.
+        """Begin logging a message received at ``wall_ns``; count it as lost if nothing is written.
 
-        A message that is not written is counted as lost, and so is one that may have been lost
-        with a broken part.
+        If the part breaks later, its unflushed messages count as lost, too.
         """
         self.at(wall_ns)
         if self.state is WriterState.RECORDING:
@@ -129,7 +128,7 @@ class RecordingWriter:
             self._latched.set_times(stream)
 
     def sequence(self, timeline: str, number: int) -> None:
-        """Set the position on another timeline for all later log calls."""
+        """Set the position on another timeline for the next log calls."""
         self._latched.sequences[timeline] = number
         if (stream := self._stream) is not None:
             self._latched.set_times(stream)
@@ -141,8 +140,8 @@ class RecordingWriter:
 
         Args:
             entity, archetype: what to log, and where.
-            latched: in force until the next, so parts begin with it.
-            size: its size, if large [bytes].
+            latched: whether it stays in force until the next one, so that parts begin with it.
+            size: its uncompressed size; 0 if small [bytes].
         """
         if latched:
             self._latched.latch(entity, archetype, missed=self._stream is None)
@@ -159,7 +158,7 @@ class RecordingWriter:
         return True
 
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
-        """Log static data of the run; replaces earlier static data."""
+        """Log static data of an entity, in place of earlier ones."""
         self._latched.static[entity] = archetypes
         if (stream := self._stream) is not None:
             stream.log(entity, *archetypes, static=True)
@@ -171,16 +170,16 @@ class RecordingWriter:
             stream.send_recording_name(name)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
-        """Make ``blueprint`` the active one; the last one in a file counts."""
+        """Make ``blueprint`` the active one: a viewer takes the last one of a file."""
         self._latched.blueprint = blueprint
         if (stream := self._stream) is not None:
             send_blueprint(stream, blueprint)
 
     def sync(self, now_ns: int) -> None:
-        """Check whether all data are written, and act on it; call it often.
+        """Flush when due, and begin, rotate or abandon parts; call it often.
 
         Args:
-            now_ns: a monotonic clock [ns].
+            now_ns: monotonic time [ns].
         """
         if now_ns < self._next_flush_ns and self._unflushed_bytes < FLUSH_BYTES:
             return
@@ -195,7 +194,7 @@ class RecordingWriter:
         self._next_flush_ns = now_ns + (FLUSH_PERIOD_NS if recording else retry_ns)
 
     def close(self) -> bool:
-        """Close the part properly; False if the disk blocks rerun's writer."""
+        """Close the part properly; False if the disk blocks Rerun's writer."""
         for broken in self._abandoned:
             broken.cut()
         if self._part is None:
@@ -213,7 +212,7 @@ class RecordingWriter:
 
     @property
     def _stream(self) -> rr.RecordingStream | None:
-        """Where to log to; None while nothing is written."""
+        """Stream of the part; None while nothing is written."""
         if self._part is None or self.state is not WriterState.RECORDING:
             return None
         return self._part.stream
@@ -235,7 +234,7 @@ class RecordingWriter:
 
     def _check_space(self, part: Part, now_ns: int) -> None:
         if self._part_until_ns is None:
-            # Parts grow slowly: once per part is enough.
+            # Once per part is enough, as the quota leaves space for a whole part.
             self._budget.keep_quota(self._folder)
             self._part_until_ns = now_ns + round(1e9 * self._budget.part_s)
         is_old = self._budget.part_s > 0 and now_ns >= self._part_until_ns

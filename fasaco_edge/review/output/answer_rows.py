@@ -1,4 +1,4 @@
-"""Rows of text on one moment of a mission, and on one spot of its floor."""
+"""Rows of text about one moment of a mission, and about one spot of its floor."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fasaco_edge.wire.reasons import plain
 if TYPE_CHECKING:
     from fasaco_edge.review.spot import Spot
 
-# Less saved by a cohort or by local search is not shown [s].
+# Least saving of a cohort or of local search that is shown [s].
 LEAST_SAVED_S = 0.05
 
 
 def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
-    """Yield name and text of all that is known of a moment."""
+    """Yield name and text of each known fact about a moment."""
     state, why = instant.state or "not known", plain(instant.state_reason or "")
-    # The first path since that state was entered; the present path follows below.
+    # A reason that names a path, the first one in this state, is left out: the path has its row.
     yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
     if instant.order:
         yield "order", instant.order

@@ -1,4 +1,4 @@
-"""A review as files for other programs: CSV or Parquet, each column described, and NumPy arrays."""
+"""The export of a review for other programs: CSV or Parquet tables, and NumPy arrays."""
 
 from __future__ import annotations
 
@@ -20,21 +20,19 @@ FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
 CSV, PARQUET = FORMATS = ("csv", "parquet")
 TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
 DESCRIPTION = "columns"
-"""The table that describes the columns of the others."""
+"""The table that describes the columns of the other tables."""
 
 
 def export(review: Review, folder: Path, form: str = CSV) -> list[tuple[Path, str]]:
-    """Write all series of a review into ``folder``, which is made if missing; return the files.
+    """Write all tables of a review into ``folder``; return each file, and a phrase about it.
 
-    A file for each of ``tables``; columns.csv, which says what they hold, in what units;
-    and end.npz: map int8 and its origin (x, y, yaw) and resolution_m; visits uint16
-    of the lattice with its first row, column and cell_m.
-
-    Each file comes with a phrase that says what is in it.
+    Also written are columns.csv, which describes the columns and their units, and end.npz: map
+    (int8), its origin (x [m], y [m], yaw [rad]) and resolution [m]; visits (uint16) of the
+    lattice, its first row and column, and the edge of its cells [m].
 
     Args:
-        review: what to write.
-        folder: where to.
+        review: the review.
+        folder: created if missing.
         form: CSV or PARQUET.
 
     Raises:
@@ -101,7 +99,7 @@ def _write_parquet(table: Table, file: Path) -> None:
         writer.write_batch(_batch(rows, schema))
 
 
-# Rows held in memory.
+# Limit on the rows held in memory.
 ROWS = 50_000
 
 
@@ -112,7 +110,7 @@ def _batch(rows: list[Sequence[object]], schema: pa.Schema) -> pa.RecordBatch:
 
 
 def _cell(value: object) -> object:
-    """Return a value that is not read as a formula by spreadsheets, unless it is a number."""
+    """Return a value that no spreadsheet takes for a formula."""
     if isinstance(value, bool):
         return int(value)
     text = one_line(value) if isinstance(value, str) else value
@@ -135,6 +133,6 @@ def _write_arrays(review: Review, file: Path) -> None:
             "lattice_corner": np.array((lattice.window.row0, lattice.window.col0)),
             "cell_m": np.array(lattice.cell_m),
         }
-    # The file has NumPy's own format; NumPy's stub mistakes the first array for an option.
+    # NumPy's type stub mistakes the first array for an option.
     with whole(file) as new:
         np.savez_compressed(new, **arrays)  # type: ignore[arg-type]

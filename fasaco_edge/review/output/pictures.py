@@ -31,7 +31,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.settings import known_settings
 
 TRAIL_SPACING_M = 0.02
-# Width of a drive drawn beside the lines of paths [m].
+# Width of a driven track drawn together with lines of paths [m].
 DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
 
@@ -50,7 +50,7 @@ def draw_review(reviews: Sequence[Review]) -> Image.Image | None:
 
 
 def draw_map(review: Review) -> Image.Image | None:
-    """Return the last map with cells, unswept floor and track; None without any of them."""
+    """Return the last map with cells, unswept floor and track; None without a map or poses."""
     grid, lattice, visits, floor = review.data.grid, review.lattice, review.visits, review.floor
     track, driven = _thinned(review.data)
     if grid is None or lattice is None or visits is None or not len(track):
@@ -58,7 +58,7 @@ def draw_map(review: Review) -> Image.Image | None:
     others = None
     if review.by_others is not None and floor is not None:
         others = MapLayer(floor.geometry, review.by_others)
-    # A line over the floor covers cells without passing their centres: visits would not show it.
+    # A smoothed line covers floor without passing the centres of cells, which visits count.
     is_line = known_settings(review.data.config).planner.line != "cells"
     return draw_mission(
         grid,
@@ -77,18 +77,13 @@ def draw_map(review: Review) -> Image.Image | None:
     )
 
 
-# Time before and after a moment for which the drive is drawn [s].
+# Period before and after a moment for which the driven track is drawn [s].
 AROUND_S = 10.0
 HEADING_M = 0.3
 
 
 def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
-    """Return the map at one moment with paths before and after, drive and robot; None without it.
-
-    Args:
-        review: of what.
-        scene: the moment.
-    """
+    """Return the map at one moment with paths, driven track and robot; None without a map."""
     grid, lattice, instant, data = scene.grid, review.lattice, scene.instant, review.data
     if grid is None or lattice is None:
         return None
@@ -124,7 +119,7 @@ def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
 
 
 def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
-    """Return the map at the end with some spots marked; None without a map or a drive."""
+    """Return the map at the end with marks at ``spots``; None without a map or spots."""
     lattice, data = review.lattice, review.data
     if data.grid is None or lattice is None or not spots:
         return None
@@ -185,10 +180,7 @@ def _caption(review: Review) -> list[str]:
 def _thinned(
     data: RunData, part: slice = slice(None)
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return a track without points that almost coincide with others, float64 (n, 2).
-
-    And which of its points were driven to from the one before, bool (n - 1,).
-    """
+    """Return a track of spaced points, float64 (n, 2), and its driven segments, bool (n - 1,)."""
     track = data.track[part, :2]
     gaps = np.concatenate(([0], np.cumsum(~data.driven)))[: len(data.poses)][part]
     if len(track) > 2:
@@ -196,7 +188,7 @@ def _thinned(
         way = np.concatenate(([0.0], np.cumsum(ways)))
         kept = np.diff(np.floor(way / TRAIL_SPACING_M), prepend=-1.0) > 0
         kept[-1] = True
-        # Both ends of a gap.
+        # Keep the point before each gap, too.
         kept[:-1] |= np.diff(gaps) > 0
         track, gaps = track[kept], gaps[kept]
     return track, np.diff(gaps) == 0

@@ -1,4 +1,4 @@
-"""Rows of text of a review, for terminal and page."""
+"""Rows of text of a review for the terminal."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ if TYPE_CHECKING:
 REASONS = ("reason", "replans", "median", "slowest")
 REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
 """Columns of ``reason_rows`` and ``replan_rows``."""
-# The most important settings; the others are in the run card and in the JSON document.
+# Keys of the settings shown; the run card and the JSON document have all.
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
 
 ORDERS = ("order", "from", "to", "result", "driven", "replans", "paused", "asked for")
 UNREACHED = ("order", "m2", "at", "why")
 LEFT = ("m2", "at", "why")
-"""Columns of ``order_rows``, ``unreached_rows``, ``left_rows`` and ``command_rows``."""
+"""Columns of ``order_rows``, ``unreached_rows`` and ``left_rows``."""
 ROOMS = ("room", "m2", "time", "entered", "swept", "passes", "left")
 """Columns of ``room_rows``."""
 MOST_PLACES = 2
-# Less of a way without poses is not shown [m].
+# Least distance without poses that is shown [m].
 LEAST_LOST_M = 1.0
 CHARGES = ("at", "for", "battery")
 
 
 def order_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
-    """Return a section of each order: its period, its result and its content."""
+    """Return a row of each order: its period, its result and its content."""
     return [
         (
             str(number),
@@ -62,7 +62,7 @@ def order_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
 
 
 def unreached_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
-    """Return the areas that each order left uncovered: area, place, and the daemon's reason."""
+    """Return the areas that each order left uncovered: size, place, and the daemon's reason."""
     return [
         (str(number), f"{area.m2:.2f}", f"({area.x:.2f}, {area.y:.2f})", area.reason)
         for number, order in enumerate(document.orders, 1)
@@ -71,7 +71,7 @@ def unreached_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
 
 
 def left_rows(document: ReviewDocument, spots: Sequence[Spot]) -> list[tuple[str, ...]]:
-    """Return the unswept patches of the reachable floor with reasons; spots are their positions."""
+    """Return size, place and reason of unswept patches; ``spots``: a spot in each patch."""
     return [
         (f"{patch.m2:.2f}", f"({patch.x:.2f}, {patch.y:.2f})", f"{spot.why}: {spot.words}")
         for patch, spot in zip(document.left, spots, strict=True)
@@ -79,7 +79,7 @@ def left_rows(document: ReviewDocument, spots: Sequence[Spot]) -> list[tuple[str
 
 
 def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]:
-    """Return a row of each room: the time in it, what was swept, and the largest patches left."""
+    """Return a row of each room: working time, swept share, and largest patches left."""
     at = {patch: room_at(review.data, (patch.x, patch.y)) for patch in document.left}
     found: list[tuple[str, ...]] = []
     for room in document.rooms:
@@ -109,7 +109,7 @@ def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
 
 
 def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return the most important rows: with verdict and curve they fit on one screen."""
+    """Return the most important rows; they fit on one screen, with verdict and curve."""
     by_name = {figure.name: figure.text for figure in figures(document)}
     config, grid = document.config, document.map
     sides = "" if grid is None else "{:.1f} x {:.1f} m, ".format(*grid.sides_m)
@@ -160,13 +160,13 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
 
 
 def _shares(document: ReviewDocument) -> str:
-    """Return the swept share of each room, those with the least first."""
+    """Return the swept share of each room, in ascending order."""
     known = sorted((room.share, room.title) for room in document.rooms if room.share is not None)
     return ", ".join(f"{title} {percent(share)}" for share, title in known)
 
 
 def _lost_way(review: Review) -> str:
-    """Return over how much of its way the robot's poses are missing; "" over little."""
+    """Return number and length of the gaps between poses; "" if they are short."""
     data = review.data
     ways_m = data.lengths_m[~data.driven]
     if ways_m.sum() < LEAST_LOST_M:
@@ -186,10 +186,10 @@ def _processor(document: ReviewDocument) -> str:
     daemon, recorder = document.processor_s, document.recorder_processor_s
     if not daemon:
         return ""
-    told = f"daemon {amount(daemon, 's')}"
+    text = f"daemon {amount(daemon, 's')}"
     if document.recorded_s:
-        told += f" ({100 * daemon / document.recorded_s:.1f} % of a core)"
-    return told if recorder is None else f"{told}, recorder {amount(recorder, 's')}"
+        text += f" ({100 * daemon / document.recorded_s:.1f} % of a core)"
+    return text if recorder is None else f"{text}, recorder {amount(recorder, 's')}"
 
 
 def _some(texts: Sequence[str]) -> str:
@@ -208,13 +208,13 @@ def _swept(review: Review, document: ReviewDocument) -> str:
     if not text:
         return NOT_KNOWN
     before_m2 = document.swept_before_m2
-    # The daemon's count has it in it, poses of the recording have not.
+    # The daemon's count includes this floor, the recorded poses do not.
     before = f", {share} {before_m2:.1f} m2 before the recording" if before_m2 else ""
     return f"{text}{ordered_words(orders)}, by {by}{before}"
 
 
 def _by_others(document: ReviewDocument) -> str:
-    """Return how much the other robots of a fleet swept; "" for a robot alone."""
+    """Return how much floor other robots of a fleet swept; "" for a robot alone."""
     if not in_fleet(document):
         return ""
     if document.swept_by_others_m2 is None:
@@ -223,7 +223,7 @@ def _by_others(document: ReviewDocument) -> str:
 
 
 def in_fleet(document: ReviewDocument) -> bool:
-    """Return whether the robot shares its work with others."""
+    """Return whether the robot belongs to a fleet."""
     return bool(document.config.get("fleet.name"))
 
 
@@ -245,7 +245,7 @@ def card_rows(document: ReviewDocument) -> list[tuple[str, str]]:
 
 
 def clock_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return the speed of a simulated robot; nothing for a real one."""
+    """Return the clock rate of a simulated robot; no row for a real one."""
     words = scale_words(document.time_scale)
     return [("clock", f"the robot's, {words}")] if words else []
 
@@ -256,7 +256,7 @@ def figure_rows(document: ReviewDocument) -> list[tuple[str, str]]:
 
 
 def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
-    """Return each kind of reason for a replan: number, median and slowest."""
+    """Return each kind of reason for a replan: number, median and longest duration."""
     took = document.replan_ms_by_reason
     return [
         (plain(kind), str(count), amount(took[kind].p50, "ms"), amount(took[kind].max, "ms"))
@@ -288,7 +288,7 @@ def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:
 
 
 def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
-    """Return each time the robot charged: when, for how long, and from what level to what."""
+    """Return each period of charging: beginning, duration, battery levels before and after."""
     return [
         (
             clock(charge.at_s),
@@ -303,12 +303,12 @@ def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
 
 
 def fault_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return how many messages were refused, by code."""
+    """Return the number of refused messages for each code."""
     return [(code, str(count)) for code, count in document.faults_by_code.items()]
 
 
 def unknown_lines(document: ReviewDocument) -> Iterator[str]:
-    """Yield samples and figures missing in a recording, and why."""
+    """Yield a line for each kind of samples or figures missing in a recording, with the reason."""
     for topic, number in document.unreadable.items():
         yield f"{number} samples of {topic} cannot be read"
     for names, why in document.not_recorded.items():
@@ -323,6 +323,6 @@ def _place(changed: Rectangle | None) -> str:
 
 
 def _began(began: str) -> str:
-    """Return when it began; a time before this program existed means that the clock was not set."""
+    """Return the time of the beginning; a year before 2024 means that the clock was not set."""
     when = began.replace("T", " ").replace("Z", " UTC")
     return when if began >= "2024" else f"{when}, by a clock that was not set"

@@ -1,4 +1,4 @@
-"""The tables of a review: for each its columns with their units, and its rows."""
+"""The tables of a review: columns with units, and rows."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_FIELDS = 64
 
 
 class Column(NamedTuple):
-    """A column: its name, type ("float", "int", "bool" or "text"), unit and meaning."""
+    """A column: name, type ("float", "int", "bool" or "text"), unit, meaning."""
 
     name: str
     kind: str
@@ -35,10 +35,10 @@ class Table:
     """A table; unknown values of a row are None.
 
     Attributes:
-        name: of its file.
+        name: name of its file.
         about: meaning of a row.
-        columns: in order.
-        rows: an iterator, usable once.
+        columns: the columns, in order.
+        rows: the rows; may be iterated once only.
     """
 
     name: str
@@ -122,7 +122,7 @@ def _paths(review: Review) -> Iterator[Table]:
 def _points(review: Review) -> Iterator[tuple[object, ...]]:
     record, seen = review.record, set[int]()
     for _, line in drawings([part.path for part in record.parts], entities.PATH):
-        # A part begins with the path that was in force before it.
+        # Each part repeats the path in force at its beginning.
         if isinstance(line, DrawnLine) and line.revision not in seen and len(line.xy):
             seen.add(line.revision)
             at_s = round(record.clock.seconds(line.at_ns), 6)
@@ -229,7 +229,7 @@ def _pheromone(review: Review) -> Table:
 
 def _levels(review: Review) -> Iterator[tuple[object, ...]]:
     record = review.record
-    # Some fields, spread over the whole time, and the last one.
+    # A limited number of fields at regular intervals, and the last one.
     every = -(-len(record.field_ns) // MOST_FIELDS) or 1
     wanted = {*record.field_ns[::every], *record.field_ns[-1:]}
     for _, field in drawings([part.path for part in record.parts], entities.PHEROMONE):

@@ -1,20 +1,15 @@
-"""The verdicts of a review: for each order whether it was completed, in words."""
+"""The verdicts of a review: a text for each order on whether it was completed."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import floor_words
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.orders import ordered_words
 
-if TYPE_CHECKING:
-    pass
-
 
 def verdicts(document: ReviewDocument) -> list[tuple[bool | None, str]]:
-    """Return for each order whether it was completed, also in words."""
+    """Return whether each order was completed (None if unknown), and a text on it."""
     orders = document.orders
     if len(orders) < 2:
         return [(document.complete, _ending(document))]

@@ -1,4 +1,4 @@
-// Areas and keep-outs drawn by hand: drag for a rectangle, or tap corner after corner; or the line
+// Drawing by hand: areas and keep-outs, by dragging a rectangle or tapping its corners; and the line
 // that splits a room.
 const drawing = { kind: "", corners: [], from: null, to: null };
 const drafts = [];
@@ -52,7 +52,7 @@ function finish(corners) {
   document.getElementById("drafts").scrollIntoView({ block: "nearest" });
 }
 
-// Keep-outs in force: those with a name are the operator's, and may be removed by a tap on the map.
+// Keep-outs in force. A keep-out with a name is the operator's: a tap on it offers to remove it.
 const keptOut = () => (model.areas && model.areas.keep_out) || [];
 let picked = "";
 
@@ -79,7 +79,7 @@ function showPicked() {
   showBars();
 }
 
-// Below the map is what is going on there: drawing, a keep-out, floor not swept, else the tools.
+// The row below the map: drawing, a keep-out, unswept floor, else the tools.
 function showBars() {
   const bars = { drawbar: drawing.kind, pickbar: picked, roombar: pickedRoom, leftbar: model.left, tools: true };
   let taken = false;

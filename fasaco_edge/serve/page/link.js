@@ -1,7 +1,7 @@
 // The link to the server: it reconnects by itself, and closes while the page is hidden.
 let socket = null, asked = 0, pause = 500, taking = Promise.resolve();
 const HIDDEN_MS = 30000;
-// A server says every 5 s that it is there: one that is silent for this long is gone.
+// The server sends "alive" every 5 s; after this time without a message it counts as gone [ms].
 const SILENT_MS = 15000;
 let heardAt = 0;
 let token = "";
@@ -20,7 +20,7 @@ function remembered() {
 const send = (message) => socket && socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
 const wants = () => send({ kind: "wants", field: showsField, unswept: Boolean(model.left) });
 
-// Callbacks for accepted and refused commands, by their number.
+// Callbacks of commands that wait for their answer, by number.
 const awaited = new Map();
 
 function command(name, members, then = {}) {
@@ -110,7 +110,7 @@ find("login").addEventListener("close", () => {
   rejoin();
 });
 
-// The whole link, opened in a tab that has the page already.
+// Opening a link in a tab that shows this page changes only the part after #: take the token from it.
 window.addEventListener("hashchange", () => {
   if (location.hash.length < 2) return;
   remembered();

@@ -2,9 +2,9 @@
 const model = {
   state: null, pose: null, areas: null, events: [], others: [], rooms: null, shares: null,
   map: null, floor: null, unswept: null, field: null, path: null, role: "viewer",
-  // Of a recording: what it is, the track driven in all of it, and the time shown.
+  // Of a recording: its description, the whole driven track, and the time shown.
   recording: null, track: null, at: 0,
-  // Floor that is not swept for one reason, and shown on the map.
+  // The unswept floor that is shown on the map.
   left: null,
 };
 
@@ -13,7 +13,7 @@ async function inflate(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// Messages are handled one after the other: an old map must not replace a newer one.
+// Messages are handled in order: an old map must not replace a newer one.
 async function take(data) {
   if (typeof data === "string") {
     const message = JSON.parse(data);

@@ -1,4 +1,4 @@
-// Orders: what is drawn and chosen, the last one again, and what a start would forget.
+// Orders: from what is drawn and chosen, the repeated last order, and what a start would forget.
 const chosen = new Set();
 
 function order() {
@@ -14,8 +14,8 @@ function order() {
   };
 }
 
-// An order that has ended can be given again, also after a restart of the server: it is kept from its
-// beginning on.
+// The last order is kept from its beginning on, so that it can be repeated after its end, also after
+// a restart of the server.
 function lastOrder(state) {
   const key = `last order of ${state.robot}`;
   try {
@@ -30,7 +30,7 @@ function inWords(order) {
   return names + (often(order.passes) > 1 ? `, ${often(order.passes)} times` : "");
 }
 
-// Whether the robot is at that order already: a start goes on with it.
+// Whether the robot is at work on an equal order, which a start would continue.
 const often = (passes) => (Array.isArray(passes) ? passes.length : passes) || 1;
 function goesOn(what) {
   const mission = (model.state || {}).mission || {}, zones = what.zones || [], areas = model.areas || { zones: [], keep_out: [] };
@@ -50,7 +50,7 @@ find("order").addEventListener("click", () => find("start").click());
 find("start").addEventListener("click", () => start(order()));
 find("again").addEventListener("click", () => start(lastOrder(model.state)));
 
-// A start that would forget what is covered is refused: the page then asks what to do.
+// The robot refuses a start that would forget what is covered: the page then asks what to do.
 let refused = null;
 function start(what, discard = false) {
   const goes = what.keep_covered ? "It sweeps the rest." : discard ? "It begins anew." : "";

@@ -1,4 +1,4 @@
-// The panel: state, progress, commands and events, in words. Text is only ever set as text.
+// The panel: state, progress, commands and events as text, never as HTML.
 const find = (id) => document.getElementById(id);
 const LOOKS = { covering: "go", returning: "go", planning: "go", charging: "go", done: "go", blocked: "bad", degraded: "bad", paused: "wait" };
 
@@ -25,23 +25,23 @@ function duration(seconds) {
   return minutes < 120 ? `${minutes} min` : `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
-// What the figures are of: all that is ordered, or a part of it.
+// What the figures refer to: all that is ordered, or a part of it.
 function partOf({ mission }) {
   const places = mission.zone ? [mission.zone] : mission.zones.map((zone) => zone.name);
   const what = places.every((name) => foundRooms().some((room) => room.title === name)) ? "room" : "area";
   return { pass: "in this pass", place: `in this ${what}`, places: `in these ${what}s` }[mission.part];
 }
 
-// When a robot that drives will be done, by the clock.
+// The time of day at which the robot will be done.
 function ends(state) {
   if (state.mission.more) return `to go ${partOf(state)}`;
   if (state.to_go_s === null || state.to_go_s < 60 || state.state === "paused" || model.recording || !(state.time_scale > 0)) return state.grows ? "to go at least" : "to go";
   const end = new Date(Date.now() + (1000 * state.to_go_s) / state.time_scale);
-  // While it still finds rooms, there is more to do than it knows.
+  // The remaining time is too short while the robot still discovers rooms.
   return `${state.grows ? "not before" : "done at"} ${end.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false })}`;
 }
 
-// What the server last said of the robot is old without a connection.
+// Without a connection, the last message of the server is old.
 function showAbsent() {
   const { absent, others } = model.state || { absent: "", others: [] };
   const named = absent.includes("No robot named") && others.length ? ` There are: ${others.join(", ")}.` : "";
@@ -74,7 +74,7 @@ function showState() {
   showCommands();
 }
 
-// In an engineer's words, one tap away.
+// Details in an engineer's words, opened by a tap.
 function showTechnical(state) {
   const away = (state.fleet || []).filter((member) => member.away).map((member) => `${member.name} is away: ${member.away}`);
   const bus = state.bus ? [`waits for the bus at ${state.bus}`] : [];
@@ -83,7 +83,7 @@ function showTechnical(state) {
   find("foot").textContent = [`fasaco-edge ${state.version}`, state.simulated].filter(Boolean).join(", ");
 }
 
-// What is not swept: each line shows itself on the map; the list opens by itself at the end.
+// Unswept floor: a tap on a line shows it on the map; the list opens by itself at the end.
 let wasOver = null;
 function showLeft(state) {
   const parts = state.left, isOver = ["over", null].includes(state.mission.stage);
@@ -92,7 +92,7 @@ function showLeft(state) {
   find("left-m2").textContent = squares(parts.reduce((sum, part) => sum + part.m2, 0));
   find("left").querySelector("ul").replaceChildren(...parts.map((part) => {
     const line = item(["span", "m2", squares(part.m2)], part.reason);
-    // Where it is, is not recorded, but for areas with a place.
+    // A recording has no places of unswept floor, except of areas with a point.
     if (model.recording && !part.places.length) return line;
     const show = action("", () => showOnMap(part));
     show.append(...line.childNodes);
@@ -100,14 +100,14 @@ function showLeft(state) {
     return line;
   }));
   find("left-hint").hidden = !find("left").querySelector("button");
-  // Without an order yet, there is no end.
+  // Before the first order there is no end.
   if (isOver && !wasOver && (state.mission.stage || wasOver === false)) find("left").open = true;
   wasOver = isOver;
   const shown = model.left && parts.find((part) => part.reason === model.left.reason);
   if (model.left) { model.left = shown || null; showBars(); if (!shown) wants(); }
 }
 
-// Daemons of earlier releases do not send where floor is not swept [ms].
+// Time to wait for unswept floor [ms]: daemons of earlier releases do not send it.
 const OLD_MS = 6000;
 function showOnMap(part) {
   model.left = part;
@@ -136,7 +136,7 @@ function showProgress(state) {
   find("bar").parentElement.setAttribute("aria-valuenow", Math.round(100 * (share || 0)));
   const lines = state.mission.zones.map((zone) => {
     const pass = zone.passes > 1 ? `, pass ${zone.pass} of ${zone.passes}` : "";
-    // The figures above are of the present one.
+    // The figures above refer to the current one.
     const share = zone.name === state.mission.zone ? "now" : percent(zone.share);
     return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${share}${pass}` : "to come"]);
   });
@@ -163,7 +163,7 @@ function showEvents() {
   );
 }
 
-// Commands: shown where they are allowed, and make sense.
+// Commands: shown if they are allowed and have an effect.
 function showCommands() {
   find("commands").hidden = model.role !== "operator";
   const state = model.state || {}, mission = state.mission || {};
@@ -213,7 +213,7 @@ function showDrafts() {
   showCommands();
 }
 
-// What is drawn and chosen, and not ordered yet, outlives a reload of the page.
+// Areas drawn and rooms chosen, but not ordered yet, survive a reload of the page.
 function keepDrafts() {
   const kept = { drafts, chosen: [...chosen], passes: find("passes").value, cross: find("cross").checked, home: find("return").checked };
   try { sessionStorage.setItem("drafts", JSON.stringify(kept)); } catch (error) { /* a browser that keeps nothing */ }
@@ -282,7 +282,7 @@ function calm() {
   sure = null;
 }
 
-// Keep-outs: the order under way goes on with them.
+// Keep-outs: the current order continues with them.
 function apply(draft) {
   command("keep_out_add", { keep_out: { name: draft.name.trim(), polygon: draft.polygon } }, {
     taken: () => { drafts.splice(drafts.indexOf(draft), 1); showDrafts(); redraw(); },
@@ -296,7 +296,7 @@ function drop(name) {
 }
 find("unkeep").addEventListener("click", () => drop(picked));
 
-// An answer is shown for a while, over the page; an engineer's words for it are a tap away.
+// An answer is shown over the page for a while; a tap shows the engineer's words for it.
 const SAID_MS = 8000, WHY_MS = 30000;
 let forgetting = 0;
 function say(text, tone, why = "") {
@@ -324,7 +324,7 @@ function showAnswer(answer) {
   const then = awaited.get(answer.id) || {};
   awaited.delete(answer.id);
   if (answer.ok) say([then.said || TAKEN[then.name] || "", answer.needs].filter(Boolean).join(" "), answer.needs ? "" : "good");
-  // What is wrong with a room is for its owner to mend.
+  // Faults about a room are worded for the owner, who can correct them.
   else if (answer.code === "bad_order" && then.name.startsWith("room_")) say(roomFault(answer), "bad");
   else say(REFUSED[answer.code] || "That did not work.", "bad", answer.hint ? `${answer.text} (${answer.hint})` : answer.text);
   const next = answer.ok ? then.taken : then.refused;

@@ -14,7 +14,7 @@ dark.addEventListener("change", () => { readColours(); redraw(); });
 const channels = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
 const SCALE = [[13, 8, 135], [84, 2, 163], [139, 10, 165], [185, 50, 137], [219, 92, 104], [244, 136, 73], [254, 188, 43]];
 
-// Colour and opacity of each mark of a kind: bits, of which the highest counts.
+// Colour and opacity of each mark of a kind; the highest set bit counts.
 function tints(kind) {
   const table = new Uint8ClampedArray(4 * 256);
   for (let mark = 1; mark < 256; mark++) {
@@ -33,7 +33,7 @@ function imageOf(grid) {
   return grid.image;
 }
 
-// A grid as an image, with the colour and opacity that a table has for each mark.
+// A grid as an image, with the colour and opacity of each mark from a table.
 function tinted(grid, table) {
   const image = document.createElement("canvas");
   [image.width, image.height] = [grid.cols, grid.rows];
@@ -57,7 +57,7 @@ function drawGrid(context, grid) {
   context.restore();
 }
 
-// Floor that is not swept for one reason, and nothing else; thin strips are drawn wider.
+// Unswept floor with one reason; thin strips are drawn wider.
 const beside = document.createElement("canvas");
 const THICK = [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]];
 const REST = 64, OUT_OF_REACH = 7;
@@ -85,7 +85,7 @@ function drawLeft(context, ratio) {
   }
 }
 
-// The pixels of a grid whose marks hold, as an image; kept with the grid.
+// The pixels of a grid with some marks, as an image, which is cached with the grid.
 function maskOf(grid, marks, holds) {
   const key = `${marks} ${colours.left}`;
   if (grid.maskKey === key) return grid.mask;
@@ -127,7 +127,7 @@ function drawLabel(context, text, px, py, colour) {
   context.textBaseline = "middle";
   context.lineWidth = 4;
   context.strokeStyle = colours.card;
-  // All of a label is on the screen if its middle is.
+  // If its middle is on the screen, a label is shown in full.
   const half = context.measureText(shown).width / 2 + 4, width = canvas.clientWidth;
   const at = px < 0 || px > width ? px : Math.min(Math.max(px, half), Math.max(width - half, half));
   context.strokeText(shown, at, py);
@@ -138,7 +138,7 @@ function drawLabel(context, text, px, py, colour) {
 function drawPath(context) {
   const path = model.path, pose = model.pose;
   if (!path || path.xy.length < 4) return;
-  // Without a path of the daemon's, as after its restart, none is shown.
+  // After a restart of the daemon, the last path is no longer in force.
   if (pose && pose.path === 0 && path.revision > 0) return;
   const at = pose && pose.path === path.revision ? pose.at : 0;
   const points = [];
@@ -158,7 +158,7 @@ function drawPath(context) {
   line(ahead, colours.ahead, width);
 }
 
-// Where the robot really drove, up to the time shown; of a robot live only its way on the path is known.
+// The driven track up to the time shown; for a live robot, only the driven part of its path is known.
 function drawTrack(context) {
   const track = model.track;
   if (!track) return;
@@ -247,7 +247,7 @@ function drawScale(context) {
   drawLabel(context, metres < 1 ? `${Math.round(100 * metres)} cm` : `${metres} m`, x - width / 2, y - 12, colours.ink);
 }
 
-// A room has its name already.
+// A room shows its own name.
 const isRoom = (zone) => foundRooms().some((room) => room.title === zone.name);
 
 function draw() {

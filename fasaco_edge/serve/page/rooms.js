@@ -1,26 +1,26 @@
-// Rooms that the robot has found: tinted on the map, tapped, named, set, ordered, split and merged.
+// Rooms that the robot has found: tints, names, settings; choosing, splitting and merging them.
 let pickedRoom = 0;
 const foundRooms = () => (model.rooms && model.rooms.rooms) || [];
 const roomOf = (id) => foundRooms().find((room) => room.id === id);
 const titleOf = (key) => (typeof key === "number" ? (roomOf(key) || { title: `room ${key}` }).title : key);
 const shareOf = (room) => (model.shares ? model.shares.swept[room.id] : null);
-// A room is ordered by its number: a standing zone may have its name.
+// A room is ordered by number, as a standing zone may have its name.
 const zoneOf = (key) => (typeof key === "number" ? { name: titleOf(key), room: key } : { name: key });
 
 const hasShare = (room) => Number.isFinite(shareOf(room));
 const figuresOf = (room) =>
   [squares(room.m2), hasShare(room) && `${percent(shareOf(room))} swept`, room.skip && "left out"].filter(Boolean).join(", ");
 
-// Where in the order of the chosen a room comes, from 1; 0 if it does not.
+// The place of a room among the chosen ones, from 1; 0 if it is not chosen.
 const turnOf = (id) => [...chosen].indexOf(id) + 1;
 
-// The map. Tints leave walls as they are: they only take from what is light, or give to what is dark.
+// The map. A tint darkens light pixels, or lightens dark ones, so that walls stay visible.
 function drawRooms(context) {
   context.save();
   context.globalCompositeOperation = dark.matches ? "lighten" : "multiply";
   for (const room of foundRooms()) {
     trace(context, room.outline, true);
-    // Rooms within a ring of corridors are no part of it.
+    // Rooms enclosed by a ring of corridors are not part of it.
     for (const inner of room.encloses.map(roomOf).filter(Boolean)) trace(context, inner.outline, true, false);
     context.fillStyle = colours[`room${room.tint}`];
     context.fill("evenodd");
@@ -41,7 +41,7 @@ function drawRoomNames(context) {
     if (!room.label) continue;
     const [x, y, wide] = room.label, [px, py] = toScreen(x, y);
     const mark = turn ? `${turn}. ` : "", most = isPicked ? Infinity : 1.3 * wide * view.scale;
-    // Of a room without a name the number will do.
+    // A room without a name shows its number.
     const text = (!room.name && whole(context, mark + room.title, most)) || fitting(context, mark + (room.name || room.id), most);
     if (!text) continue;
     const below = room.skip ? "left out" : hasShare(room) ? percent(shareOf(room)) : "";
@@ -55,7 +55,7 @@ function whole(context, text, wide) {
   return context.measureText(text).width <= wide ? text : "";
 }
 
-// As much of a name as a room is wide; "" if that is not worth it.
+// The part of a name that fits into a room; "" if it is too short.
 function fitting(context, text, wide) {
   if (whole(context, text, wide)) return text;
   for (let most = text.length - 1; most >= 3; most--) {
@@ -151,7 +151,7 @@ function choose(key) {
   showRooms();
 }
 
-// How often, as orders and rooms say it: a number, or what each pass is like.
+// The passes of orders and rooms as text: their number, or the kind of each.
 function passesIn(count, cross) {
   const number = Math.round(Number(find(count).value)) || 0;
   return find(cross).checked && number > 1 ? ["auto", ...Array(Math.min(number, 100) - 1).fill("cross")] : number || undefined;
@@ -161,7 +161,7 @@ function twiceAtLeast(count, cross) {
   if (find(cross).checked && !(Number(find(count).value) > 1)) find(count).value = 2;
 }
 
-// What to do comes first, and in brackets what is wrong.
+// The hint comes first, then the fault in brackets.
 function roomFault(answer) {
   const what = answer.text.replace(/^room\.\w+: /, "").replace(/ m2\b/g, " m²");
   return answer.hint ? `${answer.hint[0].toUpperCase()}${answer.hint.slice(1)} (${what}).` : what;
@@ -189,13 +189,13 @@ find("roompriority").addEventListener("change", ({ target }) => target.value && 
 find("merge").addEventListener("click", (event) => {
   const both = [pickedRoom, Number(find("mergewith").value)];
   if (!isSure(event.target)) return;
-  // The smaller number of the two stays.
+  // The merged room keeps the smaller number.
   const taken = () => { chosen.delete(Math.max(...both)); pickRoom(Math.min(...both)); };
   change("room_merge", { others: [both[1]] }, { taken });
 });
 find("split").addEventListener("click", () => beginDrawing("cut"));
 
-// A line that ends in the room goes on to its walls, and into them.
+// A line that ends in the room is extended to its walls, and into them.
 const INTO_WALL_M = 0.3;
 function toWalls([from, to], outline) {
   const length = Math.hypot(to[0] - from[0], to[1] - from[1]) || 1;

@@ -1,4 +1,4 @@
-// The time line of a recording: the page asks for a time, and is sent what was then.
+// The time line of a recording: the page requests a time, and gets the messages of that time.
 const line = { at: 0, asking: false, asked: -1, plays: false, ticked: 0 };
 const longest = () => (model.recording ? model.recording.seconds : 0);
 
@@ -7,7 +7,7 @@ function clock(seconds) {
   return parts.map((part, i) => (i ? String(part).padStart(2, "0") : part)).join(":");
 }
 
-// The next time is asked for when the one before has come: a slow link shows fewer of them.
+// The next time is requested after the answer to the last one: a slow link shows fewer times.
 function goTo(at) {
   line.at = Math.min(Math.max(at, 0), longest());
   find("when").value = line.at;
@@ -32,7 +32,7 @@ function tick() {
   if (line.at >= longest()) play(false);
 }
 
-// A recording opens at its end; after a break of the link, where it was.
+// A recording opens at its end, and after a reconnection at the last time shown.
 function showRecording() {
   const { files, began_s, seconds, clock: simulated } = model.recording, isNew = find("timeline").hidden;
   find("timeline").hidden = false;
@@ -42,7 +42,7 @@ function showRecording() {
   goTo(isNew ? seconds : line.at);
 }
 
-// What there was not yet then is removed.
+// Remove what did not exist yet at that time.
 function showTime(message) {
   for (const kind of ["map", "floor", "field", "path", "pose"]) if (!message.has.includes(kind)) model[kind] = null;
   model.at = message.at;

@@ -1,8 +1,8 @@
-// The view: which part of the map frame the canvas shows; moved by finger, mouse and wheel.
+// The view: the part of the map frame that the canvas shows; moved by finger, mouse and wheel.
 const canvas = document.getElementById("map");
 const view = { x: 0, y: 0, scale: 0, fitted: true, follows: false };
 
-// Scale is pixels of the screen a metre; y grows upwards on the map, downwards on the screen.
+// The scale is in pixels of the screen per metre; y grows upwards on the map, downwards on the screen.
 const toScreen = (x, y) => [
   canvas.clientWidth / 2 + (x - view.x) * view.scale,
   canvas.clientHeight / 2 - (y - view.y) * view.scale,
@@ -43,7 +43,7 @@ function moveBy(dx, dy) {
   redraw();
 }
 
-// Fingers and mouse: one moves or draws, two zoom.
+// Fingers and mouse: one pointer moves or draws, two zoom.
 const fingers = new Map();
 let tapped = null;
 const place = (event) => {
