@@ -49,7 +49,7 @@ MOST_LATTICE = 250_000
 RING_TURNS = 1000
 JOINS_AT_ONCE, JOIN_PIECES, JOIN_BEAM = 8, 40, 20
 NO_SIDE = 1 << 60
-# A window without a possible gain expands no state: it counts as so many.
+# Expansions counted for a window that expands no state, as it has no possible gain; no limit.
 EXPANSIONS_OF_WINDOW, NO_LIMIT = 64, 1 << 60
 NO_SEAMS = Seams(np.empty((0, 2), np.int32), np.empty(0, np.int32))
 
