@@ -27,8 +27,8 @@ PORT = 8465
 NOT_RECORDED = ("allow_commands", "config", "robot", "base", "connect", "security")
 EPILOG = f"""\
 examples:
-  fasaco-edge serve                                    http://127.0.0.1:{PORT}, to look only
-  fasaco-edge serve --allow-commands                   who is on this computer may command, too
+  fasaco-edge serve                                    http://127.0.0.1:{PORT}, without commands
+  fasaco-edge serve --allow-commands                   all users of this computer may command
   fasaco-edge serve --listen 0.0.0.0:{PORT} --tokens page-tokens
                                                        for phones: prints a link for each role
   fasaco-edge serve --connect tcp/192.168.1.20:7447 --robot hall2
@@ -36,14 +36,14 @@ examples:
 
 The page shows map, swept floor, path, zones and robot, and starts, pauses and sends home where that
 is allowed. It is a client of the bus as `watch` is, with the credentials of --config or --security;
-to command, these have to be an operator's.
+commands need an operator's credentials.
 
-Of FILE.rrd it shows the recording in the same page, to look only: map, path, driven track and swept
+With FILE.rrd the same page shows the recording, without commands: map, path, driven track and swept
 floor as they were at each time, state and figures by the last status recorded, one in 15 s.
 
-FILE of --tokens has lines `viewer: TOKEN` and `operator: TOKEN`; where it is not there it is made,
-with new ones. A page asks for a token, or has it behind the # of its address. Without --certificate
-tokens and pictures go over the network in the clear.
+FILE of --tokens has lines `viewer: TOKEN` and `operator: TOKEN`; if it does not exist, it is
+written with new tokens. A page asks for a token, or has it behind the # of its address. Without
+--certificate tokens and pictures go over the network in the clear.
 
 exit codes: 0 ended by a signal; 1 it cannot listen there, or FILE.rrd cannot be read; 78 wrong
 configuration
@@ -197,8 +197,8 @@ def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> 
 COMMAND = Command(
     description="Serve a page that shows a robot's mission live: map, swept floor, path and "
     "robot, progress and what is left; with commands and zones drawn by hand where allowed; or a "
-    "recorded mission, with a time line. Several may look at once. It runs on the robot or on any "
-    "other machine of the bus.",
+    "recorded mission, with a time line. Several people may look at once. It runs on the robot "
+    "or on any other machine of the bus.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -35,7 +35,7 @@ PLANNERS = {
     "colony-search": Entry(
         "search.near_optimal:NearOptimal",
         "local search with ants, which rebuild a part of the walk on the pheromone trail in every "
-        "second perturbation",
+        "other perturbation",
         has_local_search=True,
     ),
     "fasaco": Entry("paper.fasaco:Fasaco", "the paper's colony, without local search"),

@@ -72,23 +72,22 @@ evening.yaml, or the same as JSON; all lengths in metres in the frame of the map
 evening.geojson, as a drawing program writes it: each polygon is a zone with the properties name and
 passes; one with "keep_out": true is not touched. Coordinates are metres in the frame of the map.
 
-Each pass starts from zero: what was covered before is covered again; a rest leaves out what an
-edge has covered. An order, its progress, and
-whether it is paused survive a restart of the daemon. A daemon without an order covers everything
-by itself (mission.autostart of its configuration).
+Each pass covers all its floor, also what was covered before; only the pass `rest` leaves out what
+the pass `edge` has covered. An order, its progress, and whether it is paused survive a restart of
+the daemon. A daemon without an order covers everything by itself (mission.autostart of its
+configuration).
 
-Another order, and a reset, forget what is covered where the order before is not over: on a
-terminal they say how much and ask first; elsewhere they are refused without --yes.
-A reset keeps names, borders and settings of rooms, and keep-outs. To forget rooms, as in another
-building with the same map frame, stop the daemon, and delete <robot>.rooms.json beside the ledger.
-`start --keep-covered` goes on with the rest. `resume` goes on with what was paused, also the way
-home.
+A new order and a reset forget the progress of an order that is not over: on a terminal they say how
+much that is, and ask first; elsewhere they are refused without --yes. `start --keep-covered` keeps
+the progress and covers the rest. A reset keeps keep-outs, and names, borders and settings of rooms.
+To forget rooms, as in another building with the same map frame, stop the daemon, and delete
+<robot>.rooms.json beside the ledger.
 
-With --fleet all its robots get the same command, also those whose messages others received
-within the last ten minutes.
-Some may refuse or not answer while the others obey: the exit code is 1 then, and one without an
-answer may still be driving. Robots share a zone; corners are in the frame of each robot's own map:
-with fleet.frame use zones and keep-outs of their configurations.
+With --fleet all its robots get the same command, also those whose messages other robots received
+within the last ten minutes. Some robots may refuse or not answer while the others obey: then the
+exit code is 1, and a robot that has not answered may still be driving. Robots share a zone. Corners
+are in the frame of each robot's own map: with fleet.frame use zones and keep-outs of their
+configurations.
 
 exit codes: 0 done; 1 refused, or no answer, by one robot at least; 2 usage error; 78 invalid robot
 name

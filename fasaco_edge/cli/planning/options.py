@@ -67,7 +67,7 @@ figures of several passes: sums, and for each pass its own
 
 colony-search searches until its budget ends, the walk is proven optimal, or nothing is
 gained for long: a complete walk within milliseconds, then better ones by local search.
-Perturbations lead it on, and in every second one ants rebuild a part of the walk.
+Perturbations lead it on; in every other one ants rebuild a part of the walk.
 A line over the floor is laid along each of two walks, if the budget allows. What is left of
 the budget goes to the better line: each stage of its search takes twice as long as the one
 before. A larger budget gives no worse line, by its seconds and the price of floor that it

@@ -45,7 +45,7 @@ def is_poor(problem: CoverageProblem, path: CoveragePath) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class NearOptimal:
-    """Local search in which ants make every second perturbation; one thread is used.
+    """Local search in which ants make every other perturbation; one thread is used.
 
     Attributes:
         has_ants: False for a search without ants, for comparison.

@@ -4,7 +4,7 @@
    (``first_walks``). A completed previous walk takes its place if it costs no more: then the cells
    just ahead of the robot change only for a gain.
 2. Local search improves it, region by region on a large ground.
-3. Perturbations follow, each with local search: ants rebuild a disc in every second one. If turns
+3. Perturbations follow, each with local search: ants rebuild a disc in every other one. If turns
    cost, windows of the walk are solved again in between (``windows``), most of the time if turns
    are expensive.
 
