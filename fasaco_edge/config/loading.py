@@ -152,7 +152,7 @@ def _keys_in(text: str) -> list[str]:
 
 
 def _concern(named: str, faulty: str) -> bool:
-    """Return whether a key is a faulty one, is in it, or, unless a section, has it in it."""
+    """Return whether a key equals, lies in, or (unless a section) contains a faulty one."""
     is_in = f"{named}.".startswith((f"{faulty}.", f"{faulty}["))
     return is_in or ("." in named and faulty.startswith((f"{named}.", f"{named}[")))
 

@@ -15,6 +15,6 @@ YOUNG = ("rss_mb", "cores")
 @pytest.mark.parametrize("hub", come_and_go.HUBS)
 def test_who_comes_and_goes_leaves_nothing_behind(tmp_path, hub):
     campaign = come_and_go.run_campaign(tmp_path, mappers=10, daemons=3, rest_s=2.0, hub=hub)
-    # A look is short: on a busy machine nobody may be asked in one of them.
+    # A look is short: on a busy machine it may contain no question.
     assert any(row.questions_hz > 0 for row in campaign.rows), "nobody was counted"
     assert [told for told in campaign.violations if not any(what in told for what in YOUNG)] == []

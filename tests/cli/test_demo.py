@@ -128,7 +128,7 @@ def test_a_demo_covers_every_cell_that_can_be_reached(tmp_path, building):
 def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
     pytest.importorskip("rerun")
     out = tmp_path / "demo"
-    # Robots too fast for a busy machine drive past what their daemons would have told them.
+    # Robots too fast for a busy machine outrun the paths of their daemons.
     speed = round(max(6.0 / slowness(), 3.0), 1)
     options = ("--map", building, "--robots", 2, "--speed", speed, "--timeout", 1200)
     ended = fasaco_edge("demo", *options, "--out", out, "--json")

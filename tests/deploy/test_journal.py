@@ -28,7 +28,7 @@ def test_a_storm_of_faults_is_a_line(service: Service):
     service.lab.run("/opt/fasaco-edge/current/bin/python3", "-m", "tests.deploy.mapper", "storm")
     before, refused = -1, 0
     while before < refused:
-        time.sleep(1.2)  # a status is told once a second
+        time.sleep(1.2)  # a status is sent once a second
         before, refused = refused, service.ask()["errors"]["by_code"]["malformed_message"]
     service.stop()
     periods = (time.monotonic() - began) / PERIOD_S
