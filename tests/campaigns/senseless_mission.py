@@ -148,10 +148,7 @@ class MissionTrial:
             kept = before.snapshot()
             snapshot = decode_ledger(encode_ledger(kept), kept.cell_m)
             if snapshot.cell_m == config.cell_m:
-                if snapshot.tiles:
-                    mission.restore_ledger(snapshot)
-                mission.restore_rooms(before.rooms)
-                mission.restore_order(OrderState.from_json(snapshot.note))
+                mission.restore(snapshot, OrderState.from_json(snapshot.note), before.rooms)
             if keeps_site and before.grid is not None:
                 self._batch.append(MapReceived(before.grid))
         self._mission = mission

@@ -295,7 +295,7 @@ def test_floor_alone_is_restored_too(tmp_path):
     LedgerFile(tmp_path, "robot").write(snapshot)
     writer = open_ledger(tmp_path, "robot", CELL)
     drive = Drive((0, 0))
-    LedgerKeeper(writer, CELL, autostart=True).restore(drive.mission)
+    LedgerKeeper(writer, CELL, autostart=True).restore(drive.mission, drive.mission.rooms)
     assert drive.mission.covered.floor.pixels == snapshot.floor.pixels > 0
     writer.disk.close(1.0)
 

@@ -115,8 +115,9 @@ class LineRobot:
         """Let another mission go on from what is kept, on a map that comes first."""
         kept = self.mission.snapshot()
         self.mission, self.exit = Mission(self.config), PathExit()
-        self.mission.restore_ledger(decode_ledger(encode_ledger(kept), kept.cell_m))
-        self.mission.restore_order(OrderState.from_json(kept.note))
+        self.mission.restore(
+            decode_ledger(encode_ledger(kept), kept.cell_m), OrderState.from_json(kept.note)
+        )
         self.path, self._plan = [], None
         self.show(pixels)
 

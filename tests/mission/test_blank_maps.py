@@ -66,8 +66,7 @@ def test_after_a_restart_a_map_without_floor_contradicts_nothing(letter):
     before = swept(*FLOOR, ticks=60)
     covered = before.visited
     drive = Drive(HERE)
-    drive.mission.restore_ledger(before.mission.snapshot())
-    drive.mission.restore_order(before.mission.order_state)
+    drive.mission.restore(before.mission.snapshot(), before.mission.order_state)
     assert stand(drive, 8.0, BLANK[letter]) == []
     assert stand(drive, 8.0, OLD) == []
     assert covered <= drive.visited

@@ -399,7 +399,7 @@ def resumed(drive, cell, *rows):
     """What comes after a kill -9: all that was kept, and nothing else."""
     kept = drive.mission.snapshot()
     again = Drive(cell, order_state=OrderState.from_json(kept.note))
-    again.mission.restore_ledger(kept)
+    again.mission.restore(kept)
     again.tell(MapReceived(building(*rows)), pose_at(*cell))
     return again
 

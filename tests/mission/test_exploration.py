@@ -209,8 +209,7 @@ def test_a_mapper_that_begins_anew_hides_no_floor_of_an_order(over):
     kept = drive.mission.snapshot()
     order = OrderState.from_json(kept.note)
     again = Drive((1, 1), order_state=order)
-    again.mission.restore_ledger(kept)
-    again.mission.restore_order(order)
+    again.mission.restore(kept, order)
     again.tell(MapReceived(seen), pose_at(1, 1))
     for _ in range(20):
         if again.request is not None:
@@ -236,8 +235,7 @@ def test_on_the_same_map_after_a_restart_nobody_looks_where_it_ends():
     kept = drive.mission.snapshot()
     order = OrderState.from_json(kept.note)
     again = Drive(drive.cell, order_state=order)
-    again.mission.restore_ledger(kept)
-    again.mission.restore_order(order)
+    again.mission.restore(kept, order)
     again.tell(MapReceived(seen), pose_at(*drive.cell))
     again.finish()
     assert len(again.visited) == 8

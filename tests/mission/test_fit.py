@@ -117,7 +117,7 @@ def after(drive):
 def resumed(before, cell, *events):
     """A robot whose mission goes on after a restart."""
     drive = Drive(cell)
-    drive.mission.restore_ledger(before)
+    drive.mission.restore(before)
     drive.tell(*events)
     return drive
 

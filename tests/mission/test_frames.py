@@ -17,7 +17,7 @@ HERE, THERE = pose_at(1, 1), pose_at(1, 1, frame="odom")
 def restarted(first, *events):
     """A mission that goes on from what another one covered."""
     drive = Drive((1, 1))
-    drive.mission.restore_ledger(first.mission.snapshot())
+    drive.mission.restore(first.mission.snapshot())
     drive.tell(*events)
     return drive
 

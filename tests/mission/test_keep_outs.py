@@ -128,7 +128,7 @@ def test_it_outlives_the_daemon():
     add(drive, VASE)
     kept = drive.mission.snapshot()
     again = Drive(drive.cell, order_state=OrderState.from_json(kept.note))
-    again.mission.restore_ledger(kept)
+    again.mission.restore(kept)
     again.tell(MapReceived(building(*ROOM)), pose_at(*drive.cell))
     again.finish()
     assert again.visited == ALL - inside(1, 3, 4, 5)

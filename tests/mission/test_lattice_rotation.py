@@ -146,8 +146,7 @@ def test_an_order_is_kept_to_the_last_bit_as_it_was_given():
     assert kept.order == order
     # The same order once more, after a restart, goes on.
     again = Mission(replace(CONFIG, lattice_deg=17.3))
-    again.restore_ledger(mission.snapshot())
-    again.restore_order(kept)
+    again.restore(mission.snapshot(), kept)
     assert again.order_state.order == mission.order_state.order
     decision = again.step([CommandReceived(1, "start", order)], 0.0)
     assert decision.answers[0].error is None
@@ -190,8 +189,7 @@ def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     assert kept.lattice_deg == mission.rotation.deg
     # A mission that goes on after a restart has the angle at once.
     again = Robot(Mission(AUTO), at=robot.at)
-    again.mission.restore_ledger(kept)
-    again.mission.restore_order(mission.order_state)
+    again.mission.restore(kept, mission.order_state)
     again.tell(MapReceived(grid))
     assert again.mission.rotation.deg == mission.rotation.deg
     # Where it stands it may sweep a pixel more.
@@ -202,6 +200,22 @@ def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     figures = judge_floor(grid, np.array(robot.trail), ROBOT).figures
     assert figures.swept_share > 0.97
     assert figures.illegal_share == 0.0
+
+
+def test_other_cells_keep_what_was_covered_before_a_restart():
+    grid = askew_building()
+    robot = Robot(Mission(AUTO), at=rotated_point(*START, DEG))
+    near = MapReceived(seen_around(grid, robot.at, 1.2))
+    robot.tell(near)
+    robot.drive(20)
+    kept = robot.mission.snapshot()
+    again = Robot(Mission(AUTO), at=robot.at)
+    again.mission.restore(kept, OrderState.from_json(kept.note))
+    again.tell(near)
+    again.tell(MapReceived(grid))
+    again.drive(15)
+    assert again.mission.rotation.deg == pytest.approx(DEG, abs=1.0)
+    assert again.mission.ledger.snapshot().cells > again.mission.covered.before.cells > 5
 
 
 def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
@@ -264,7 +278,7 @@ def test_cells_of_another_size_count_by_the_floor_at_their_centres():
 
 def snapshot_of(ledger):
     mission = Mission(CONFIG)
-    mission.restore_ledger(replace(ledger, lattice_deg=0.0))
+    mission.restore(replace(ledger, lattice_deg=0.0))
     return mission.covered.floor
 
 

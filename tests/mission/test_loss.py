@@ -99,7 +99,7 @@ def test_a_robot_that_only_stands_there_loses_nothing():
 def test_before_there_is_a_map_all_that_was_covered_counts():
     kept = covering(12).mission.snapshot()
     again = Drive((0, 0), order_state=OrderState.from_json(kept.note))
-    again.mission.restore_ledger(kept)
+    again.mission.restore(kept)
     assert refused_without_map(again) == "start forgets 11 covered cells (0.7 m2)"
 
 

@@ -251,8 +251,7 @@ def test_a_mission_that_replaces_another_goes_on_with_its_doubt(other):
     shown = MapReceived(building(*other))
     stand(first, 3.0, shown)
     again = Drive(HERE)
-    again.mission.restore_ledger(first.mission.snapshot())
-    again.mission.restore_order(first.mission.order_state)
+    again.mission.restore(first.mission.snapshot(), first.mission.order_state)
     again.mission.succeed(first.mission)
     again.now = first.now
     faults = stand(again, 4.0, shown)

@@ -228,6 +228,26 @@ def test_lanes_of_a_pass_overlap_as_it_says():
     assert lengths[0] > 1.25 * max(lengths[1:])
 
 
+@pytest.mark.parametrize("lanes", ["auto", {"overlap": 0.4}])
+def test_other_cells_keep_what_was_covered_before_a_restart(lanes):
+    """A mapper that began anew shows the near half of a corridor, which was covered before."""
+    grid = room(5.0, 0.45)
+    config = replace(line_robot.CONFIG, lattice_deg=None)
+    robot = line_robot.LineRobot(grid.cells, (0.5, 0.27), config)
+    order(robot, lanes)
+    assert robot.wait(120.0, lambda robot: robot.x > 3.8)
+    half = grid.cells.copy()
+    half[:, 50:] = -1
+    robot.x, robot.y = 0.5, 0.27
+    robot.restart(half)
+    looks = robot.wait(60.0, lambda robot: robot.mission.state is State.DONE or robot.x > 2.0)
+    assert looks
+    assert robot.mission.state is not State.DONE
+    robot.show(grid.cells)
+    assert robot.wait(300.0, lambda robot: robot.mission.state is State.DONE)
+    assert max(x for x, _ in robot.track) > 4.6
+
+
 def test_cells_that_no_map_fits_on_are_given_up():
     grid, usual_m = room(3.0, 2.4), CONFIG.footprint.cell_m
     layout = LatticeLayout(CONFIG)

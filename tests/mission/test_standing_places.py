@@ -38,9 +38,7 @@ def restarted(drive, config, order_state=None):
     """A robot that goes on from the ledger of another one."""
     again = Drive(HERE, config=config)
     before = drive.mission.snapshot()
-    if before.cells:
-        again.mission.restore_ledger(before)
-    again.mission.restore_order(order_state or OrderState.from_json(before.note))
+    again.mission.restore(before, order_state or OrderState.from_json(before.note))
     return again
 
 
@@ -195,7 +193,7 @@ def test_an_order_keeps_its_frame_over_a_restart(command):
     zone = {"zones": [{"name": "a", "polygon": corners}]}
     drive.command("start", {"keep_out": [corners]} if command == "keep-out zones" else zone)
     again = Drive(HERE, config=CONFIG)
-    again.mission.restore_order(OrderState.from_json(drive.mission.order_state.to_json()))
+    again.mission.restore(order=OrderState.from_json(drive.mission.order_state.to_json()))
     again.tell(*floor("map_2"))
     assert again.mission.state is State.IDLE
     assert "it was given in frame 'map_1', the map is in 'map_2'" in again.mission.reason

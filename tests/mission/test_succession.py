@@ -23,8 +23,7 @@ PERIOD_S = 10
 def replace(drive):
     """Let another mission go on, as the daemon does."""
     before, after = drive.mission, Mission(drive.config)
-    after.restore_ledger(before.snapshot())
-    after.restore_order(before.order_state)
+    after.restore(before.snapshot(), before.order_state)
     after.succeed(before)
     drive.mission, drive.request, drive.walk, drive.revision = after, None, [], 0
     drive.tell(*before.held())

@@ -353,7 +353,7 @@ def test_floor_before_a_restart_counts_until_a_map_contradicts():
 
     def resumed(*rows):
         drive = Drive((1, 1))
-        drive.mission.restore_ledger(kept)
+        drive.mission.restore(kept)
         drive.tell(MapReceived(building(*rows)), pose_at(1, 1))
         return drive.mission.covered.floor
 

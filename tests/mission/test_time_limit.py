@@ -124,8 +124,7 @@ def test_the_time_goes_on_over_a_restart(covered):
         drive.go()
     kept = drive.mission.snapshot()
     drive.mission, drive.request = Mission(drive.config), None
-    drive.mission.restore_ledger(kept)
-    drive.mission.restore_order(OrderState.from_json(kept.note))
+    drive.mission.restore(kept, OrderState.from_json(kept.note))
     drive.revision, drive.walk = 0, []
     drive.tell(MapReceived(building(*HALL)), pose_at(*drive.cell), after=1000.0)
     left_s = drive.mission.time_limit.left_s
@@ -140,8 +139,7 @@ def test_a_first_pose_and_a_clock_that_is_set_on_take_no_time():
     drive.run(State.COVERING)
     kept = drive.mission.snapshot()
     drive.mission, drive.request = Mission(drive.config), None
-    drive.mission.restore_ledger(kept)
-    drive.mission.restore_order(OrderState.from_json(kept.note))
+    drive.mission.restore(kept, OrderState.from_json(kept.note))
     drive.revision, drive.walk = 0, []
     drive.tell(MapReceived(building(*HALL)))
     for stamp_s in (1_700_000_000, 1_700_003_600):

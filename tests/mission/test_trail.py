@@ -105,7 +105,7 @@ def test_it_goes_on_after_a_restart():
     kept = decode_ledger(encode_ledger(before), CELL)
     np.testing.assert_allclose(kept.trail.tau, before.trail.tau, rtol=0.004)
     again = Mission(CONFIG)
-    again.restore_ledger(kept)
+    again.restore(kept)
     again.step([MapReceived(building(*ROOMS)), pose_at(*drive.cell)], 0.0)
     np.testing.assert_array_equal(again.trail.snapshot().tau, kept.trail.tau)
 

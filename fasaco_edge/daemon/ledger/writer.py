@@ -26,6 +26,7 @@ from fasaco_edge.wire.documents.status import LedgerReport
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.map.room_book import RoomBook
 
 LOG = logging.getLogger(__name__)
 
@@ -71,11 +72,9 @@ class LedgerKeeper:
         self._kept = _Kept(self._before.total, self._before.floor.changes, 0, 0, self.order_state)
         self._kept_at = float("-inf")
 
-    def restore(self, mission: Mission) -> None:
-        """Let a mission continue where the previous one ended."""
-        if not self._before.is_empty:
-            mission.restore_ledger(self._before)
-        mission.restore_order(self.order_state)
+    def restore(self, mission: Mission, rooms: RoomBook) -> None:
+        """Let a mission continue where the previous one ended, in its rooms."""
+        mission.restore(self._before, self.order_state, rooms)
 
     def take_back(self, mission: Mission) -> None:
         """Take over a mission's progress for the mission that replaces it."""

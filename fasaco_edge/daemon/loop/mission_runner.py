@@ -111,8 +111,7 @@ class MissionRunner:
         held = self._held.events
         if loaded is not None:
             self.mission, self.worker = loaded
-            self.mission.restore_rooms(self.rooms)
-            self._keeper.restore(self.mission)
+            self._keeper.restore(self.mission, self.rooms)
             if self._before is not None:
                 self.mission.succeed(self._before)
             self._before = None

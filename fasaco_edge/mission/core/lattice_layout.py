@@ -24,6 +24,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.grid.walls import WallDirection, wall_direction
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.planners.passes import Laid, lane_and_tool_m
 
 # Evidence required: length of parallel walls [m], and their share of all walls.
@@ -111,8 +112,6 @@ class LatticeLayout:
 
     def __init__(self, config: MissionConfig) -> None:
         self.deg = self._usual_deg = config.lattice_deg or 0.0
-        # The angle of a ledger from before a restart.
-        self._resumed_deg: float | None = None
         self._is_given = config.lattice_deg is not None
         self.cell_m = self._usual_cell_m = config.footprint.cell_m
         # Width of the tool, usual and as planned with at present [m].
@@ -133,27 +132,32 @@ class LatticeLayout:
         cost = replace(config.cost, step_s=config.cost.step_s * scale)
         return replace(config, footprint=footprint, cost=cost, sweeping=sweeping)
 
-    def resume(self, deg: float) -> bool:
-        """Keep the angle of a ledger from before a restart; return whether that changes it."""
-        if self._is_given or not deg:
-            return False
-        self.deg = self._usual_deg = self._resumed_deg = deg
-        self._walls.end()
-        return True
+    def resume(self, before: LedgerSnapshot, lay: Laid) -> bool:
+        """Keep the cells of a ledger from before a restart; return whether that changes any.
+
+        Cells of another edge are kept only if those of the present pass have it.
+        """
+        was, deg = (self.deg, self.cell_m), before.lattice_deg
+        if deg == lay.angle_deg:
+            self.deg = deg
+        elif deg and not self._is_given:
+            self.deg = self._usual_deg = deg
+            self._walls.end()
+        cell_m, tool_m = self._lane_and_tool_m(lay)
+        if math.isclose(before.cell_m, cell_m):
+            self.cell_m, self._tool_m = cell_m, tool_m
+        return (self.deg, self.cell_m) != was
+
+    def _lane_and_tool_m(self, lay: Laid) -> tuple[float, float]:
+        """Return the edge of a pass's cells, and the width of the tool to plan with [m]."""
+        usual = self._usual_tool_m, self._usual_cell_m
+        return usual[::-1] if lay.overlap is None else lane_and_tool_m(*usual, lay.overlap)
 
     def changes_for_pass(self, lay: Laid, grid: OccupancyGrid) -> bool:
         """Change angle and edge to those of a pass's lanes, if they fit the newest map; return
         whether that changes any."""
-        deg = lay.angle_deg
-        if self._resumed_deg is not None and self._resumed_deg == deg:
-            # The ledger's angle was that of the pass; the usual one is not known.
-            self._usual_deg = 0.0
-            self._walls.begin()
-        self._resumed_deg = None
-        wanted = self._usual_deg if deg is None else deg
-        cell_m, tool_m = self._usual_cell_m, self._usual_tool_m
-        if lay.overlap is not None:
-            cell_m, tool_m = lane_and_tool_m(tool_m, cell_m, lay.overlap)
+        wanted = self._usual_deg if lay.angle_deg is None else lay.angle_deg
+        cell_m, tool_m = self._lane_and_tool_m(lay)
         if (wanted, cell_m) == (self.deg, self.cell_m):
             return False
         # The map may grow.

@@ -86,14 +86,11 @@ class Mission:
         self._idle = IdlePlaces(config)
         self._rooms = RoomWatch()
         self._lay_cells()
-        self.restore_order(order or OrderState.autostart())
+        self._continue(order or OrderState.autostart())
 
     def _lay_cells(self) -> None:
         """Start a mission on a lattice at the decided angle, with cells of the decided edge."""
         self._rotation = LatticeRotation(self._layout.deg)
-        # Rotation of the lattice against the restored ledger's [deg]; edge of its cells as a
-        # multiple of the ledger's.
-        self._rotated_by_deg, self._scaled_by = 0.0, 1.0
         # The newest map in the lattice's frame, and the same map in the map frame.
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
@@ -132,42 +129,54 @@ class Mission:
         mask = mask_frame(self._config.policy.keep_out_mask)
         self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)
 
-    def restore_ledger(self, before: LedgerSnapshot) -> None:
-        """Continue a ledger from before a restart, unless the map contradicts it.
+    def restore(
+        self,
+        before: LedgerSnapshot | None = None,
+        order: OrderState | None = None,
+        rooms: RoomBook | None = None,
+    ) -> None:
+        """Continue from before a restart; to be called before the first step.
 
-        To be called before the first step, and before ``restore_order``. A contradiction, see
-        ``coverage.fit``, is reported as a fault (LedgerMismatchError) with the map that shows it,
-        and coverage starts from zero.
+        If the map contradicts the ledger, see ``coverage.fit``, it is reported as a fault
+        (LedgerMismatchError) with the map that shows it, and coverage starts from zero.
+
+        Args:
+            before: ledger, which may be empty; None for none.
+            order: order; None for the one that the mission started with.
+            rooms: rooms, which the mission changes; None for none.
         """
-        if self._layout.resume(before.lattice_deg):
+        if rooms is not None:
+            self._rooms.book = rooms
+        order = order or self.order_state
+        if before is not None and self._layout.resume(before, order.current_pass):
             self._lay_cells()
-        self._resume(before)
-        self.covered.note_restart(in_order=True)
+        self._continue(order, before, restart=before)
 
-    def _resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
-        self._rotated_by_deg = self._rotation.deg - before.lattice_deg
+    def _continue(
+        self,
+        order: OrderState,
+        before: LedgerSnapshot | None = None,
+        *,
+        restart: LedgerSnapshot | None = None,
+        is_confirmed: bool = False,
+    ) -> None:
+        """Continue an order with the ledger that belongs to it, and that of the last restart."""
         deg, cell_m = self._rotation.deg, self._layout.cell_m
-        self._scaled_by = cell_m / before.cell_m
-        before = relaid_ledger(before, deg, cell_m)
-        self.covered.resume(before, is_confirmed=is_confirmed)
-        self._trail.resume(before.trail)
-        self.map.frames.activate(before.frame)
-
-    def restore_order(self, order: OrderState) -> None:
-        """Continue an order from before a restart; to be called before the first step, and after
-        ``restore_rooms``."""
+        rotated_by_deg, scale = 0.0, 1.0
+        if before is not None:
+            rotated_by_deg, scale = deg - before.lattice_deg, cell_m / before.cell_m
+        if before is not None and not before.is_empty:
+            before = relaid_ledger(before, deg, cell_m)
+            self.covered.resume(before, is_confirmed=is_confirmed)
+            self._trail.resume(before.trail)
+            self.map.frames.activate(before.frame)
+            if restart is not None and order.stage is not Stage.OVER:
+                self.covered.note_restart(relaid_ledger(restart, deg, cell_m))
         self.map.places.resume(order.places)
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
-        if order.stage is Stage.OVER:
-            self.covered.note_restart(in_order=False)
-        self._changes.begin(self._rotation.order(order, self._rotated_by_deg, self._scaled_by))
+        self._changes.begin(self._rotation.order(order, rotated_by_deg, scale))
         self.state, self.reason = self._executive.status()
-
-    def restore_rooms(self, book: RoomBook) -> None:
-        """Continue with the rooms of a book, which the mission changes; to be called before
-        ``restore_order``."""
-        self._rooms.book = book
 
     def succeed(self, before: Mission) -> None:
         """Take over a predecessor's state of robot and inputs, and its doubt about the building.
@@ -267,15 +276,14 @@ class Mission:
 
     def _lay_anew(self, why: str, now: float) -> PathUpdate | None:
         """Continue on another lattice; return the path that stops the robot, if any."""
-        before, route = self.snapshot(), self.route
+        before, route, restart = self.snapshot(), self.route, self.covered.before
         order = replace(self.order_state, reached=self.orders.reached)
         is_confirmed = self.covered.is_confirmed and not self.map.building.is_foreign
         executive, held = self._executive, self.held()
         # The robot must not drive a path that is no longer checked.
         stop = route.stop(why, now)
         self._lay_cells()
-        self._resume(before, is_confirmed=is_confirmed)
-        self.restore_order(order)
+        self._continue(order, before, restart=restart, is_confirmed=is_confirmed)
         self.route.succeed(route)
         self._executive.succeed(executive)
         self.drive.break_track()

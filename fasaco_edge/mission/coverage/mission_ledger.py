@@ -133,6 +133,7 @@ class MissionLedger:
         self.reopened = 0
         self.shared = shared or OthersCells()
         self.passed = PassedCells()
+        # Coverage from before a restart in the middle of an order.
         self.before: LedgerSnapshot | None = None
         self._opened_again: Counter[Cell] = Counter()
         # The ledger from before a restart; None once a map has confirmed it.
@@ -150,10 +151,9 @@ class MissionLedger:
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
-    def note_restart(self, *, in_order: bool) -> None:
-        """Note that the present coverage is from before a restart, in the middle of an order or
-        not."""
-        self.before = self.current.snapshot() if in_order else None
+    def note_restart(self, before: LedgerSnapshot) -> None:
+        """Note the coverage from before a restart, in present cells."""
+        self.before = before
 
     def not_since(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window were last visited before the restart."""

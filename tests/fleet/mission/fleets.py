@@ -23,7 +23,7 @@ class FleetRobot(Drive):
         self.messages = Messages(name, CONFIG.footprint.robot_radius_m)
         super().__init__(cell, config=config, kind=FleetKind(name))
         if before is not None:
-            self.mission.restore_ledger(before)
+            self.mission.restore(before)
         self.mission.covered.shared.begin(1)
         self.tell(MapReceived(building(*rows)), pose_at(*cell))
 

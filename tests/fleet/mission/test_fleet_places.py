@@ -123,7 +123,7 @@ class OnFloors(Drive):
     def __init__(self, place=IN_FLEET.map_place, before=None, frame="house"):
         super().__init__((0, 0), kind=FleetKind("r1", place))
         if before is not None:
-            self.mission.restore_ledger(before)
+            self.mission.restore(before)
         self.mission.covered.shared.begin(1)
         fleet = FleetConfig("hall", frame, place.origin[0])
         self.receiver = FleetReceiver(structs.replace(HALL, fleet=fleet))
