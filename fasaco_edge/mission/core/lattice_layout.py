@@ -153,6 +153,22 @@ class LatticeLayout:
         usual = self._usual_tool_m, self._usual_cell_m
         return usual[::-1] if lay.overlap is None else lane_and_tool_m(*usual, lay.overlap)
 
+    def change(self, lay: Laid | None, grid: OccupancyGrid, pose: StampedPose) -> str:
+        """Change to the cells of a pass, or to rows along the walls; return why, "" for no change.
+
+        Args:
+            lay: the present pass; None if the robot does not sweep.
+            grid: the newest map.
+            pose: the robot's pose.
+        """
+        if lay is not None and self.changes_for_pass(lay, grid):
+            along = f"along the lanes of the pass, {self.cell_m:.3g} m wide,"
+        elif self.deg == self._usual_deg and self._rotates_to_walls(grid, pose):
+            along = "along the walls from now on,"
+        else:
+            return ""
+        return f"cells lie {along} at {self.deg:.1f} degrees to the map frame"
+
     def changes_for_pass(self, lay: Laid, grid: OccupancyGrid) -> bool:
         """Change angle and edge to those of a pass's lanes, if they fit the newest map; return
         whether that changes any."""
@@ -172,12 +188,7 @@ class LatticeLayout:
         if is_other and not self._is_given:
             self._walls.begin()
 
-    @property
-    def is_settled(self) -> bool:
-        """Whether no later map will rotate the lattice to its walls."""
-        return self._walls.is_over or self.deg != self._usual_deg
-
-    def rotates_to_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
+    def _rotates_to_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
         """Evaluate the walls of the newest map; return whether the angle has changed."""
         deg = self._walls.look(grid, pose.pose)
         # A rotated lattice spans up to twice as many cells, and the map may grow.
@@ -186,22 +197,22 @@ class LatticeLayout:
         self.deg = self._usual_deg = deg
         return True
 
-    def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> bool:
-        """Return whether the angle changes to 0, or the edge to the usual one, because one of the
-        maps does not fit otherwise."""
+    def rotates_back_for(self, maps: Iterable[OccupancyGrid]) -> str:
+        """Change the angle to 0, or the edge to the usual one, if one of the maps does not fit
+        otherwise; return why, "" for no change."""
         is_usual = (self.deg, self.cell_m) == (self._usual_deg, self._usual_cell_m)
         if is_usual and (self._is_given or not self.deg):
-            return False
+            return ""
         if all(
             self._fits(grid, self.deg, self.cell_m) or not self._fits(grid, 0.0, self._usual_cell_m)
             for grid in maps
         ):
-            return False
+            return ""
         if is_usual:
             self._usual_deg = 0.0
         self.deg, self.cell_m = self._usual_deg, self._usual_cell_m
         self._tool_m = self._usual_tool_m
-        return True
+        return "the map is too large for other cells than the usual ones"
 
     def _fits(self, grid: OccupancyGrid, deg: float, cell_m: float, share: float = 1.0) -> bool:
         """Return whether a lattice at an angle [deg] takes at most a share of the cell limit."""

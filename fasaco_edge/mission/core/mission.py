@@ -248,31 +248,23 @@ class Mission:
         return self._handler.handle(map(self._rotation.event, events), now)
 
     def _align(self, happened: Decision, now: float) -> Decision:
-        """Lay the lattice along a pass's lanes, or along the walls once their direction is certain;
-        return the combined decision."""
-        state, layout, grid, pose = self.order_state, self._layout, self.grid, self.pose
-        layout.note_faults(happened.faults)
+        """Lay other cells if the pass or the walls ask for them; return the combined decision."""
+        state, grid, pose = self.order_state, self.grid, self.pose
+        self._layout.note_faults(happened.faults)
         # A path kept during an errand is in present cells; while the building is in doubt, the map
         # may soon be another.
         if state.errand or self.is_in_doubt or grid is None or pose is None:
             return happened
-        sweeps = state.current_zone is not None
-        if sweeps and layout.changes_for_pass(state.current_pass, grid):
-            along = f"along the lanes of the pass, {layout.cell_m:.3g} m wide,"
-        elif not layout.is_settled and layout.rotates_to_walls(grid, pose):
-            along = "along the walls from now on,"
-        else:
-            return happened
-        why = f"cells lie {along} at {layout.deg:.1f} degrees to the map frame"
-        stop = self._lay_anew(why, now)
+        lay = None if state.current_zone is None else state.current_pass
+        why = self._layout.change(lay, grid, pose)
+        stop = self._lay_anew(why, now) if why else None
         return replace(happened, path=stop or happened.path)
 
     def _make_room(self, events: Iterable[Event], now: float) -> PathUpdate | None:
-        """Rotate the lattice back to the map frame's axes for a map that does not fit otherwise."""
+        """Lay the usual cells for a map that does not fit otherwise; return the path, if any."""
         maps = (event.grid for event in events if isinstance(event, MapReceived))
-        if not self._layout.rotates_back_for(maps):
-            return None
-        return self._lay_anew("the map is too large for other cells than the usual ones", now)
+        why = self._layout.rotates_back_for(maps)
+        return self._lay_anew(why, now) if why else None
 
     def _lay_anew(self, why: str, now: float) -> PathUpdate | None:
         """Continue on another lattice; return the path that stops the robot, if any."""
