@@ -1,4 +1,4 @@
-"""Index of the campaigns: what each looks for, and the command of its full form.
+"""Index of the campaigns: what each looks for, its command, and how long that takes.
 
     python -m tests.campaigns
 
@@ -16,25 +16,29 @@ from rich.table import Table
 
 HERE = Path(__file__).parent
 COMMAND = re.compile(
-    r"((?:PYTHONPATH=\S+ )?python -m (tests\.campaigns\.\w+).*?)\s*(?:#.*)?$", re.M
+    r"^ *((?:PYTHONPATH=\S+ )?python -m (tests\.campaigns\.\w+).*?)\s*(?:#.*)?$", re.M
 )
 
 
-def campaigns() -> list[tuple[str, str]]:
-    """Return command and purpose of each campaign, by name."""
+TAKES = re.compile(r"^Takes (.+)\.$", re.M)
+
+
+def campaigns() -> list[tuple[str, str, str]]:
+    """Return command, purpose and duration on two quiet cores of each campaign, by name."""
     found = []
     for path in sorted([*HERE.glob("*.py"), *HERE.glob("*/__main__.py")]):
         about = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
         name = path.parent.name if path.stem == "__main__" else path.stem
-        command = COMMAND.search(about)
+        command, takes = COMMAND.search(about), TAKES.search(about)
         if command is not None and command[2] == f"tests.campaigns.{name}":
-            found.append((command[1].rstrip("`"), about.splitlines()[0].rstrip(":;,")))
+            duration = "" if takes is None else takes[1]
+            found.append((command[1], about.splitlines()[0], duration))
     return found
 
 
 def main() -> None:
     """Print the index."""
-    table = Table("command", "what it looks for", show_lines=True)
+    table = Table("command", "what it looks for", "takes", show_lines=True)
     for row in campaigns():
         table.add_row(*row)
     Console().print(table)

@@ -1,6 +1,8 @@
-"""Install, start, upgrade, plan and drive a mission on emulated arm64, and compare with this one.
+"""Installation, start, upgrade, plan and mission on emulated arm64, compared with this machine.
 
     python -m tests.campaigns.arm64 FOLDER [--without-recording] [--only mission]
+
+Takes hours.
 
 Needs root and, the first time, the network: FOLDER then holds a tree of Debian for arm64 and the
 release folder that is installed in it, 3 GB. To compile the kernels there takes an hour. Everything

@@ -1,6 +1,8 @@
-"""Attacks on a daemon in the middle of a mission, and what came of each:
+"""Attacks on a daemon in the middle of a mission, and how it fares.
 
-python -m tests.campaigns.attack
+    python -m tests.campaigns.attack
+
+Takes minutes.
 """
 
 from __future__ import annotations

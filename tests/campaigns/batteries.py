@@ -2,6 +2,8 @@
 
     python -m tests.campaigns.batteries --missions 100 [--cells 4000] [--seed 0]
 
+Takes an hour.
+
 In one process, in simulated time: the daemon's ``Mission``, a robot that does as it is told in a
 generated building unknown to it, and the simulated robot's battery, which charges where the robot
 stands in its dock. Each building is covered twice. Once with a battery that never drains: what

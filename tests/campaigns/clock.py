@@ -2,6 +2,8 @@
 
     python -m tests.campaigns.clock --boots 12 [--seed 0] [--json FILE]
 
+Takes minutes.
+
 Each boot is a daemon with its recorder, started in 1970, a year off or right, and recorded into one
 folder with a small quota; its clock then steps back and forth by years. Watched from outside, by a
 clock that is right: which part is deleted, how long each recording claims to be, and every age that

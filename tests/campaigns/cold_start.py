@@ -2,6 +2,8 @@
 
     PYTHONPATH=deploy python -m tests.campaigns.cold_start RELEASE [--json]
 
+Takes minutes.
+
 RELEASE is a folder that `make wheelhouse` has made. Measured are the installation, which compiles
 the kernels, a start until systemd calls the service ready, the time from a first map and pose to
 the first path, the memory that this takes at most, and a roll back to a version before. Then a byte

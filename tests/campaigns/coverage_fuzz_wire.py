@@ -1,7 +1,9 @@
-"""Bytes that lead a decoder where none has led it before, bred by atheris (libFuzzer).
+"""Bytes that lead decoders into new branches, bred by atheris (libFuzzer).
 
-python -m pip install atheris
-python -m tests.campaigns.coverage_fuzz_wire --seconds 300
+    python -m pip install atheris
+    python -m tests.campaigns.coverage_fuzz_wire --seconds 300
+
+Takes hours.
 
 Every message type is fuzzed in a process of its own, from its valid and hostile vectors on.
 What fuzz_campaign asks of a payload is asked here too; a payload that fails is kept.

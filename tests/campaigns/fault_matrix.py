@@ -3,6 +3,8 @@
     python -m tests.campaigns.fault_matrix [--only WORDS] [--stages 2] [--watch 14] [--json]
                                            [--source FOLDER]
 
+Takes minutes.
+
 Two daemons of one name, two followers, a source of poses and their router are processes; a base
 moves as the commands say. Each part is frozen, killed, restarted in a loop, cut off from the
 network, or slow: what it sends arrives 1 s late. The planner also hangs while something else

@@ -1,6 +1,8 @@
-"""Daemons of a fleet that are killed or frozen, and networks that split; the full campaign is
+"""Daemons of a fleet that are killed or frozen, and networks that split.
 
     python -m tests.campaigns.fleet_kills --kills 200 --splits 20
+
+Takes hours.
 
 Three daemons share a building over three routers in a row, one robot at each end's and one more at
 the last's. At random moments a daemon is killed (kill -9), or stopped with its token in place

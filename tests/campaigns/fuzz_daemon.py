@@ -1,6 +1,8 @@
-"""Broken samples for a daemon in the middle of a mission; the full campaign is
+"""Broken samples for a daemon in the middle of a mission.
 
-python -m tests.campaigns.fuzz_daemon --samples 10000
+    python -m tests.campaigns.fuzz_daemon --samples 10000
+
+Takes minutes.
 """
 
 from __future__ import annotations

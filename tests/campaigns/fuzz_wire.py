@@ -1,6 +1,8 @@
-"""Broken bytes for every decoder, by the million; the full campaign is
+"""Broken bytes for every decoder, a million of them.
 
-python -m tests.campaigns.fuzz_wire --mutations 1000000
+    python -m tests.campaigns.fuzz_wire --mutations 1000000
+
+Takes minutes.
 
 Each mutation of a valid vector has to be refused by the one named error, or to be read as a
 value that holds what the contract promises and is the same after encoding and decoding it.

@@ -1,6 +1,8 @@
-"""Every command as root, lured into folders that another user has prepared.
+"""Every command as root, in folders that another user has prepared as traps.
 
     PYTHONPATH=deploy python -m tests.campaigns.hostile_user [--short] [--json FILE]
+
+Takes minutes.
 
 Home, working folder, TMPDIR, PYTHONPATH and more lead into a trap (``tests.campaigns.trap``); the
 mode mask is 0. Each of fasaco-edge's commands runs there as it is installed, with a daemon and a

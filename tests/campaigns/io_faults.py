@@ -1,9 +1,11 @@
-"""Let each file call of the daemon, the recorder and the compiler fail in turn.
+"""Failures of each file call of daemon, recorder and compiler, in turn.
 
     python -m tests.campaigns.io_faults                       # all, hours
     python -m tests.campaigns.io_faults --most 20             # 20 of each kind of call
     python -m tests.campaigns.io_faults --only compile        # an empty cache of kernels: days
     python -m tests.campaigns.io_faults --only orders --again orders:sync:2:EIO
+
+Takes hours.
 
 The Nth open, read, write, fsync, rename, mmap and so on under the folders of state, recordings,
 configuration and compiled kernels fails, for every N there is, with each error that it may fail

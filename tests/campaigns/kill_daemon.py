@@ -1,6 +1,8 @@
-"""A daemon that is killed again and again while its robot drives; the full campaign is
+"""A daemon that is killed again and again while its robot drives.
 
-python -m tests.campaigns.kill_daemon --kills 200
+    python -m tests.campaigns.kill_daemon --kills 200
+
+Takes a quarter of an hour.
 """
 
 from __future__ import annotations

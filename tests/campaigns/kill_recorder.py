@@ -1,6 +1,8 @@
-"""Kill recorders with SIGKILL at random moments, and see what is left.
+"""Recorders killed with SIGKILL at random moments, and what is left of their files.
 
     python -m tests.campaigns.kill_recorder --kills 100 [--seed 0]
+
+Takes minutes.
 
 A robot drives at 50 poses a second, among maps, coverage and statuses. After each kill all parts
 are to be read by rerun, as they are or after the next recorder's repair; the age that the newest

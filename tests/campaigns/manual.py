@@ -2,6 +2,8 @@
 
     PYTHONPATH=deploy python -m tests.campaigns.manual RELEASE
 
+Takes minutes.
+
 RELEASE is a folder that `make wheelhouse` has made. Every command for the robot is run, in the
 manual's order, while a simulated robot covers a flat; what each took is printed. The kernels are
 compiled as on a robot, so this takes some minutes. Exit code 1 where a command fails, the mission

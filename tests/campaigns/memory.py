@@ -1,8 +1,10 @@
-"""Maps of every size, resolution and rate against a daemon that may have only so much memory:
+"""Maps of every size, resolution and rate for a daemon with limited memory.
 
-python -m tests.campaigns.memory
-python -m tests.campaigns.memory --sides 1000,5000,8000 --rates 20 --limit-mb 400
-python -m tests.campaigns.memory --kinds grey,colour --rates 20
+    python -m tests.campaigns.memory
+    python -m tests.campaigns.memory --sides 1000,5000,8000 --rates 20 --limit-mb 400
+    python -m tests.campaigns.memory --kinds grey,colour --rates 20
+
+Takes half an hour.
 
 The daemon runs in a control group with its unit's MemoryMax=, where there is one to be had. It is
 to live, whatever comes: what it takes must fit into what ``fasaco_edge.daemon.memory`` says, what

@@ -1,10 +1,13 @@
 """Coverage lines driven by a look-alike of Nav2: aborts, delays, restarts, lost replies.
 
-``python -m tests.campaigns.nav2_goals [--missions 50] [--length 40] [--speed 1] [--seed 0]
-[--faults all] [--at-once 4]`` prints a row for each mission and what became of all. A mission is
-part of a line over a bundled map, so many metres long; daemon, path and status are stood in for,
-the follower and the look-alike are processes that hardly work: several missions at once disturb
-each other little.
+    python -m tests.campaigns.nav2_goals [--missions 50] [--length 40] [--speed 1] [--seed 0]
+
+Takes half an hour.
+
+It prints a row for each mission, and what became of all; ``--at-once 4`` missions run at a time,
+and ``--faults`` chooses what goes wrong. A mission is part of a line over a bundled map,
+``--length`` metres long; daemon, path and status are stood in for, the follower and the look-alike
+are processes that hardly work: several missions at once disturb each other little.
 
 Standing is forced where nobody who sees the robot could have avoided it: a goal that took longer to
 come than the robot took from where the goal could first hold, without leaving out anything of the

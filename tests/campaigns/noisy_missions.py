@@ -3,6 +3,8 @@
     python -m tests.campaigns.noisy_missions --seeds 5
     python -m tests.campaigns.noisy_missions --rooms legs --noises rough --seed 7
 
+Takes half an hour.
+
 Each seed is a mission for each room and noise, with an offset of the base and a rate of poses that
 it draws. What has to hold: a mission claims no floor that its record has not, all floor that was
 ever reachable is told, a mission that is done is, and none stays in one place for more than 20 s

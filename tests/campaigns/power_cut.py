@@ -1,6 +1,8 @@
-"""Cut the power at every write of a first start and a mission, and start again.
+"""Power cuts at each write of a first start and a mission, and the next start.
 
     python -m tests.campaigns.power_cut --cuts 2000
+
+Takes hours.
 
 A real daemon with its recorder is watched while its robot drives, is told to begin anew, and while
 it is started again; and the compiler, while it fills an empty cache. From each call that changed a

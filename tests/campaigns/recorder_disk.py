@@ -1,6 +1,8 @@
-"""Fill the disk under a recorder again and again, and see what it says and what is left.
+"""A disk that fills up under a recorder again and again.
 
     python -m tests.campaigns.recorder_disk --episodes 20
+
+Takes minutes.
 
 The disk is a tmpfs of 24 megabytes, which takes the right to mount. Each episode fills it all at
 once, waits until the recorder says so, makes room, and waits until it records again. In the end

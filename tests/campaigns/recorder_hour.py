@@ -1,6 +1,8 @@
-"""Record an hour of a mission at speed; say what it takes in memory and on the disk.
+"""An hour of a mission, recorded at speed: memory and disk it takes.
 
     python -m tests.campaigns.recorder_hour [--seconds 3600] [--picture PICTURE.png]
+
+Takes minutes.
 
 A hall of 75 m x 75 m, 250 x 250 cells of the lattice: a map of 1,500 x 1,500 pixels once a second
 that comes to be known while the robot drives, poses at 20 Hz, coverage and status once a second,

@@ -1,8 +1,10 @@
-"""Legal messages in senseless orders, a million of them: nothing ends the daemon or holds it up.
+"""Legal messages in senseless order, a million of them: none ends or delays the daemon.
 
     python -m tests.campaigns.semantic_fuzz --events 1000000
     python -m tests.campaigns.semantic_fuzz --in-process --events 1000000
     python -m tests.campaigns.semantic_fuzz --replay FILE
+
+Takes an hour.
 
 The first talks to real daemons behind a real router, the second to a mission in this process, which
 comes by many more states a second. The seed decides what is said; what is found is told with it,

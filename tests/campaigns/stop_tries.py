@@ -2,6 +2,8 @@
 
     python -m tests.campaigns.stop_tries --tries 1000 [--stages 3]
 
+Takes a quarter of an hour.
+
 A follower in a process of its own drives a base along a path; then one thing fails, chosen at
 random, and it is measured how long after that the last velocity but zero came. What fails: poses
 stay away, are none, jump, or are in another frame; the path becomes empty or is none; the daemon's

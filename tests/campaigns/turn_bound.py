@@ -1,6 +1,8 @@
-"""The lower bound of steps and turns against least costs, on small grounds by the hundred thousand:
+"""Lower bounds of steps and turns against least costs, on small grounds by the hundred thousand.
 
-python -m tests.campaigns.turn_bound --grounds 100000
+    python -m tests.campaigns.turn_bound --grounds 100000
+
+Takes minutes.
 
 Each ground has thin walls, cells that need no visit, an end or none, and prices from turns that
 are nearly free to those that are nearly all. What a best walk costs is found by dynamic

@@ -1,7 +1,9 @@
 """Missions in the lab: the product in ir-sim, with OpenKarto's mapper, judged by the true poses.
 
-python -m tests.campaigns.lab --building office --seed 1 --out DIR
-python -m tests.campaigns.lab table --maps DIR
+    python -m tests.campaigns.lab --building office --seed 1 --out DIR
+    python -m tests.campaigns.lab table --maps DIR
+
+Takes minutes.
 
 Base, mapper, mission and follower run in one process in simulated time: the same seed gives the
 same mission, bit for bit, however busy the machine is. ``table`` runs several and prints a table.
