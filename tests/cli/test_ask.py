@@ -79,7 +79,7 @@ def test_what_is_wrong_is_told(endpoint, capsys):
     assert json.loads(told.out)["code"] == "bad_query"
     assert "cohort" in told.err
     assert main(["ask", "status", "--robot", "other", "--connect", endpoint]) == 1
-    assert "there are robot: give one as --robot" in capsys.readouterr().err
+    assert "robots on this bus: robot; choose one by --robot" in capsys.readouterr().err
     for words in (("ask", "colour"), ("ask", "path", "--param", "colour"), ("ask",)):
         with pytest.raises(SystemExit, match="2"):
             main([*words])

@@ -77,7 +77,7 @@ def test_stop_needs_no_consent_and_says_how_to_continue(robot):
     running, outsider = robot
     stopped = mission(running, "stop")
     assert stopped.code == 0
-    assert "`mission start --keep-covered` goes on with the rest" in stopped.err
+    assert "`mission start --keep-covered` covers the rest" in stopped.err
     assert covered(outsider) == 12
 
 

@@ -52,7 +52,7 @@ def test_ros_and_a_router(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (GIVEN[:4], "--map-by must be given: there is no terminal to ask at"),
+        (GIVEN[:4], "--map-by must be given: there is no terminal for questions"),
         ([], "--robot-radius, --tool-width, --map-by must be given"),
         ([*GIVEN, "--domain", "7"], "--domain and --namespace are for maps from ROS 2"),
         ([*GIVEN, "--robot-radius", "20"], "robot.radius_m: expected float <= 10.0, got 20"),
@@ -71,7 +71,7 @@ def test_a_file_that_is_there_is_kept(tmp_path, capsys):
     file = tmp_path / "robot.yaml"
     file.write_text("robot: {name: mine}\n")
     assert init(file, *GIVEN) == 78
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert file.read_text() == "robot: {name: mine}\n"
 
 

@@ -53,7 +53,7 @@ def recording(tmp_path):
     [
         (PLAN, "steps, [0-9.]+% above the bound ", "map +.*"),
         (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "map +.*"),
-        (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
+        (("warmup",), "checking the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
             ("bench", "planners", "--maps", "office", "--seeds", "1", "--ants", "8"),
             "planners ━* +0/6 ",

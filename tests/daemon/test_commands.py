@@ -270,7 +270,7 @@ def test_the_command_line(tmp_path):
         other = fasaco_edge("mission", "status", "--robot", "x", "--connect", running.endpoint)
         assert other.code == 1
         assert "no daemon answers at fasaco/@v1/x" in other.err
-        assert "of robots on this bus there are robot: give one as --robot" in other.err
+        assert "robots on this bus: robot; choose one by --robot" in other.err
 
 
 def begin_idle(outsider: Outsider) -> None:

@@ -116,7 +116,7 @@ def test_the_time_of_all_is_by_the_speed_of_each():
         ("--passes cross", r"--passes\[0\]: cross goes after a pass with lanes"),
         ("--passes auto@2", "a pass at 2 m/s is faster than the robot, 0.25 m/s"),
         ("--passes auto --planner fasaco", "--passes: only colony-search has passes"),
-        ("--passes auto --pheromone-png p.png", "leave no single trail"),
+        ("--passes auto --pheromone-png p.png", "has a trail of its own"),
         ("--passes 30deg --line cells", "the centres of cells lie along the axes"),
         ("--passes auto --turn-radius 0.3", "a robot that turns on the spot"),
     ],

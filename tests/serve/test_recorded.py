@@ -183,8 +183,8 @@ def test_a_recording_takes_no_commands(file, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--allow-commands",), "--allow-commands: a recording is only looked at"),
-        (("--robot", "two"), "--robot: a recording is only looked at, and has no bus"),
+        (("--allow-commands",), "--allow-commands: a page of a recording has no commands"),
+        (("--robot", "two"), "--robot: a page of a recording has no commands and no bus"),
         (("--listen", "0.0.0.0:8000"), "lets other computers in, without any access control"),
     ],
 )

@@ -300,7 +300,7 @@ def test_the_review_of_a_fleet_is_printed_and_drawn(studio, tmp_path):
 
 
 def test_each_figure_of_a_fleet_is_in_the_help():
-    told = review.COMMAND.epilog.partition("Of a fleet it holds:")[2]
+    told = review.COMMAND.epilog.partition("For a fleet it has:")[2]
     figures = (*FleetFigures.__struct_fields__, *FleetRobotFigures.__struct_fields__)
     others = {"by", "cells", "and", "each", "with"}
     assert [word for word in re.findall(r"\w+", told) if word not in others] == list(figures)
