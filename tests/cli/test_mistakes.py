@@ -89,7 +89,11 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --png w --path-out ./w", 78, "cannot write w: another option writes it"),
         ("plan map.yaml --png map.png", 78, "cannot write map.png: it is an input"),
         ("plan map.yaml --png link.png", 78, "cannot write link.png: it is an input"),
-        ("plan good.npy --planner mine.py:f --png mine.py", 78, "cannot write mine.py: it is an input"),
+        (
+            "plan good.npy --planner mine.py:f --png mine.py",
+            78,
+            "cannot write mine.py: it is an input",
+        ),
         ("simulate map.yaml --trail-out map.png", 78, "cannot write map.png: it is an input"),
         ("review a.rrd --png a.rrd", 78, "cannot write a.rrd: it is an input"),
         ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is an input"),
