@@ -72,7 +72,7 @@ def test_no_room_is_swept_whole_before_it_is(capsys):
     assert "100.0 %" in told
 
 
-def test_what_is_wrong_is_told(endpoint, capsys):
+def test_a_wrong_query_is_an_error_with_its_cause(endpoint, capsys):
     words = ("pheromone", "--param", "cohort=77", "--json")
     assert main(["ask", *words, "--connect", endpoint]) == 1
     told = capsys.readouterr()

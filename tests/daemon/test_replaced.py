@@ -81,7 +81,7 @@ def send_mask(running, outsider, square):
 
 
 @pytest.mark.parametrize("replace", [reload, send_mask])
-def test_what_a_mission_used_is_released_when_it_is_replaced(tmp_path, replace):
+def test_a_replaced_mission_releases_its_memory(tmp_path, replace):
     mission = {} if replace is reload else dict(MISSION)
     with (
         service(tmp_path, mission=mission, executed=True) as (running, _),

@@ -89,7 +89,7 @@ def codes(robot):
     return {trouble.code for trouble in robot.mission.troubles}
 
 
-def test_it_sweeps_elsewhere_and_then_where_somebody_stood():
+def test_it_sweeps_the_place_of_a_person_later():
     robot = SeeingRobot(room(), START, disc(2.0, 1.5))
     assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
     assert robot.wait(3.0, lambda robot: "blocked" in codes(robot))
@@ -103,7 +103,7 @@ def test_it_sweeps_elsewhere_and_then_where_somebody_stood():
     assert "blocked" not in codes(robot)
 
 
-def test_what_never_goes_away_is_left_out_and_said():
+def test_a_lasting_obstacle_is_left_out_and_reported():
     robot = SeeingRobot(two_rooms(), START, closed_door())
     assert robot.wait(1500.0, lambda robot: robot.mission.state == "done")
     assert "not reached" in robot.mission.reason
