@@ -16,7 +16,7 @@ from tests.support.outsider import Outsider
 from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
 from tests.support.waiting import until
 
-# Replacements until all caches are full, and those after that which are measured.
+# Number of replacements until all caches are full, and of measured ones after that.
 FIRST, MEASURED = 20, 40
 # What one may keep, on average [MB]. After the first, memory grows by 1 to 4 MB and then no more;
 # with each mission kept it would grow by 9 MB.

@@ -15,8 +15,10 @@ from fasaco_edge.mission.core.events import FollowerBlocked, PatchReceived
 from fasaco_edge.mission.map.obstacles import CLOSED_S, WIDEN_AFTER_S, Obstacles
 from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
 
-# The follower keeps this far from things [m], and says after so long that it stands [s].
-MARGIN_M, HELD_S = 0.06, 5.0
+# Distance that the follower keeps from things [m].
+MARGIN_M = 0.06
+# Standstill after which it reports an obstacle [s].
+HELD_S = 5.0
 START = (0.6, 0.6)
 TRIES_AGAIN = replace(CONFIG, policy=MissionPolicy(lost_pose_s=0.0))
 

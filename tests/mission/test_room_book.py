@@ -19,7 +19,7 @@ from fasaco_edge.mission.map.room_edits import merge, move, split
 from fasaco_edge.mission.map.room_matching import HOLD_CHANGE, HOLD_NEW
 from fasaco_edge.mission.map.room_watch import update
 
-# A letter is a square of 1 m, drawn as 10 x 10 pixels; equal letters are one region.
+# A letter is a square of 1 m, drawn as 10 x 10 pixels of 0.1 m; equal letters are one region.
 PIXELS, SIDE_M = 10, 0.1
 
 
