@@ -49,7 +49,7 @@ contract: $(STAMP)  ## files of protocol/ that are made from the package: keys, 
 bench: $(STAMP)  ## a daemon's start, memory, load and delays on this computer
 	$(BIN)/fasaco-edge bench daemon
 
-lab: $(LAB_STAMP)  ## missions in a simulator of others, judged by the true poses: some 5 min each
+lab: $(LAB_STAMP)  ## missions in a third-party simulator, judged by the true poses: some 5 min each
 	$(BIN)/python -m tests.campaigns.lab table $(ARGS)
 
 lab-install: $(STAMP)  ## what `make lab` needs, if that can be had here; without it `make test` skips the lab

@@ -57,7 +57,7 @@ def test_a_fault_inside_a_map_file_is_corrected_there(tmp_path, changes, hint):
     assert hint in hint_of(read_map, described(tmp_path, [[WHITE]], **changes), kind=MapFileError)
 
 
-def test_a_fault_of_a_file_is_told_from_that_of_its_name(tmp_path):
+def test_faults_of_a_file_and_of_its_name_have_other_hints(tmp_path):
     names = MapFileError.hint
     (tmp_path / "list.yaml").write_text("- 1\n")
     (tmp_path / "torn.png").write_bytes(b"P5 3 3 255 \x00")
@@ -118,7 +118,7 @@ def test_a_wrong_value_differs_from_a_wrong_type(decode, name, hint):
     assert hint in hint_of(decode, vector(name))
 
 
-def test_a_type_that_is_not_known_is_told_from_a_broken_one():
+def test_unknown_types_and_broken_messages_have_other_hints():
     assert "name it in the encoding" in hint_of(decode_pose, b"", "std_msgs/String")
     assert "type and encoding" in hint_of(decode_pose, b"", schemas.POSE_STAMPED)
 

@@ -11,7 +11,7 @@ def test_a_module_runs_the_tests_that_import_it():
     assert len(chosen) < 20
 
 
-def test_a_module_without_tests_of_its_own_runs_those_of_its_users():
+def test_a_module_without_tests_runs_those_of_its_users():
     chosen = affected_by(["fasaco_edge/mission/core/executive.py"])
     assert len(chosen) >= FEW
     assert all(name.startswith("tests/") for name in chosen)
@@ -21,5 +21,5 @@ def test_a_changed_test_runs_itself():
     assert affected_by(["tests/test_quick.py"]) == ["tests/test_quick.py"]
 
 
-def test_nothing_runs_where_no_module_has_changed():
+def test_without_a_changed_module_no_test_runs():
     assert affected_by(["README.md", "tests/test_gone.py"]) == []

@@ -248,7 +248,7 @@ def test_a_researcher_s_page(integrated, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["README.md", OWNER])
-def test_other_pages(name, tmp_path):
+def test_commands_of_the_other_pages_work(name, tmp_path):
     Reader(tmp_path).follow(page(name))
 
 

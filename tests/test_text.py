@@ -40,7 +40,7 @@ def hidden():
         ("Küche 厨房 \N{BROOM} [red]", "Küche 厨房 \N{BROOM} [red]"),
     ],
 )
-def test_what_would_do_something_is_seen(text, seen):
+def test_control_characters_are_made_visible(text, seen):
     assert one_line(text) == seen
 
 

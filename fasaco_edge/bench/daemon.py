@@ -25,10 +25,10 @@ MEASURES = (
     ("ready_s", "exec to liveliness token [s]", 3),
     ("status_s", "exec to first status [s]", 3),
     ("idle_mb", "memory before the first map [MB]", 1),
-    ("idle_own_mb", "of this without pages of files [MB]", 1),
+    ("idle_own_mb", "without pages of files [MB]", 1),
     ("idle_percent", "share of a core before the first map [%]", 2),
     ("warm_mb", "memory after map and plan [MB]", 1),
-    ("warm_own_mb", "of this without pages of files [MB]", 1),
+    ("warm_own_mb", "without pages of files [MB]", 1),
     ("peak_mb", "peak memory [MB]", 1),
 )
 # Goals: measured value, label, limit of its median, unit.
@@ -38,11 +38,11 @@ GOALS = (
     ("idle_percent", "share of a core, idle", 0.5, "%"),
     ("warm_own_mb", "memory after map and plan, without pages of files", 135.0, "MB"),
 )
-# Delays from the put of a map to the arrival of its path, which states the time of planning.
+# Delays from the put of a map to the arrival of its path; the path states the time of planning.
 DELAYS = (
     ("total_ms", "map put to path received [ms]"),
-    ("plan_ms", "of this planning [ms]"),
-    ("rest_ms", "all but planning [ms]"),
+    ("plan_ms", "planning [ms]"),
+    ("rest_ms", "without planning [ms]"),
 )
 GOAL_REST_P99_MS = 20.0
 # Time from the last change to a reading of memory [s].
@@ -58,17 +58,20 @@ DaemonRun = tuple[dict[str, float], list[tuple[float, float]]]
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--starts", type=positive, default=5, help="daemons to start (default: %(default)s)"
+        "--starts",
+        type=positive,
+        default=5,
+        help="number of daemons to start (default: %(default)s)",
     )
     parser.add_argument(
-        "--maps", type=positive, default=40, help="maps for each to answer (default: %(default)s)"
+        "--maps", type=positive, default=40, help="maps for each daemon (default: %(default)s)"
     )
     parser.add_argument(
         "--load",
         type=seconds_above_zero,
         default=5.0,
         metavar="S",
-        help="how long its load without a map is measured [s] (default: %(default)g)",
+        help="time over which the load without a map is measured [s] (default: %(default)g)",
     )
 
 
@@ -139,7 +142,7 @@ def _report(args: argparse.Namespace, runs: Sequence[DaemonRun]) -> Report:
         },
         goals=(
             *(Goal(what, median(spreads[name]), most, unit) for name, what, most, unit in GOALS),
-            Goal("p99 of all but planning", delays["rest_ms"]["p99"], GOAL_REST_P99_MS, "ms"),
+            Goal("p99 without planning", delays["rest_ms"]["p99"], GOAL_REST_P99_MS, "ms"),
         ),
         remarks=(
             "kernels come from a warm cache",
@@ -167,10 +170,10 @@ DAEMON = Benchmark(
     name="daemon",
     summary="a daemon's start, memory, load, and delay from a map to its path",
     description="Start a real daemon on a free port of loopback several times. Time it from exec "
-    "to its liveliness token and to the first status it answers with; read its memory and its "
-    "share of a core before the first map, and its memory after one map of 1000 x 1000 pixels "
-    "(50 m x 50 m) and its plan. Then a crate moves in the farthest hall, and each map needs a new "
-    "path: time each from its put to the arrival of its path.",
+    "to its liveliness token and to its first status; read its memory and its share of a core "
+    "before the first map, and its memory after one map of 1000 x 1000 pixels (50 m x 50 m) and "
+    "its plan. Then a crate moves in the farthest hall, so that each map needs a new path: measure "
+    "the delay from the put of a map to the arrival of its path.",
     add_options=_add_options,
     count=lambda args: int(args.starts),
     measure=_measure,

@@ -26,14 +26,14 @@ from fasaco_edge.host.processes import end_with_parent
 COMMANDS = {
     "demo": "watch a simulated robot map and cover a building",
     "plan": "plan a coverage path offline",
-    "init": "write a first configuration: some questions, tried on the bus",
+    "init": "write a first configuration from some answers, and test it on the bus",
     "run": "run the daemon: maps come in over Zenoh, paths go out",
-    "follow": "drive a robot's base along the path: velocities, 20 times a second",
+    "follow": "drive a robot's base along the path, by velocities 20 times a second",
     "mission": "command a running daemon: start, pause, resume, home, cancel, replan, status ...",
-    "rooms": "list, name, split, merge and set the rooms that a daemon has found",
+    "rooms": "list, name, split, merge and set the rooms found by a running daemon",
     "ask": "query a running daemon: status, path, coverage, pheromone, config, replan ...",
     "watch": "watch a robot's mission live in this terminal",
-    "serve": "serve a robot's mission as a live page, for a phone too",
+    "serve": "show a robot's mission as a web page, also on phones",
     "record": "record a robot's mission into a Rerun recording (.rrd)",
     "review": "report what happened in a recorded mission",
     "replay": "replay a recorded mission and compare its decisions",
@@ -41,13 +41,13 @@ COMMANDS = {
     "bench": "compare planners; measure a daemon's memory, load and delays on this machine",
     "maps": "list the maps that come with the package",
     "warmup": "compile the kernels into the cache, so that the first plan starts at once",
-    "check-config": "check a configuration: every fault, with line, value and what is allowed",
+    "check-config": "check a configuration: each fault with line, value and what is allowed",
     "doctor": "check host, bus and configuration, and say what to do",
 }
 """Each command, and its line in ``fasaco-edge --help``."""
 
 # Errors of a faulty or full disk, or of exhausted memory or file descriptors. Their exit code makes
-# systemd restart a service, the exit code of an invalid configuration does not.
+# systemd restart a service; that of an invalid configuration does not.
 _TRANSIENT = frozenset(
     (errno.EIO, errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ESTALE)
 )
@@ -120,7 +120,7 @@ def _parser(words: Sequence[str]) -> Parser:
     """Return a parser with all commands, and the options of the command in ``words``."""
     parser = Parser(
         prog="fasaco-edge",
-        description="Coverage path planning with fast-spanning ant colonies, on a robot.",
+        description="Coverage path planning for robots, with fast-spanning ant colonies.",
         epilog="Begin with `fasaco-edge demo`. Each command has --help.",
     )
     parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
@@ -142,7 +142,7 @@ def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
 
 
 def _is_transient(error: BaseException | None) -> bool:
-    """Return whether the cause of an error may be over soon, and is no mistake of the user."""
+    """Return whether an error may end by itself, and is no mistake of the user."""
     # Errors of a user's own planner are the user's.
     while error is not None and not isinstance(error, PlannerFailed):
         if isinstance(error, OSError) and error.errno in _TRANSIENT:

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 EPILOG = """\
 examples:
   fasaco-edge ask status
-  fasaco-edge ask path                      its length, and the reason for it
-  fasaco-edge ask pheromone                 the living trail, and how distinct its directions are
-  fasaco-edge ask replan                    a full new plan, now
+  fasaco-edge ask path                      the length of the path, and why it was planned
+  fasaco-edge ask pheromone                 the pheromone trail, and how dominant its directions are
+  fasaco-edge ask replan                    plans everything again now
   fasaco-edge ask config --json
 
 Commands are given with `fasaco-edge mission`; protocol/commands.md describes the queries and their
@@ -91,13 +91,15 @@ def nobody_answers(prefix: str, robots: Collection[str]) -> NobodyAnswersError:
     if prefix.rpartition("/")[2] in robots:
         return NobodyAnswersError(
             f"the daemon at {prefix} is on the bus, but has not answered in time",
-            hint="its process may be held up or frozen: look after the robot, and ask again",
+            hint="its process may hang or be stopped: check the robot, then ask again",
         )
     names = one_line(", ".join(sorted(robots)))
-    there = f"there are {names}: give one as --robot" if names else "there is none"
+    there = (
+        f"robots on this bus: {names}; choose one by --robot" if names else "no robot on this bus"
+    )
     return NobodyAnswersError(
         f"no daemon answers at {prefix}",
-        hint=f"of robots on this bus {there}; `fasaco-edge run` starts a daemon",
+        hint=f"{there}; `fasaco-edge run` starts a daemon",
     )
 
 

@@ -27,9 +27,8 @@ examples:
   fasaco-edge bench daemon                             is this computer fast enough?
   fasaco-edge bench planners --planner mine.py:walk    your planner beside the others
 
-Each benchmark has --help, prints a table or --json, and can be
-interrupted (Ctrl-C): it then reports what it has measured so far. Figures are
-medians with their range; run them on a quiet machine.
+Each benchmark has --help, and prints a table, or JSON with --json. Ctrl-C interrupts it: it then
+reports the measurements so far. Figures are medians with their range; run them on an idle machine.
 """
 
 
@@ -163,8 +162,8 @@ def _table(title: str) -> Table:
 
 
 COMMAND = Command(
-    description="Measure the daemon's memory, load and delays on this machine, with goals and "
-    "whether they are met; or compare planners.",
+    description="Compare planners; or measure the daemon's memory, load and delays on this "
+    "machine, and whether they meet their goals.",
     run=run,
     add_options=add_benchmarks,
     epilog=EPILOG,

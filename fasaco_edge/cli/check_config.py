@@ -18,10 +18,11 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import memory_limit
 
 EPILOG = """\
-It reads the file as the daemon does, with the keep-out mask it names, and starts nothing. It does
-not read its keys and passwords, which may be readable for the service only; `fasaco-edge doctor`,
-run as the service's user, checks those.
-exit codes: 0 a daemon would start with it, 78 it would not (EX_CONFIG)
+It reads the file and its keep-out mask as the daemon does, and starts nothing. It does not read
+keys and passwords, which may be readable for the service only; `fasaco-edge doctor`, run as the
+service's user, checks those.
+
+exit codes: 0 a daemon starts with this file, 78 it does not (EX_CONFIG)
 
 examples:
   fasaco-edge check-config /etc/fasaco-edge/config.yaml
@@ -35,7 +36,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--show",
         action="store_true",
-        help="print the configuration in force, defaults included, as YAML; without secrets",
+        help="print the whole configuration with defaults, but without secrets, as YAML",
     )
     add_json(parser, "the result")
 

@@ -18,25 +18,25 @@ from fasaco_edge.doctor.report import findings
 from fasaco_edge.text import one_line
 
 EPILOG = """\
-Nothing is started or changed: it joins the bus for a second, listens, and queries. Run it as the
-daemon's user or as root, so that it can read what the daemon reads. The checks:
+It joins the bus for a second, listens, and queries; it starts and changes nothing. Run it as the
+daemon's user or as root, so that it can read the same files as the daemon. The checks:
   configuration   whether the file is valid
-  platform        processor, system, Python; whether there is more than one core
-  memory          how much there is, and whether limits on it hold
+  platform        processor, system, Python, number of cores
+  memory          size, and whether limits on it are effective
   clock           whether it is synchronised
   kernels         whether they are compiled for this code and processor, and who owns them
-  disk            room for state, kernels and, with --recordings, recordings
+  disk            space for state and kernels, and for recordings if --recordings is given
   permissions     whether others may change configuration or state
-  session         whether the daemon can join the bus, or another one has its name
+  session         whether the daemon can join the bus, and no other daemon has its name
   peers           daemon, other robots, maps and poses on the bus
   endpoints       where the daemon listens, and who can reach it
-  identity        certificate, key and CA: whether they match, and until when;
-                  or user and password
+  identity        whether certificate, key and CA match, and when they expire; or user and password
   secret files    whether others on this computer can read keys and passwords
   roles           who may publish maps, command, view and record
 
-Each line is ok; warn: works, but needs attention; or fail, with what to do.
-exit codes: 0 nothing failed, 1 something failed
+Each check is ok; warn: works, but needs attention; or fail, with what to do.
+
+exit codes: 0 no check failed, 1 a check failed
 
 examples:
   fasaco-edge doctor --config /etc/fasaco-edge.yaml
@@ -96,8 +96,8 @@ def _print(found: list[tuple[str, Finding]]) -> None:
 
 
 COMMAND = Command(
-    description="Check the host on which a daemon runs or will run, the bus and the "
-    "configuration: what is missing, who has access to what, and what to do about it.",
+    description="Check the bus, the configuration, and the host on which a daemon runs or will "
+    "run: what is missing, who has access to what, and what to do about it.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

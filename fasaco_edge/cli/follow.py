@@ -34,40 +34,43 @@ STDIN = 0
 NEAR_SHARE = 0.75
 EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
-turn_deg_s, turn_deg_s2, steered_deg and turn_radius_m. Where the configuration has a block ros2,
-poses come from its topics and velocities go to ros2.topics.cmd_vel; else by the keys `pose` and
+turn_deg_s, turn_deg_s2, steered_deg and turn_radius_m. If the configuration has a block ros2, poses
+come from its topics and velocities go to ros2.topics.cmd_vel; else the keys are `pose` and
 `cmd_vel`.
-Corners up to 135 degrees are rounded in motion, within 2 cm; at sharper ones it turns on the spot.
-With robot.turn_radius_m it never does: it steers along curves, and comes to rest only where these
-change between forward and backward, which it drives where the path's heading is opposite to it.
+The robot rounds corners up to 135 degrees in motion, within 2 cm; at sharper corners it turns on
+the spot. With robot.turn_radius_m it steers along curves instead, and never turns on the spot. It
+drives backward where the heading of the path is opposite to its direction, and comes to rest only
+where it changes between forward and backward.
 
 It stops the robot within 0.2 s, and keeps it standing, while
   the newest pose is older than --pose-age, missing, malformed, or has jumped; with poses from tf,
     while odometry is older than --pose-age, or the localiser's transform is older than 2 s (or than
     --pose-age, if longer)
-  the configuration has a block scan, and no usable scan has come for scan.lost_s
+  the configuration has a block scan, and no usable scan has arrived for scan.lost_s
   the scan shows something ahead that the map does not show: the robot slows down before it, and
     drives on once it is gone
   the path is empty (mission pause, cancel; done), missing, malformed, or driven to its end
-  the robot is further than 0.3 m off the path, or does not move as commanded (three tries in a
-    place and a direction, 2 and 4 s apart)
+  the robot is further than 0.3 m off the path, or does not move as commanded (three tries in one
+    place and direction, 2 and 4 s apart)
   no daemon plans for it, or the daemon that plans has sent no status for 2.5 s
-  another follower of this robot drives: this one sends nothing at all then, and takes over once the
-    other is gone; or access rules keep others from seeing that this one drives
-and when this program ends. The robot drives on by itself once the reason is gone; after the third
-try, once the pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees): a path in the
-same direction brings no new try. A pose with the stamp of the previous one does not count as new.
+  another follower drives this robot: this follower then sends nothing, and takes over once the
+    other is gone
+  access rules hide from other followers that this one drives
+and when this program ends. The robot drives on by itself once the reason is gone. After the third
+try it drives on once the pose has moved by 0.1 m, or the path leads elsewhere (by 45 degrees or
+more). A pose with the stamp of the previous pose does not count as new.
 Zeros are sent for a second after a stop, then nothing. A base has to stop by itself if nothing
-comes for 0.5 s: nothing else can stop it if this program or its computer dies.
+arrives for 0.5 s: nothing else can stop it if this program or its computer dies.
 
-With `ros2.follow: nav2` in the configuration this program sends no velocities: the path goes to
-Nav2's controller, piece by piece, as goals of /follow_path (nav2_msgs/FollowPath), which are
-cancelled for the same reasons. Nav2's results are reported here. If this program or its computer
-dies, Nav2 drives to the end of the present goal, at most 20 m.
+With `ros2.follow: nav2` this program sends no velocities: Nav2's controller gets the path, piece by
+piece, as goals of /follow_path (nav2_msgs/FollowPath). They are cancelled for the same reasons, and
+their results are reported here. If this program or its computer dies, Nav2 drives to the end of the
+present goal, at most 20 m.
 
-With `ros2.dock: nav2` Nav2's docking server moves the robot into its dock, from before it, and out
-again before the next path, as goals of /dock_robot and /undock_robot (nav2_msgs/DockRobot,
-UndockRobot). Nothing is driven here until it is done; errors are tried again after 10 s to 5 min.
+With `ros2.dock: nav2` Nav2's docking server drives the robot from a pose in front of the dock into
+it, and out again before the next path, by goals of /dock_robot and /undock_robot
+(nav2_msgs/DockRobot, UndockRobot). Until it has finished, this program does not drive; after an
+error it tries again, in 10 s to 5 min.
 
 examples:
   fasaco-edge follow --config /etc/fasaco-edge/config.yaml --dry-run
@@ -79,7 +82,7 @@ exit codes: 0 ended by a signal; 78 wrong configuration
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--dry-run", action="store_true", help="say what would be sent, and send nothing"
+        "--dry-run", action="store_true", help="print what would be sent, and send nothing"
     )
     parser.add_argument(
         "--stamped",
@@ -91,7 +94,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=_age,
         default=0.5,
         metavar="S",
-        help="stop for a newest pose that is older, by its arrival [s] (default: %(default)g)",
+        help="largest age of the newest pose, by its arrival [s]; the robot stops if it is older "
+        "(default: %(default)g)",
     )
     parser.add_argument(
         "--speed",
@@ -278,7 +282,7 @@ def _dock(config: DaemonConfig) -> dict[str, object]:
 COMMAND = Command(
     description="Drive a robot's base along the path of its daemon: subscribe to path and pose, "
     "publish velocities (geometry_msgs/Twist) 20 times a second, until SIGTERM or SIGINT. For "
-    "robots whose base takes velocities and that have nothing else to follow a path with.",
+    "robots whose base takes velocities, and that have no other program to follow a path.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -1,4 +1,4 @@
-"""``fasaco-edge init``: a first configuration, made by questions and tried on the bus."""
+"""``fasaco-edge init``: a first configuration, made from answers and tested on the bus."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ QUESTIONS = {
     "robot_radius": ("Radius of the disc around the robot [m]", f"{DEFAULT_RADIUS_M:g}"),
     "tool_width": ("Width of its tool [m]", f"{DEFAULT_CELL_M:g}"),
     "map_by": (
-        f"How does the map come? {'; '.join(f'{way}: {what}' for way, what in WAYS.items())}",
+        f"Source of the map? {'; '.join(f'{way}: {what}' for way, what in WAYS.items())}",
         "zenoh",
     ),
     "connect": (
-        f"Router to connect to, {DEFAULT_ENDPOINT} say; none: the daemon listens there",
+        f"Router to connect to, such as {DEFAULT_ENDPOINT}; none: the daemon listens there",
         "",
     ),
 }
@@ -62,14 +62,15 @@ QUESTIONS = {
 CLEARANCE_M = 0.02
 HEAD = "# Every key, with its default and what it means: deploy/fasaco-edge.yaml\n"
 EPILOG = """\
-What is not given is asked for at a terminal, again after a typing error; elsewhere radius or size,
-the tool's width and --map-by have to be given. The file has what differs from the defaults, and is
-checked as `check-config` does.
+On a terminal it asks for values that no option gives; elsewhere radius or size, tool width and
+--map-by are required. The file contains the values that differ from the defaults, and is checked as
+by `check-config`.
 
 examples:
   fasaco-edge init
   fasaco-edge init robot.yaml --robot-radius 0.22 --tool-width 0.3 \\
       --map-by rmw_zenoh --connect tcp/127.0.0.1:7447
+
 exit codes: 0 written, whether or not maps were received; 78 not written (EX_CONFIG)
 """
 
@@ -90,8 +91,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--robot-size",
         type=_size,
         metavar="WxL",
-        help="instead for a rectangular robot: width and length [m], such as 0.5x0.6; plans use "
-        "the disc around that",
+        help="width and length of a rectangular robot [m], such as 0.5x0.6, in place of a radius; "
+        "plans use the disc around the rectangle",
     )
     parser.add_argument(
         "--tool-width", type=float, metavar="M", help="width of the brush, mop or mower [m]"
@@ -101,8 +102,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=CLEARANCE_M,
         metavar="M",
-        help="distance that lines keep from walls and furniture in addition to the radius, except "
-        "where giving it up gains enough floor [m]; 0 for a map and poses without errors (default: "
+        help="distance that lines keep from walls and furniture in addition to the radius [m], "
+        "except where less gains enough floor; 0 for a map and poses without errors (default: "
         "%(default)g)",
     )
     parser.add_argument(
@@ -114,7 +115,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--connect",
         metavar="ENDPOINT",
         help="router or bridge to connect to, such as tcp/127.0.0.1:7447; without one the daemon "
-        "listens there itself",
+        "listens at that endpoint itself",
     )
     parser.add_argument(
         "--name", metavar="NAME", help="name of the robot on the bus (default: robot)"
@@ -131,7 +132,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="time to look for maps (default: %(default)g s)",
     )
     parser.add_argument("--no-try", action="store_true", help="do not look for maps on the bus")
-    parser.add_argument("--force", action="store_true", help="replace the file if there is one")
+    parser.add_argument("--force", action="store_true", help="replace an existing file")
     add_json(parser, "the configuration and what was received")
 
 
@@ -148,7 +149,7 @@ def run(args: argparse.Namespace) -> int:
     file: Path = args.file
     if file.exists() and not args.force:
         raise BadConfiguration(
-            f"{file} is there already", hint="name another file, or replace it with --force"
+            f"{file} already exists", hint="name another file, or replace it with --force"
         )
     check_outputs([file])
     _ask(args)
@@ -199,7 +200,9 @@ def _ask(args: argparse.Namespace) -> None:
         return
     if not (sys.stdin.isatty() and err().is_terminal):
         names = [f"--{name.replace('_', '-')}" for name in missing if name != "connect"]
-        raise BadConfiguration(f"{', '.join(names)} must be given: there is no terminal to ask at")
+        raise BadConfiguration(
+            f"{', '.join(names)} must be given: there is no terminal for questions"
+        )
     for name in missing:
         setattr(args, name, _asked(name))
 
@@ -279,8 +282,8 @@ def _print(file: Path, text: str, config: DaemonConfig, peers: Finding | None) -
 
 
 COMMAND = Command(
-    description="Write a first configuration for a robot: its size, its tool, how the map comes. "
-    "Looks for the map on the bus, and says what it has received.",
+    description="Write a first configuration for a robot: its size, its tool, the source of its "
+    "map. Look for the map on the bus, and print what was received.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -79,7 +79,7 @@ def _check_together(args: argparse.Namespace, request: PlanRequest) -> None:
                 "--passes: only colony-search has passes", hint="leave --planner out"
             )
         if args.pheromone_png:
-            raise BadConfiguration("--pheromone-png: several passes leave no single trail")
+            raise BadConfiguration("--pheromone-png: each of several passes has a trail of its own")
     leaves_none = request.own or search.planner not in WITH_PHEROMONE
     if args.pheromone_png and leaves_none:
         raise BadConfiguration(
@@ -121,7 +121,7 @@ def _plan(
 
 
 def _warn(request: PlanRequest, planned: Plan | PassPlans) -> None:
-    """Warn if the line sweeps less floor than requested, and of turns that fit on no arc."""
+    """Warn if the line sweeps less floor than requested, or has turns that fit on no arc."""
     floor, asked_share = planned.floor, request.search.swept
     if floor is None or floor.swept_share is None:
         return
@@ -142,8 +142,8 @@ def _warn(request: PlanRequest, planned: Plan | PassPlans) -> None:
 
 
 COMMAND = Command(
-    description="Plan a walk over all cells that the robot can reach, and the line along it that "
-    "it drives; print how good they are. Files are written only where an option names them.",
+    description="Plan a walk over all cells that the robot can reach, and the line that it drives "
+    "along this walk; print how good they are. Only files that an option names are written.",
     run=run,
     add_options=add_options,
     epilog=EPILOG,

@@ -25,21 +25,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--config",
         type=Path,
         metavar="FILE",
-        help="the daemon's YAML configuration (robot, bus, pose and recording) in place of these "
-        "options; - reads JSON from standard input",
+        help="the daemon's YAML configuration, for robot, bus, pose and recording, in place of "
+        "these options; - reads JSON from standard input",
     )
     parser.add_argument(
         "--fleet",
         metavar="NAME",
-        help="record all robots of this fleet (`fleet: {name: NAME}`) into one file, also those "
-        "that come later; its layout shows all of them. Maps and poses are those of the native "
-        "keys, not of ROS 2",
+        help="record all robots of this fleet (`fleet: {name: NAME}`) into one file, also robots "
+        "that join later. Maps and poses come from the native keys, not from ROS 2",
     )
     parser.add_argument(
         "--ros2",
         type=ros_config,
         metavar="JSON",
-        help="the block ros2 of the daemon's configuration: also record these topics; not with "
+        help="also record the topics of this block ros2 of a daemon's configuration; not with "
         "--fleet",
     )
     parser.add_argument(
@@ -47,8 +46,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=0,
         metavar="MB",
-        help="size of the robot's recordings in DIR above which the oldest files are deleted, "
-        "never the one being written [MB]; 0 for no limit (default: %(default)s)",
+        help="limit on the size of the robot's recordings in DIR [MB]: above it the oldest files "
+        "are deleted, but not the file being written; 0 for no limit (default: %(default)s)",
     )
     add_robot_on_bus(parser, config=False)
 
@@ -74,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.fleet is not None and args.ros2 is not None:
         raise BadConfiguration(
-            "--ros2: of a fleet's robots only the native keys are recorded",
+            "--ros2: a fleet's recording has only native keys",
             hint="leave --ros2 out, or record each robot",
         )
     earlier = set(args.out.glob("*.rrd"))
@@ -138,10 +137,10 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
 
 
 COMMAND = Command(
-    description="Record map, coverage, pheromone, path, pose, states and latencies of one "
-    "robot, and byte for byte what its mission receives, or all robots of a fleet on one map, "
-    "until SIGTERM or SIGINT. Open the "
-    "result with `rerun FILE.rrd`, play it again with `fasaco-edge replay FILE.rrd`.",
+    description="Record map, coverage, pheromone, path, pose, states and latencies of one robot, "
+    "and all messages to its mission, byte for byte; or record all robots of a fleet on one map. "
+    "It ends at SIGTERM or SIGINT. Open the result with `rerun FILE.rrd`; run its mission again "
+    "with `fasaco-edge replay FILE.rrd`.",
     run=run,
     add_options=_add_options,
 )

@@ -31,17 +31,17 @@ if TYPE_CHECKING:
     from fasaco_edge.replay.replay import RecordedRun
 
 DESCRIPTION = """\
-Feed the samples of a recording to the mission again, through the same code that the daemon
-runs, and report what it decides. A recording with a turn log is replayed cycle by cycle, and each
-decision compared with the recorded one, bit for bit: the first that differs ends it, with exit
-code 1. One without is replayed approximately: time is that of the samples and planning is counted
-in work. The same files give the same decisions on any machine.
+Run the mission again on the samples of a recording, by the code of the daemon, and report its
+decisions. A recording with a turn log is replayed cycle by cycle, and each decision is compared
+with the recorded one, bit for bit; the first difference ends the replay, with exit code 1. A
+recording without a turn log is replayed approximately: time is that of the samples, and planning
+has a limit on its work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
 Times are the robot's, since the recording began, as in its review. The column `then` shows whether
-the path equals the recorded one cell by cell; without a turn log paths are not compared. With
---config or --work the replay is of another mission, and approximate, too. Plans of a user's own
-planner, as earlier releases had them, cannot be repeated.
+the path equals the recorded one, cell by cell; without a turn log paths are not compared. With
+--config or --work the replay is approximate, too, as it is another mission. Plans of a user's own
+planner, which earlier releases allowed in missions, cannot be repeated.
 """
 
 
@@ -63,7 +63,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--work",
         type=_count,
         metavar="N",
-        help=f"proposals of each plan, where there is no turn log (default: {PROPOSALS})",
+        help=f"number of proposals for each plan, without a turn log (default: {PROPOSALS})",
     )
     parser.add_argument("--json", action="store_true", help="print a JSON document")
 
@@ -294,7 +294,7 @@ def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
             rows.append((name, f"recorded with {was}, replayed with {now}"))
     kernels = compared.kernels
     if compared.difference is not None and kernels.recorded not in ("", kernels.replayed):
-        rows.append(("why", "other kernels may plan other paths: that is no fault"))
+        rows.append(("why", "other kernels may plan other paths, without a fault"))
     return rows
 
 

@@ -19,29 +19,30 @@ from fasaco_edge.wire.documents.rooms import Rooms
 EPILOG = """\
 examples:
   fasaco-edge rooms list
-  fasaco-edge rooms list --geojson > rooms.geojson   for a drawing program; also an order for them
+  fasaco-edge rooms list --geojson > rooms.geojson   for a drawing program, or as an order
   fasaco-edge rooms name 3 kitchen
-  fasaco-edge rooms name kitchen ""                  has no name any more
-  fasaco-edge rooms split kitchen 1.5,0 1.5,3.2      from wall to wall, in metres on the map
+  fasaco-edge rooms name kitchen ""                  removes the name
+  fasaco-edge rooms split kitchen 1.5,0 1.5,3.2      from wall to wall, [m] in the map frame
   fasaco-edge rooms merge kitchen 5 --name "living room"
-  fasaco-edge rooms set kitchen --passes auto,cross  a cross pass, wherever an order says nothing
-  fasaco-edge rooms set bath --skip                  left out of orders for everything
-  fasaco-edge rooms set kitchen --priority 90        first, if there is no time for all
+  fasaco-edge rooms set kitchen --passes auto,cross  for orders that give no passes
+  fasaco-edge rooms set bath --skip                  orders for everything leave it out
+  fasaco-edge rooms set kitchen --priority 90        comes first if time is short
   fasaco-edge mission start --zone kitchen --zone "room 5"
 
-The daemon finds rooms on its map by itself, also without an order. Each has a number that no other
-room ever gets; a room is given by its number, its name, or as "room 3". What was named, split,
-merged or set stays so through new maps, restarts and resets, and no map parts or joins it any more.
+The daemon finds rooms on its map by itself, also without an order. Each room has a number of its
+own, which is never used again; ROOM is this number, the name, or "room 3". Names, splits, merges
+and settings are kept when maps change, and after restarts and resets; new maps do not split or
+merge such rooms again.
 
 exit codes: 0 done; 1 refused, or no answer; 2 usage error; 78 invalid robot name
 """
 
 ACTIONS = {
     "list": "show the rooms: number, name, area, swept share, neighbours and settings",
-    "name": "give a room a name, or take it away",
+    "name": "give a room a name, or remove its name",
     "split": "split a room along a line from wall to wall",
-    "merge": "merge rooms that have a passage to each other",
-    "set": "set what orders do in a room",
+    "merge": "merge rooms that a passage connects",
+    "set": "set passes, priority, or skipping of a room",
 }
 
 
@@ -59,7 +60,7 @@ def _add_actions(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_name(action: argparse.ArgumentParser) -> None:
-    text = 'the name, which no other room has; "" takes its name away'
+    text = 'the name, which no other room may have; "" removes it'
     action.add_argument("name", metavar="NAME", help=text)
 
 
@@ -76,17 +77,19 @@ def _add_merge(action: argparse.ArgumentParser) -> None:
 
 
 def _add_set(action: argparse.ArgumentParser) -> None:
-    add_passes(action, f"passes of orders by its name that give none: how many, or {WORDS}")
+    add_passes(
+        action, f"passes of orders that name this room without passes: their number, or {WORDS}"
+    )
     action.add_argument(
         "--skip",
         action=argparse.BooleanOptionalAction,
-        help="leave it out of orders for everything, or not any more",
+        help="leave it out of orders for everything, or include it again",
     )
     action.add_argument(
         "--priority",
         type=int,
         metavar="0..100",
-        help="higher ones come first where time or battery do not allow all (default: 50)",
+        help="rooms of higher priority come first if time or battery are short (default: 50)",
     )
 
 

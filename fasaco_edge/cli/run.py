@@ -9,7 +9,7 @@ from pathlib import Path
 from fasaco_edge.cli.console.arguments import Command, Exit
 
 EPILOG = """\
-Without a file the daemon listens at tcp/127.0.0.1:7447 (or joins the router that already
+Without --config the daemon listens at tcp/127.0.0.1:7447 (or joins the router that already
 listens there) and uses the keys fasaco/@v1/robot/...:
   in    map, map_update, pose      ROS messages in CDR
   out   path, coverage, pheromone  ROS messages in CDR
@@ -17,13 +17,15 @@ listens there) and uses the keys fasaco/@v1/robot/...:
         command                    JSON, each accepted command
         alive                      liveliness token
   ask   @rpc/path, @rpc/status, @rpc/coverage, @rpc/mission
-It covers everything it can reach, unless it is given an order (`fasaco-edge mission`) or set to
-wait for one (mission.autostart: false). Order and coverage are kept on disk: after a restart the
-mission continues where it stopped.
-As a service (deploy/) it notifies systemd when it is ready, feeds the watchdog, and reloads its
-configuration at SIGHUP: settings that can change at run time (planner, map, the robot's speeds,
-the mission's timeouts and zones) are applied, others are listed; a faulty file is rejected as a
-whole.
+
+It covers everything that the robot can reach, unless it gets an order (`fasaco-edge mission`) or
+has to wait for one (mission.autostart: false). Order and coverage are kept on disk: after a restart
+the mission continues where it stopped.
+
+As a service (deploy/) it notifies systemd when it is ready, and feeds the watchdog. At SIGHUP it
+reloads its configuration: it applies settings that can change at run time (planner, map, the
+robot's speeds, the mission's timeouts and zones) and lists the others; it rejects a faulty file as
+a whole.
 """
 
 
@@ -36,14 +38,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--state",
         type=Path,
         metavar="DIR",
-        help="folder in which progress is kept (default: mission.state_dir of the configuration, "
+        help="folder for the progress (default: mission.state_dir of the configuration, "
         "else $STATE_DIRECTORY, else fasaco-edge in $XDG_STATE_HOME or ~/.local/state)",
     )
     parser.add_argument(
         "--fresh",
         action="store_true",
-        help="cover everything again; existing progress is set aside in a file of its own, "
-        "keep-outs that were added stay",
+        help="cover everything again: existing progress is moved to a file of its own; keep-outs "
+        "that were added stay",
     )
 
 

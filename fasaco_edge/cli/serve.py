@@ -35,18 +35,18 @@ examples:
   fasaco-edge serve run00001-*.rrd                     a recorded mission, with a time line
 
 The page shows map, swept floor, path, zones and robot, and starts, pauses and sends home where that
-is allowed. It is a client of the bus as `watch` is, with the credentials of --config or --security;
-commands need an operator's credentials.
+is allowed. It is a client of the bus, as `watch` is, with the credentials of --config or
+--security; commands need an operator's credentials.
 
 With FILE.rrd the same page shows the recording, without commands: map, path, driven track and swept
-floor as they were at each time, state and figures by the last status recorded, one in 15 s.
+floor at each time, and state and figures by the status before, of which one in 15 s is recorded.
 
 FILE of --tokens has lines `viewer: TOKEN` and `operator: TOKEN`; if it does not exist, it is
 written with new tokens. A page asks for a token, or has it behind the # of its address. Without
---certificate tokens and pictures go over the network in the clear.
+--certificate tokens and pictures go over the network unencrypted.
 
-exit codes: 0 ended by a signal; 1 it cannot listen there, or FILE.rrd cannot be read; 78 wrong
-configuration
+exit codes: 0 ended by a signal; 1 the address is not available, or FILE.rrd cannot be read; 78
+wrong configuration
 """
 
 
@@ -56,7 +56,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         type=Path,
         metavar="FILE.rrd",
-        help="the parts of a recorded run; without, a robot live",
+        help="the parts of a recorded run; without them, the page is live",
     )
     parser.add_argument(
         "--listen",
@@ -73,20 +73,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--tokens",
         type=Path,
         metavar="FILE",
-        help="who may look, and who may command; needed to listen on other than loopback",
+        help="tokens of viewers and operators; required to listen on other addresses than loopback",
     )
     parser.add_argument(
         "--name",
         action="append",
         default=[],
         metavar="NAME",
-        help="a host name by which the page is opened, beside addresses and this computer's name; "
-        "may be repeated",
+        help="a further host name by which browsers open the page, beside addresses and this "
+        "computer's name; may be repeated",
     )
     parser.add_argument(
         "--certificate", type=Path, metavar="FILE", help="serve over TLS with this certificate"
     )
-    parser.add_argument("--private-key", type=Path, metavar="FILE", help="its key")
+    parser.add_argument("--private-key", type=Path, metavar="FILE", help="key of the certificate")
     add_robot_on_bus(parser)
 
 
@@ -127,7 +127,7 @@ def _recording(args: argparse.Namespace) -> Iterator[Callable[[], Playback]]:
     for option in NOT_RECORDED:
         if getattr(args, option):
             raise BadConfiguration(
-                f"--{option.replace('_', '-')}: a recording is only looked at, and has no bus",
+                f"--{option.replace('_', '-')}: a page of a recording has no commands and no bus",
                 hint="leave it out, or leave out FILE.rrd",
             )
     from fasaco_edge.cli.console.recordings import files_of_a_run
@@ -195,10 +195,10 @@ def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> 
 
 
 COMMAND = Command(
-    description="Serve a page that shows a robot's mission live: map, swept floor, path and "
-    "robot, progress and what is left; with commands and zones drawn by hand where allowed; or a "
-    "recorded mission, with a time line. Several people may look at once. It runs on the robot "
-    "or on any other machine of the bus.",
+    description="Serve a web page that shows a robot's mission live: map, swept floor, path and "
+    "robot, progress and what is left; where allowed, with commands, and zones drawn by hand. Or "
+    "serve a recorded mission, with a time line. Several people may look at once. It runs on the "
+    "robot or on any other machine of the bus.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -34,21 +34,21 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=1.0,
         metavar="X",
-        help="simulated seconds per second; for correct reports of a recording, set the same "
-        "robot.time_scale in the daemon's configuration (default: %(default)g)",
+        help="simulated seconds per second; give the daemon's configuration the same "
+        "robot.time_scale, so that reviews of a recording are correct (default: %(default)g)",
     )
     parser.add_argument(
         "--driver",
         choices=("ideal", "follow"),
         default="ideal",
-        help="ideal: it follows paths by itself; follow: `fasaco-edge follow`, started with the "
-        "same --speed, drives it (default: %(default)s)",
+        help="ideal: the simulation moves the robot along its path; follow: `fasaco-edge follow`, "
+        "started with the same --speed, drives it (default: %(default)s)",
     )
     parser.add_argument(
-        "--start-xy", type=pair_of_floats, metavar="X,Y", help="where the robot starts [m]"
+        "--start-xy", type=pair_of_floats, metavar="X,Y", help="start position of the robot [m]"
     )
     parser.add_argument(
-        "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"
+        "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="radius [m]"
     )
     parser.add_argument(
         "--range", type=float, default=3.5, metavar="M", help="range of the scanner [m]"
@@ -61,7 +61,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="MIN",
-        help="battery life [simulated min]; it charges where it started; 0: unlimited "
+        help="battery life [simulated min]; the robot charges at its start; 0: unlimited "
         "(default: %(default)g)",
     )
     parser.add_argument(
@@ -69,13 +69,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="M",
-        help="tightest arc of the base [m], forward and backward; 0: it turns on the spot. "
-        "With --driver follow (default: %(default)g)",
+        help="radius of the base's tightest arc [m], forward and backward; needs --driver follow; "
+        "0: the base turns on the spot (default: %(default)g)",
     )
     parser.add_argument(
         "--meets-others",
         action="store_true",
-        help="stop before other robots on the bus; all have the same size",
+        help="stop before other robots on the bus, which have the same size",
     )
     parser.add_argument(
         "--trail-out", type=Path, metavar="FILE.csv", help="write the driven positions, header x,y"
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
         turn_radius_m=args.turn_radius,
     )
     if args.turn_radius and args.driver == "ideal":
-        raise BadConfiguration("--turn-radius counts only with --driver follow")
+        raise BadConfiguration("--turn-radius needs --driver follow")
     truth = read_map(path)
     x, y = args.start_xy or start_point(path, truth, args.robot_radius)
     world = World(truth, Pose2D(x, y), config)
@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
     print(
         f"drove {world.distance_m:.1f} m in {1e-9 * world.stamp_ns:.0f} simulated s, "
         f"{world.collisions} collisions, {world.stops} stops before a wall, "
-        f"stood {world.longest_stand_s:.1f} s at most"
+        f"longest standstill {world.longest_stand_s:.1f} s"
     )
     if args.meets_others:
         print(f"touched other robots {world.touches} times, stopped {world.meetings} times")
@@ -145,9 +145,9 @@ def _words(world: World, progress: Progress) -> str:
 
 
 COMMAND = Command(
-    description="A differential-drive robot with a 360-degree scanner in a building unknown to "
-    "it. It publishes the map it has scanned so far and its pose, and follows the "
-    "newest path, until SIGTERM or SIGINT. Without a daemon or router it waits for one.",
+    description="Simulate a differential-drive robot with a 360-degree scanner in a building that "
+    "it does not know. It publishes its pose and the map scanned so far, and follows the newest "
+    "path, until SIGTERM or SIGINT. It waits for a daemon or router.",
     run=run,
     add_options=_add_options,
 )

@@ -16,12 +16,13 @@ from fasaco_edge.planners.stages import STAGES
 
 EPILOG = """\
 The cache is $NUMBA_CACHE_DIR, else fasaco-edge in $XDG_CACHE_HOME or ~/.cache. Its code is for
-these sources, one version each of numba, llvmlite and Python, and one processor; a daemon that
-finds none compiles it with its first map. Each file is checked before use; a damaged one is
-compiled again. A folder that users other than root and you could write to or replace is not
-used, but a temporary one: `chmod go-w` on the named folder corrects that. A relative
-$XDG_CACHE_HOME is ignored; a user without a home gets the temporary folder, too.
-exit codes: 0 all kernels are there, 1 (--check) some are not
+these sources, one processor, and one version each of numba, llvmlite and Python. Without it a
+daemon compiles the kernels at its first map. Each file is checked before use; a damaged file is
+compiled again. If users other than root and you can write to the folder, or replace it, a temporary
+folder is used instead: `chmod go-w` on the named folder corrects that. A relative $XDG_CACHE_HOME
+is ignored; a user without a home gets a temporary folder, too.
+
+exit codes: 0 all kernels are compiled, 1 (--check) some are missing
 
 examples:
   fasaco-edge warmup
@@ -32,10 +33,12 @@ examples:
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--check", action="store_true", help="compile nothing, report whether all kernels are there"
+        "--check",
+        action="store_true",
+        help="compile nothing, report whether all kernels are compiled",
     )
     parser.add_argument(
-        "--prune", action="store_true", help="then remove kernels of other versions"
+        "--prune", action="store_true", help="also remove kernels of other versions"
     )
     add_json(parser, "the result")
 
@@ -75,7 +78,7 @@ def compile_kernels(stages: Collection[str] = STAGES) -> float:
     """Compile missing kernels of some stages with a progress bar; return the duration [s]."""
     started = time.monotonic()
     with progress() as bar:
-        task = bar.add_task("looking at the kernels", total=len(stages))
+        task = bar.add_task("checking the kernels", total=len(stages))
         places = {stage: place for place, stage in enumerate(stages)}
 
         def report(stage: str) -> None:

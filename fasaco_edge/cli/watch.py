@@ -34,15 +34,15 @@ examples:
   fasaco-edge watch | tee mission.log                  lines of text, without a terminal
   fasaco-edge watch --json | jq .coverage.fraction
 
-q or Ctrl-C quits. The picture shows the map with north up: y grows upwards. If no map is published
-on the native key `map` (under ROS 2, say) only the coverage is drawn. NO_COLOR=1 and TERM=dumb are
-honoured.
+q or Ctrl-C quits. The picture shows the map with y upwards. If the native key `map` has no map, as
+under ROS 2, only the coverage is drawn. NO_COLOR=1 and TERM=dumb are honoured.
 
---fleet shows a table of all robots of a fleet, also those that come later: what each does, how much
-it has swept, and how much is left of its part. With --json a line a second, if something has
-changed. For all robots on one map record the fleet: fasaco-edge record --fleet NAME --out DIR.
+--fleet shows a table of all robots of a fleet, also of robots that join later: what each does, how
+much it has swept, and how much of its part is left. With --json it prints a line a second, if
+something has changed. To see all robots on one map, record the fleet:
+fasaco-edge record --fleet NAME --out DIR.
 
-exit codes: 0 quit by the user; 1 --once without an answer, or the terminal is gone
+exit codes: 0 quit by the user; 1 no answer with --once, or the terminal has closed
 """
 
 
@@ -54,7 +54,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=seconds,
         default=5.0,
         metavar="S",
-        help="with --once, how long to wait for the daemon (default: %(default)s)",
+        help="timeout for the daemon with --once [s] (default: %(default)s)",
     )
     parser.add_argument(
         "--fleet",
@@ -122,9 +122,9 @@ def _once(args: argparse.Namespace, watched: Watched, no_answer: Callable[[], Fa
 
 
 COMMAND = Command(
-    description="Show map, coverage, the path ahead and the robot, with state, figures and "
-    "what happened lately, as they come over Zenoh; on the robot or on any other machine. With "
-    "--fleet, which robot of a fleet does what.",
+    description="Show map, coverage, robot and the path ahead live, with state, figures and the "
+    "latest events, on the robot or on any other machine. With --fleet show what each robot of a "
+    "fleet does.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

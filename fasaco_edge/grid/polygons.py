@@ -56,7 +56,7 @@ def _edges(polygon: Polygon) -> Iterator[tuple[Point, Point]]:
 
 def area_m2(polygon: Polygon) -> float:
     """Return the area of a polygon, of points (x, y) [m]."""
-    # Relative to a corner, as far from the origin rounding would exceed the differences.
+    # Relative to a corner: far from the origin, rounding would exceed the differences.
     x0, y0 = polygon[0]
     twice = math.fsum(
         (ax - x0) * (by - y0) - (bx - x0) * (ay - y0) for (ax, ay), (bx, by) in _edges(polygon)

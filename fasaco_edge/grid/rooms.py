@@ -33,15 +33,16 @@ DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
 ROOM_M2 = 1.5
 # Furniture: longest edge; edge up to which anything is furniture; least thickness of the rest [m].
 LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
-# Distance from adjoining free floor within which unknown pixels are still to be seen [m].
+# Distance to free floor beside unknown pixels, within which unknown pixels belong to a part of the
+# building that was not seen yet [m].
 OPEN_M = 0.5
 # Ratio of unknown to wall pixels beside free ones, above which a map marks no walls, so that all
 # pixels that are not free are wall.
 MOST_UNMARKED = 4
 # Largest clearance in a door [m].
 CLEAR_M = 2.0
-# Directions of chords, from integers on half a square, so that their unit vectors are equal on all
-# machines.
+# Directions of chords, as integers along half of a square's border, so that their unit vectors are
+# equal on all machines.
 _HALF = 6
 _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
     (_HALF, col) for col in range(_HALF - 1, -_HALF - 1, -1)

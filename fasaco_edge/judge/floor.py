@@ -5,8 +5,8 @@ Its inputs are a map and a line of points, no cells, walks or planners.
 Reachable floor
     All pixels that the tool's disc touches at positions that the robot's disc can reach from the
     beginning of the line. The robot fits where its disc touches only known free pixels. A tool that
-    sticks out of the robot's disc touches no floor behind a wall: only pixels that are connected
-    with the robot's disc by free pixels, about inside the tool's disc.
+    sticks out of the robot's disc touches no floor behind a wall, but only pixels that free pixels,
+    about within the tool's disc, connect with the robot's disc.
 Swept floor
     The reachable floor that the tool's disc passed over along the line, by the same rules.
 Illegal share
@@ -90,8 +90,8 @@ class FloorFigures:
         quarter_turns: angle turned on the line, in quarter-turns.
         seconds: time of driving and turning [s].
         least_s: lower bound on ``seconds`` for any line that sweeps as much [s]: a tool of width w
-            sweeps at most w l + pi w^2 / 4 along a line of length l, and turns are not counted. Its
-            error is that of the swept area, of up to a pixel along the rim.
+            sweeps at most w l + pi w^2 / 4 along a line of length l, and turns are not counted. It
+            is as exact as the swept area, to a pixel along the border.
         seconds_per_m2: driving time per square metre swept [s/m2]; None if nothing was swept.
         patches_over_4_dm2: patches left that are larger than ``PATCH_M2``.
         largest_patch_m2: the largest patch left [m2].
@@ -183,7 +183,9 @@ def judge_floor(
     if not np.isfinite(line_xy).all():
         raise ValueError("a line must be of finite points")
     if driven is not None and driven.shape != (len(line_xy) - 1,):
-        raise ValueError(f"a line must have a way less than points, got {driven.shape} driven")
+        raise ValueError(
+            f"driven must have a member for each of {len(line_xy) - 1} segments, got {driven.shape}"
+        )
     floor = _Floor.of(grid, robot)
     line = DrivenLine.of(line_xy, floor.geometry, driven)
     reachable = floor.reachable_from(stands_at or tuple(line_xy[0].tolist()))
@@ -242,7 +244,7 @@ class _Floor:
         under, beyond_px = near(tool_px), tool_px - self.radius_px
         if beyond_px <= 0:
             return under
-        # Steps lead over edges: a diagonal distance takes more of them.
+        # Pixels are connected by their edges: a diagonal distance takes more steps.
         return under & through(self.free, near(self.radius_px), math.ceil(SQRT2 * beyond_px))
 
     def illegal_share(self, line: DrivenLine) -> float:

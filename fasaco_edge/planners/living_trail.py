@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 
-# Pull of a driven step towards tau0: as much as equation (7) by about seven ants.
+# Pull of a driven step towards tau0, equal to equation (7) applied by about seven ants.
 DRIVEN = 0.5
 # A direction is within reach of the strongest if its pheromone is at least this share of the range
 # above the weakest: lambda of the mean branching factor (Gambardella and Dorigo 1995).

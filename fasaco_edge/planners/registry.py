@@ -34,8 +34,8 @@ class Entry(NamedTuple):
 PLANNERS = {
     "colony-search": Entry(
         "search.near_optimal:NearOptimal",
-        "local search with ants, which rebuild a part of the walk on the pheromone trail in every "
-        "other perturbation",
+        "local search; in every other perturbation ants rebuild a part of the walk along the "
+        "pheromone trail",
         has_local_search=True,
     ),
     "fasaco": Entry("paper.fasaco:Fasaco", "the paper's colony, without local search"),

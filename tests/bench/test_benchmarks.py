@@ -29,7 +29,7 @@ def assert_ordered(spread):
     assert 0 < spread["low"] <= spread["median"] <= spread["high"]
 
 
-def test_daemon(capsys):
+def test_the_benchmark_of_the_daemon_reports_its_figures(capsys):
     document = figures(capsys, "daemon", "--starts", "1", "--maps", "2", "--load", "1")
     assert (document["starts"], document["maps"]) == (1, 2)
     for name in ("ready_s", "status_s", "idle_mb", "idle_percent", "peak_mb"):

@@ -22,7 +22,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.lattice.reach import reachable_from
 from fasaco_edge.planners.grids import MAP_FOOTPRINT, NamedGrid
 
-# What a cell of a floor plan is.
+# Kinds of cells of a floor plan.
 SOLID, ROOM, CORRIDOR = 0, 1, 2
 
 FEWEST_CELLS = 1_000
@@ -31,12 +31,17 @@ TOLERANCE = 0.02
 # Free cells per cell within the outline, about; corrected by the plans that missed.
 FREE_SHARE = 0.735
 
-# In cells. A block deeper or longer than this is divided by another corridor.
-DEEPEST_BLOCK, LONGEST_BLOCK, LONGEST_HALL, SHALLOWEST_BLOCK = 46, 110, 80, 11
+# Sizes [cells]. A block that is deeper or longer than this is divided by another corridor.
+DEEPEST_BLOCK, LONGEST_BLOCK = 46, 110
+LONGEST_HALL, SHALLOWEST_BLOCK = 80, 11
 NARROWEST_CORRIDOR, WIDEST_CORRIDOR = 4, 7
 DEEPEST_ROOM, NARROWEST_ROOM, USUAL_ROOM, WIDEST_ROOM = 20, 6, 11, 34
-# Of the blocks, of the rooms, and of the walls between rooms.
-HALL_SHARE, YARD_SHARE, LOCKED_SHARE, LINKED_SHARE = 0.12, 0.03, 0.05, 0.12
+# Shares of the blocks.
+HALL_SHARE, YARD_SHARE = 0.12, 0.03
+# Share of the rooms.
+LOCKED_SHARE = 0.05
+# Share of the walls between rooms.
+LINKED_SHARE = 0.12
 
 Plan = NDArray[np.uint8]
 # Whether there is a corridor at a block's first row, last row, first column, last column.

@@ -26,10 +26,10 @@ if TYPE_CHECKING:
     from fasaco_edge.judge.floor import FloorFigures
 
 DEFAULT_MAPS = ("flat", "office", "basement")
-# The robot that the floor figures of all releases are of.
+# The robot of the floor figures, the same for all releases.
 TOOL_M, RADIUS_M, OVERLAP = 0.3, 0.18, 0.08
 SPEED_M_S, TURN_S = 0.25, 1.5
-# Proposals of a plan: with the map at hand about a second, on the way about a tenth of one.
+# Proposals of a plan for a known map, about a second; and of one during a mission, a tenth of that.
 PROPOSALS, PROPOSALS_ON_THE_WAY = 25_000_000, 2_500_000
 CENTRES, QUICK, THOROUGH, ONLINE = CASES = ("centres", "quick", "thorough", "online")
 # A mission that is not done by then has failed, in simulated time [s].

@@ -34,8 +34,10 @@ DEFAULT_MAPS = ("flat", "office", "walled_grid", "basement", "warehouse")
 STEP_S, QUARTER_TURN_S = 1.2, 1.5
 # The next 5 m on cells of 0.3 m.
 NEXT_STEPS = 17
-# Where the map was wrong: of the cells beside walls so many are lost, of those beyond found.
-LOST, FOUND = 0.06, 0.03
+# Share of the cells beside walls that a changed map loses.
+LOST = 0.06
+# Share of the cells beyond these that it gains.
+FOUND = 0.03
 HEADER = ("situation", "plans", "cost", "+-", "kept, from nothing", "kept, from the walk")
 
 

@@ -31,9 +31,10 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 # Corners of the polygon are left out if it stays this near to them [m].
 SIMPLIFIED_M = 0.05
-# Search of Fields2Cover for an order of its swaths [s], and the angle of these to the walls [rad]:
-# where one of them runs exactly along a side of the polygon, it finds none at all.
-ORDER_S, TILT = 5, 1e-3
+# Time of Fields2Cover to search for an order of its swaths [s].
+ORDER_S = 5
+# Angle of the swaths to the walls [rad]: it finds none if a swath runs exactly along a side.
+TILT = 1e-3
 # Limits of an installation, which may compile, and of one line [s].
 INSTALL_S, LINE_S = 1800, 300
 SHAPELY = "shapely==2.2.0"

@@ -28,12 +28,14 @@ if TYPE_CHECKING:
 
 TOOL_M, RADIUS_M, OVERLAP = 0.3, 0.18, 0.08
 SPEED_M_S, TURN_S = 0.25, 1.5
-# Pixels of a map, and of a building's cell; so much of the map's rim comes and goes.
-PIXEL_M, CELL_PX, RIM_PX = 0.05, 6, 24
+# Edge of a pixel of a map [m]; edge of a cell of a building [pixels].
+PIXEL_M, CELL_PX = 0.05, 6
+# Width of the map's border that comes and goes [pixels].
+RIM_PX = 24
 PATCHED, GROWING = CASES = ("patched", "growing")
-# A crate stands at most so far from the robot, and is so wide [m].
+# Largest distance of a crate from the robot, and width of a crate [m].
 NEAR_M, CRATE_M = 3.0, 0.4
-# Poses between two maps, and how far the robot drives from one to the next [m].
+# Number of poses between two maps, and drive from one pose to the next [m].
 POSES, POSE_M = 5, 0.05
 PROPOSALS = 2_500_000
 # All that is not in one of the parts.

@@ -47,7 +47,7 @@ def test_good_walk_passes_and_is_counted():
         assert (verdict.turns_90, verdict.turns_180) == (3, 2)
 
 
-def test_walk_of_one_cell_may_be_all_there_is():
+def test_a_walk_of_one_cell_is_complete_on_one_cell():
     verdict = judge([(0, 0)], end=(0, 0), rows=(".#.",))
     assert verdict.problems == ()
     assert (verdict.steps, verdict.revisits, verdict.turns_90, verdict.turns_180) == (0, 0, 0, 0)
@@ -112,7 +112,7 @@ def test_only_reachable_wanted_cells_must_be_covered():
     assert check_walk(steps, free, np.array(LOOP[:-1]), (0, 0)).problems == ()
 
 
-def test_many_problems_are_told_by_the_first_few():
+def test_only_the_first_of_many_problems_are_listed():
     verdict = judge([(0, 0)] * 6)
     assert verdict.problems == (
         *(f"stands still: step {step}, (0, 0) to (0, 0)" for step in (1, 2, 3)),

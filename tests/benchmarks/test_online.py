@@ -131,7 +131,7 @@ def test_only_what_is_in_sight_is_known():
     assert listener.heard[0] is MapReceived
 
 
-def test_updates_tell_as_much_as_whole_maps():
+def test_updates_show_as_much_as_whole_maps():
     building = drawn(*TWO_ROOMS)
     listener, other = Listener(Sight(building, 1.0)), Sight(building, 1.0)
     for cell in [(1, 2), (1, 3), (2, 3), (2, 5), (2, 6), (2, 7), (3, 8)]:
@@ -266,7 +266,7 @@ def test_every_planner_has_a_row_and_the_first_the_figures(tmp_path):
     assert [row[0] for row in table.rows] == list(names)
 
 
-def test_nowhere_to_go(tmp_path):
+def test_a_building_of_one_cell_is_refused(tmp_path):
     file = tmp_path / "cell.npy"
     np.save(file, np.ones((1, 1), bool))
     plan = plan_of(choice=BuildingChoice((str(file),), 0, 0))
@@ -283,7 +283,7 @@ def test_goals_are_those_of_what_was_measured():
     assert list(limits(with_turns=True).values()) == [1.05]
 
 
-def test_figures(capsys, tmp_path):
+def test_the_benchmark_online_reports_its_figures(capsys, tmp_path):
     file = tmp_path / "rooms.npy"
     np.save(file, free_of(*TWO_ROOMS))
     words = ["--grids", str(file), "--starts", "2", "--ranges", "1"]
@@ -306,7 +306,7 @@ def test_figures(capsys, tmp_path):
     assert document["goals"][0]["what"].startswith("all reachable")
 
 
-def test_tables(capsys, tmp_path):
+def test_the_benchmark_online_prints_its_tables(capsys, tmp_path):
     file = tmp_path / "rooms.npy"
     np.save(file, free_of(*TWO_ROOMS))
     words = ["--grids", str(file), "--starts", "1", "--ranges", "2"]

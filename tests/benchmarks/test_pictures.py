@@ -67,7 +67,7 @@ def test_pheromone_is_not_mirrored_and_goes_from_least_to_most():
     assert blocked[:, 0].mean() < low[:, 0].mean()
 
 
-def test_pheromone_that_is_the_same_everywhere():
+def test_uniform_pheromone_can_be_drawn():
     lattice = CoverageLattice.from_free(np.ones((3, 4), bool))
     trail = np.full((3, 4), 0.1, np.float32)
     snapshot = ColonySnapshot(lattice.window, lattice.cell_m, trail, 0, 8, 10, 12)

@@ -97,7 +97,7 @@ def test_other_files_are_not_results(text, tmp_path):
         read_references(file)
 
 
-def test_missing_results(tmp_path):
+def test_missing_results_are_an_error(tmp_path):
     with pytest.raises(BadConfiguration, match="cannot read"):
         read_references(tmp_path / "none.json")
 
@@ -121,7 +121,7 @@ SQUARE = [(0, 0), (0, 1), (1, 1), (1, 0)]
         (SQUARE, {"lower_bound_steps": 4}, "below the bound of 4"),
     ],
 )
-def test_wrong_walks_are_told(cells, given, wrong):
+def test_wrong_walks_are_refused(cells, given, wrong):
     lattice = CoverageLattice.from_free(np.ones((2, 2), bool))
     problem = CoverageProblem.of(lattice, (0, 0), cost=CoverageCost(1.0, 1.5))
     assert judged(problem, path_of(problem, SQUARE)).turns_90 == 2
@@ -129,7 +129,7 @@ def test_wrong_walks_are_told(cells, given, wrong):
         judged(problem, path_of(problem, cells, **given))
 
 
-def test_walk_that_does_not_come_home_is_told():
+def test_a_walk_that_does_not_return_home_is_refused():
     lattice = CoverageLattice.from_free(np.ones((2, 2), bool))
     problem = CoverageProblem.of(lattice, (0, 0), end=(0, 0))
     with pytest.raises(WrongWalkError, match="ends at"):
@@ -184,7 +184,7 @@ def test_goals_of_other_budgets(budget_s, most):
     assert [(limit, measured) for (_, limit), measured in goals.items()] == [(most, 1.0)]
 
 
-def test_goals_are_of_ants_alone():
+def test_goals_count_only_ants():
     never = replace(OPEN, variant="none")
     assert goals_of([run_of(setting=never, known=Known(best_steps=100))]) == {}
 
@@ -251,7 +251,7 @@ def test_variants_stand_side_by_side():
 
 
 @pytest.mark.parametrize("end", ["anywhere", "home"])
-def test_quality(end, room, capsys):
+def test_the_benchmark_quality_reports_its_figures(end, room, capsys):
     words = ["--grids", str(room / "room.npy"), "--results", str(room / "results.json")]
     words += ["--budgets", "0.02", "--seeds", "1", "--end", end]
     assert main(["quality", *words, "--json"]) == 0
@@ -291,13 +291,13 @@ def test_results_of_another_grid_are_refused(room):
         next(measure(plan_of(room), lambda _: None))
 
 
-def test_walk_shorter_than_the_optimum_is_told(room):
+def test_a_walk_shorter_than_the_optimum_is_refused(room):
     known_room(room, proven_optimum={"open_steps": 300})
     with pytest.raises(WrongWalkError, match="fewer than are proven"):
         next(measure(plan_of(room), lambda _: None))
 
 
-def test_bound_above_a_known_walk_is_told(room):
+def test_a_bound_above_a_known_walk_is_refused(room):
     known_room(room, results={"lkh_open": walk(39)})
     with pytest.raises(WrongWalkError, match="above a walk of 39"):
         next(measure(plan_of(room), lambda _: None))

@@ -83,7 +83,7 @@ def test_a_planner_of_one_s_own_is_a_row(tmp_path, capsys):
     assert re.search(r"yours +\n +mine.py:depth_first +333 ", said)
 
 
-def test_figures(capsys):
+def test_table_one_reports_its_figures(capsys):
     assert main(["table1", "--maps", "office", *SMALL, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["benchmark"] == "table1"
@@ -135,7 +135,7 @@ def test_interrupted_table_reports_what_there_is(made, tmp_path, count):
     assert f"Interrupted: {missing} runs are missing" in (tmp_path / "page.md").read_text()
 
 
-def test_grids_are_told_apart_by_name(tmp_path, capsys):
+def test_two_grids_of_one_name_are_refused(tmp_path, capsys):
     np.save(tmp_path / "office.npy", np.ones((3, 3), bool))
     words = ["--grids", str(tmp_path / "office.npy"), "--maps", "office", *SMALL]
     assert main(["table1", *words]) != 0

@@ -69,6 +69,6 @@ def test_walks_over_maps_have_a_certified_gap_at_each_price(capsys, tmp_path):
         assert each["cost_s"] == each["simple_s"] == 47 + 10 * each["price"]
 
 
-def test_instances_that_are_none_are_named(tmp_path, capsys):
+def test_a_folder_without_instances_is_an_error(tmp_path, capsys):
     assert main(["turns", "--instances", str(tmp_path), "--no-maps"]) == 78
     assert "results.json" in capsys.readouterr().err

@@ -51,7 +51,7 @@ def test_the_readme_has_the_roles():
             assert set(re.findall("`([^`]+)`", listens)) == set(access.ROLES[role].listens)
 
 
-def test_what_a_robot_says_and_hears_is_what_the_contract_says():
+def test_roles_match_the_directions_in_the_contract():
     by_direction = {entry["name"]: entry["direction"] for entry in KEYS}
     incoming = {name for name, direction in by_direction.items() if direction == "in"}
     assert set(access.ROLES["mapper"].speaks) == incoming
@@ -69,19 +69,19 @@ def test_what_a_robot_says_and_hears_is_what_the_contract_says():
         ("driver", "cmd_vel", "put"),
     ],
 )
-def test_what_drives_a_robot_comes_from_one_role_and_routers(role, name, message):
+def test_only_one_role_and_routers_may_send_each_input(role, name, message):
     everybody = {role: [role] for role in access.ROLES}
     rules = control(**everybody)
     may = {one for one in everybody if name in granted(rules, one, message, "ingress")}
     assert may == {role, "router"}
 
 
-def test_nobody_may_delete():
+def test_no_role_may_delete():
     rules = control(**{role: [role] for role in access.ROLES})["rules"]
     assert not any("delete" in rule["messages"] for rule in rules)
 
 
-def test_a_role_that_nobody_has_is_left_out():
+def test_a_role_without_names_is_left_out():
     rules = control(viewer=["eye"], mapper=[])
     assert [subject["id"] for subject in rules["subjects"]] == ["viewer"]
     assert rules["subjects"][0]["cert_common_names"] == ["eye"]
@@ -90,7 +90,7 @@ def test_a_role_that_nobody_has_is_left_out():
     assert control()["policies"] == []
 
 
-def test_a_role_for_one_robot_is_none_for_another():
+def test_a_role_for_one_robot_is_not_valid_for_another():
     grants = [access.Grant("robot", [name], f"fasaco/@v1/{name}", of=name) for name in ("a", "b")]
     rules = access.access_control(
         [*grants, access.Grant("viewer", ["v"], "fasaco/@v1/*")], "usernames"
@@ -103,13 +103,13 @@ def test_a_role_for_one_robot_is_none_for_another():
     assert all("of b" in rule for rule in rules["policies"][1]["rules"])
 
 
-def test_who_commands_may_view():
+def test_an_operator_may_view():
     rules = control(operator=["boss"])
     assert granted(rules, "operator", "query", "ingress") > {"@rpc/mission", "@rpc/status", "path"}
     assert [subject["id"] for subject in rules["subjects"]] == ["operator"]
 
 
-def test_zenoh_takes_all_of_it():
+def test_zenoh_accepts_the_whole_configuration():
     everybody = {role: [role] for role in access.ROLES}
     for transport in (
         access.mutual_tls("ca.pem", "own.pem", "own.key"),

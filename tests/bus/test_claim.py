@@ -31,12 +31,12 @@ def planning(own):
     return claim
 
 
-def test_who_is_alone_plans_once_it_has_looked():
+def test_a_daemon_alone_plans_after_its_check():
     assert not planning(A).rival
 
 
 @pytest.mark.parametrize("own", [A, C])
-def test_who_comes_to_where_another_plans_waits(own):
+def test_a_new_daemon_waits_for_the_one_that_plans(own):
     """Whoever has the smaller id: who plans goes on."""
     claim = Claim(own)
     for now in (0.0, 1.0, 2.0, 100.0):
@@ -47,7 +47,7 @@ def test_who_comes_to_where_another_plans_waits(own):
     assert before.state is ClaimState.PLANS
 
 
-def test_of_two_that_start_at_once_one_plans():
+def test_two_daemons_that_start_together_leave_one_planning():
     first, second = Claim(A), Claim(B)
     for now in (0.0, CALM_S):
         first.decide({B: ClaimState.WAITS}, now)
@@ -56,7 +56,7 @@ def test_of_two_that_start_at_once_one_plans():
     assert second.rival == A
 
 
-def test_who_waits_takes_over_when_the_other_is_gone():
+def test_a_waiting_daemon_takes_over_from_a_gone_one():
     claim = Claim(B)
     for now in range(50):
         claim.decide({A: ClaimState.PLANS}, float(now))
@@ -66,7 +66,7 @@ def test_who_waits_takes_over_when_the_other_is_gone():
     assert claim.state is ClaimState.PLANS
 
 
-def test_of_two_that_wait_the_one_with_the_smaller_id_takes_over():
+def test_the_waiting_daemon_with_the_smaller_id_takes_over():
     claims = {B: Claim(B), C: Claim(C)}
     for own, other in ((B, C), (C, B)):
         claims[own].decide({A: ClaimState.PLANS, other: ClaimState.WAITS}, 0.0)
@@ -86,7 +86,7 @@ def test_a_daemon_that_could_plan_but_does_not_is_not_waited_for():
     assert claim.state is ClaimState.PLANS
 
 
-def test_of_two_planners_one_goes_on_and_sees_the_other_stop():
+def test_after_a_partition_one_of_two_planners_yields():
     """A network partition left each half with a planner of its own."""
     first, second = planning(A), planning(B)
     first.decide({B: ClaimState.PLANS}, 5.0)
@@ -104,7 +104,7 @@ def test_of_two_planners_one_goes_on_and_sees_the_other_stop():
     assert first.rival_yielded
 
 
-def test_out_of_touch_nobody_takes_over():
+def test_a_daemon_without_a_router_does_not_take_over():
     """The router is gone, and with it the other's token."""
     claim = Claim(B)
     claim.decide({A: ClaimState.PLANS}, 0.0)
@@ -161,7 +161,7 @@ def test_only_what_is_a_claim_counts():
 
 
 @pytest.mark.parametrize("seed", range(50))
-def test_any_course_of_things_ends_with_one_that_plans(seed):
+def test_any_course_of_events_ends_with_one_planner(seed):
     """Daemons come, go, are cut off from each other and freeze; tokens come late."""
     rng = random.Random(seed)
     claims = {f"{number:x}": Claim(f"{number:x}") for number in range(1, 5)}

@@ -73,7 +73,7 @@ def taken(samples, count):
     return [samples.get(timeout=TIMEOUT_S).payload for _ in range(count)]
 
 
-def test_publishers_that_are_gone_are_asked_no_more(bus, endpoint):
+def test_gone_publishers_get_no_more_queries(bus, endpoint):
     samples = Queue()
     bus.subscribe(KEY, samples.put, latched=True)
     client = open_client(endpoint)
@@ -111,7 +111,7 @@ def test_to_ask_for_the_newest_leaves_no_questioner_behind(bus, endpoint):
 
 
 @pytest.mark.parametrize("numbered", [True, False])
-def test_late_publishers_are_heard_once(bus, endpoint, numbered):
+def test_samples_of_late_publishers_arrive_once(bus, endpoint, numbered):
     """One that published before it could be heard, and one after: in order, none twice."""
     samples = Queue()
     with publishing(endpoint, numbered) as early:
@@ -131,7 +131,7 @@ def test_late_publishers_are_heard_once(bus, endpoint, numbered):
     assert samples.empty()
 
 
-def test_where_several_samples_count_they_come_in_order(bus, endpoint):
+def test_cached_and_live_samples_arrive_in_order(bus, endpoint):
     samples, stop = Queue(), threading.Event()
     with publishing(endpoint, cache=100) as publisher:
 
@@ -152,7 +152,7 @@ def test_where_several_samples_count_they_come_in_order(bus, endpoint):
     assert heard == list(range(heard[0], 2000))
 
 
-def test_what_waits_for_an_answer_has_a_bound(bus, endpoint, monkeypatch):
+def test_samples_held_for_a_missing_answer_are_bounded(bus, endpoint, monkeypatch):
     """A publisher that does not answer, and another one that sends megabytes meanwhile."""
     monkeypatch.setattr(latched, "ANSWER_S", 1000.0)
     asked, samples = [], Queue()
@@ -173,7 +173,7 @@ def test_what_waits_for_an_answer_has_a_bound(bus, endpoint, monkeypatch):
 
 
 @pytest.mark.parametrize("numbered", [True, False])
-def test_what_an_answer_has_overtaken_is_not_heard(bus, endpoint, numbered):
+def test_a_sample_older_than_the_answer_is_dropped(bus, endpoint, numbered):
     """The first sample bears the number 0, as that of a publisher that was started anew does."""
     samples, on_their_way = Queue(), Queue()
     client = open_client(endpoint)
@@ -294,7 +294,7 @@ def test_the_wait_for_a_lost_sample_ignores_other_publishers(bus, endpoint, monk
 
 
 @pytest.mark.parametrize("numbered", [True, False])
-def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint, numbered):
+def test_a_sample_published_during_a_subscription_arrives_once(bus, endpoint, numbered):
     with publishing(endpoint, numbered) as publisher:
         for number in range(30):
             samples = Queue()
@@ -307,7 +307,7 @@ def test_what_is_published_while_somebody_subscribes_comes_once(bus, endpoint, n
 
 
 @pytest.mark.parametrize("numbered", [True, False])
-def test_a_publisher_heard_before_it_is_found_is_heard_once(bus, endpoint, numbered):
+def test_a_sample_received_before_its_token_arrives_once(bus, endpoint, numbered):
     """It publishes on a link that stands, before its token is looked for."""
     samples = Queue()
     subscription = bus.subscribe(KEY, samples.put, latched=True)

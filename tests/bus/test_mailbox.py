@@ -38,7 +38,7 @@ def test_more_than_is_handed_out_at_once_waits_for_the_next_take():
     assert box.take_lost("pose") == 0
 
 
-def test_what_must_not_overtake_waits_for_those_before_it_alone():
+def test_an_ordered_item_waits_for_earlier_items_only():
     box = Mailbox({"command": Queue(2, after="pose"), "pose": Queue(4, at_once=2)})
     for number in range(4):
         box.post("pose", number)
@@ -64,7 +64,7 @@ def weighed(length, size):
     st.integers(1, 5),
     st.integers(0, 20),
 )
-def test_what_a_queue_loses_is_its_oldest_and_no_more_than_it_must(takes, length, size):
+def test_a_full_queue_drops_as_few_of_its_oldest_as_possible(takes, length, size):
     box = weighed(length, size)
     for sizes in takes:
         for number in sizes:
@@ -86,7 +86,7 @@ def test_an_empty_mailbox_is_waited_for_no_longer_than_asked():
     assert time.monotonic() - began >= 0.04
 
 
-def test_a_post_wakes_whoever_waits():
+def test_a_post_wakes_the_waiting_reader():
     box, taken = mailbox(), []
     waiting = threading.Thread(target=lambda: taken.extend(box.take(30.0)))
     waiting.start()
@@ -118,7 +118,7 @@ def test_many_threads_lose_nothing_that_is_queued():
 
 
 @given(st.lists(st.sampled_from(["map", "update", "pose", "take"]), max_size=40))
-def test_what_is_taken_is_what_a_plain_list_would_keep(kinds):
+def test_a_take_returns_what_a_plain_list_would_keep(kinds):
     """The twin keeps everything posted and thinks about it only when it is taken."""
     box, posted = mailbox(length=4), []
     for number, kind in enumerate([*kinds, "take"]):
@@ -168,7 +168,7 @@ def spaced():
     )
 
 
-def test_of_a_flood_few_are_taken_and_the_newest_always():
+def test_a_flood_is_thinned_but_its_newest_item_is_taken():
     box, taken, began = spaced(), [], time.monotonic()
     flooding = threading.Event()
 
@@ -204,14 +204,14 @@ def test_held_topics_wait_until_released_and_others_do_not():
     assert box.take(60.0) == [("map", "newer")]
 
 
-def test_where_nothing_is_spaced_everything_is_taken_at_once():
+def test_without_spacing_every_item_is_taken_at_once():
     box = Mailbox({"map": Queue(2)}, Spacing("map", 0.0))
     for number in range(100):
         box.post("map", number)
         assert box.take(0) == [("map", number)]
 
 
-def test_what_follows_a_map_waits_with_it_and_nothing_else_does():
+def test_only_followers_of_a_map_wait_with_it():
     box = spaced()
     box.post("map", "old")
     assert box.take(0) == [("map", "old")]

@@ -105,7 +105,7 @@ def test_a_sample_comes_in_with_type_and_attachment(bus, client, samples, latche
     assert samples.get(timeout=TIMEOUT_S) == Sample(KEY, b"three", "", b"")
 
 
-def test_who_comes_late_gets_the_newest_of_a_latched_key(bus, client):
+def test_a_late_joiner_gets_the_newest_sample_of_a_latched_key(bus, client):
     publisher = bus.publisher(KEY, SCHEMA, QOS["path"])
     for number in range(5):
         publisher.put(b"%d" % number, b"attached")
@@ -153,7 +153,7 @@ def test_questions_are_answered_with_their_parameters(bus, client):
     assert reply.ok.payload.to_bytes() == b"{}"
 
 
-def test_an_error_is_an_error_there_too(bus, client):
+def test_an_error_reply_arrives_as_an_error(bus, client):
     bus.serve(KEY, lambda _: Reply(b'{"code":"not_yet"}', is_error=True))
     (reply,) = client.get(KEY, timeout=TIMEOUT_S)
     assert reply.ok is None
@@ -184,7 +184,7 @@ def test_a_token_stands_while_its_session_does(bus, client, endpoint):
 
 
 @pytest.mark.parametrize("mode", ["peer", "router"])
-def test_who_finds_the_port_taken_joins(endpoint, samples, mode):
+def test_a_session_joins_if_the_port_is_taken(endpoint, samples, mode):
     settings = BusSettings(mode, (), (endpoint,))
     with open_bus(settings) as first, open_bus(settings) as second:
         first.subscribe(KEY, samples.put)
@@ -195,7 +195,7 @@ def test_who_finds_the_port_taken_joins(endpoint, samples, mode):
 
 
 @pytest.mark.parametrize("mode", ["peer", "router"])
-def test_who_joined_listens_once_the_other_is_gone(endpoint, samples, mode):
+def test_a_joined_session_listens_once_the_other_is_gone(endpoint, samples, mode):
     settings = BusSettings(mode, (), (endpoint,))
     first = open_bus(settings)
     with open_bus(settings) as second, open_bus(settings) as third:
@@ -228,7 +228,7 @@ def test_who_joined_listens_once_the_other_is_gone(endpoint, samples, mode):
         BusSettings("nonsense"),
     ],
 )
-def test_where_there_is_nobody_or_nothing_it_says_so_at_once(settings):
+def test_an_endpoint_without_a_listener_is_an_error_at_once(settings):
     started = time.monotonic()
     with pytest.raises(BusUnavailable) as caught:
         open_bus(settings)
@@ -298,7 +298,7 @@ with open_bus(BusSettings("client", ({endpoint!r},))) as bus:
 
 
 @pytest.mark.parametrize("name", ["coverage", "pheromone", "directions"])
-def test_what_comes_at_once_waits_for_a_busy_subscriber(endpoint, name):
+def test_a_burst_of_samples_waits_for_a_busy_subscriber(endpoint, name):
     """Cohorts come one on the other: where only two could wait, the last were dropped."""
     small = BusSettings("peer", (), (f"{endpoint}#so_sndbuf=65536",))
     with open_bus(small) as bus, subscriber(f"{endpoint}#so_rcvbuf=65536") as busy:
@@ -392,7 +392,7 @@ def test_a_token_list_asks_again_where_no_answer_comes(bus, monkeypatch):
     assert roll.there() == {f"{KEY}/here"}
 
 
-def test_a_token_list_believes_whom_an_answer_in_part_names(bus, monkeypatch):
+def test_a_token_list_keeps_tokens_of_a_partial_answer(bus, monkeypatch):
     token = bus.token(f"{KEY}/here")
     roll = bus.token_list(f"{KEY}/*")
     until(lambda: roll.ask(0.0) or roll.version)
@@ -416,7 +416,7 @@ def test_a_token_list_has_a_bound(bus, endpoint, monkeypatch):
     until(lambda: roll.ask(0.0) or not roll.there())
 
 
-def test_who_lets_others_answer_is_asked_no_more(bus, endpoint):
+def test_a_server_that_lets_others_answer_gets_no_more_queries(bus, endpoint):
     with (
         open_bus(BusSettings("client", (endpoint,))) as other,
         open_bus(BusSettings("client", (endpoint,))) as client,

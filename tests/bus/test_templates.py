@@ -51,7 +51,7 @@ def parts(config):
     return {part: json.loads(config.get_json(part)) for part in PARTS}
 
 
-def test_there_are_templates_for_everybody():
+def test_there_is_a_template_for_each_kind_of_session():
     assert {path.stem for path in TEMPLATES} == {
         *("robot", "router", "client", "user-robot", "user-client"),
     }

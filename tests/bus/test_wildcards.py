@@ -47,7 +47,7 @@ def test_the_table_is_checked_as_a_whole():
 
 
 @pytest.mark.parametrize("expression", MATCHED)
-def test_what_an_expression_matches(expression):
+def test_an_expression_matches_the_listed_keys(expression):
     asked = zenoh.KeyExpr(expression)
     assert {key for key in ALL_KEYS if asked.intersects(zenoh.KeyExpr(key))} == MATCHED[expression]
 

@@ -49,8 +49,10 @@ STARTS = {"r1": (0.75, 0.75), "r2": (11.25, 0.75), "r3": (6.15, 7.05)}
 STEP_S = 0.05
 # A robot whose daemon waits for a map publishes it again, as a mapper does, each [s].
 MAP_S = 1.0
-# A share is to be taken over within this time [s]; events come this long after another at most.
-TAKEN_OVER_S, CALM_S = 10.0, 6.0
+# Time within which a part must be taken over [s].
+TAKEN_OVER_S = 10.0
+# Longest time between two events [s].
+CALM_S = 6.0
 # A robot that comes back soon after it left is given a part after ten seconds (``EVEN_S`` of the
 # fleet's layer), so that one that comes and goes does not change all paths each time.
 UNITED_S = 15.0

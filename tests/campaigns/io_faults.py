@@ -56,8 +56,10 @@ MAY_FAIL = {
     Kind.LINK: ("EIO", "EROFS"),
     Kind.ANY: ("EIO", "ENOSPC", "EMFILE"),
 }
-# Of the faults, so many last; and a disk is gone from each so many calls on.
-LASTING_SHARE, STRIDE = 0.2, 3
+# Share of the faults that last.
+LASTING_SHARE = 0.2
+# Stride between the calls at which a disk disappears.
+STRIDE = 3
 # What says, on standard error, that something was wrong.
 TELLS = ("WARNING", "ERROR", "fasaco-edge:", "kernels not ready")
 # What is said where no call fails: after a reset, and where the computer is busy with much else.

@@ -14,9 +14,13 @@ from fasaco_edge.kernels.floor.capsule import is_clear
 
 Pixel = tuple[float, float]
 
-# Tolerance of rounding; how much nearer the way back may lead, and steps of a radius [pixels].
-NEAR_PX, BACK_PX, STEP_PX = 1e-3, 1.5, 0.125
-# A line leads out within so many points.
+# Tolerance for rounding [pixels].
+NEAR_PX = 1e-3
+# Distance by which the way back may lead nearer to a wall [pixels of the map].
+BACK_PX = 1.5
+# Step in the search for a radius [pixels].
+STEP_PX = 0.125
+# Largest number of points with which a line leads out.
 MOST_LEADING = 3
 BACK = "drives back along its track"
 

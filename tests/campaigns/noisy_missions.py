@@ -55,7 +55,7 @@ MOST_SHARE = 0.01
 # By how much a claim is above the truth at most, of the floor that is a pixel off walls: of what is
 # beside them a map of such pixels shows nothing for certain.
 MOST_EXCESS = 0.05
-# A robot with work left leaves where it is, by so much [m], in so long [s].
+# A robot with work left must move by LEAVES_M [m] within LEAVES_S [s].
 LEAVES_M, LEAVES_S = 0.05, 20.0
 
 

@@ -33,7 +33,7 @@ from tests.campaigns.senseless_mission import MissionTrial
 RING = 30_000
 # After so many findings there is enough to mend.
 MOST_FINDINGS = 5
-# Events of one mission within this process, and of what its maps have at most.
+# Number of events of a mission within this process; largest size of its maps [pixels].
 MISSION_EVENTS, MISSION_PIXELS = 10_000, 90_000
 SAY_EVERY_S = 10.0
 

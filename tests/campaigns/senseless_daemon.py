@@ -54,9 +54,9 @@ UNIT = Path(__file__).parents[2] / "deploy" / "fasaco-edge.service"
 LATE_SHARE = 0.001
 # So long an answer, a state, a daemon or a router is waited for, on the slowest machine [s].
 PATIENCE_S = 150.0
-# The maps that a path may name, and how many lattices of them are kept.
+# Number of kept maps, which a path may name, and of kept lattices of them.
 MAPS_KEPT, LATTICES_KEPT = 400, 20
-# Larger maps are judged now and then only: the judge must not become the load.
+# Larger maps are judged only now and then, so that the judge is not the main load.
 MOST_JUDGED_PIXELS = 100_000
 # How a session looks for a router that has gone [ms].
 SOON = {"period_init_ms": 100, "period_max_ms": 500}

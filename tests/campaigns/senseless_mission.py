@@ -66,8 +66,10 @@ from tests.campaigns.senseless import Event, pixels_of
 from tests.mission.test_line import check_tally
 
 MOST_CELLS = 20_000
-# A mission that is kept is read again once in so many turns; a lattice made afresh more often.
-KEPT_EVERY, FRESH_EVERY = 40, 5
+# Cycles between two checks of the encoded ledger.
+KEPT_EVERY = 40
+# Cycles between two checks of the lattice.
+FRESH_EVERY = 5
 HONEST_TURNS = 6
 
 

@@ -13,7 +13,7 @@ YOUNG = ("rss_mb", "cores")
 
 
 @pytest.mark.parametrize("hub", come_and_go.HUBS)
-def test_who_comes_and_goes_leaves_nothing_behind(tmp_path, hub):
+def test_participants_that_come_and_go_leave_nothing_behind(tmp_path, hub):
     campaign = come_and_go.run_campaign(tmp_path, mappers=10, daemons=3, rest_s=2.0, hub=hub)
     # A look is short: on a busy machine it may contain no question.
     assert any(row.questions_hz > 0 for row in campaign.rows), "nobody was counted"

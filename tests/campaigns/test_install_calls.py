@@ -33,7 +33,7 @@ def test_a_name_that_counts_before_the_bytes_are_there_is_found():
     assert taken(WRITTEN, SYNCED, NAMED, f"fsync(3<{SETTINGS}>) = 0").left() == []
 
 
-def test_a_complete_version_is_on_the_disk_before_it_says_so():
+def test_a_version_is_on_disk_before_it_is_marked_complete():
     file = f'openat(AT_FDCWD</>, "{PREFIX}/1.0/x.py", O_WRONLY|O_CREAT) = 4<{PREFIX}/1.0/x.py>'
     mark = f'rename("{PREFIX}/1.0/M", "{PREFIX}/1.0/INSTALLED") = 0'
     assert len(taken(file, mark).wrong) == 1

@@ -78,7 +78,7 @@ def test_the_rarest_calls_come_first_and_no_kind_is_left_out():
         "warmup:rename:2:ENOSPC",
     ],
 )
-def test_a_fault_is_told_and_nothing_is_lost(fault):
+def test_an_io_fault_is_reported_and_loses_nothing(fault):
     """Long form: python -m tests.campaigns.io_faults."""
     name, _, text = fault.partition(":")
     outcome, _ = outcome_of(name, Failure.of_text(text))
@@ -99,7 +99,7 @@ def test_an_unreadable_recording_does_not_stop_the_recorder(tmp_path):
 
 
 @pytest.mark.parametrize("at", [6, 7, 8, None])  # of the footer, and of what stands behind it
-def test_a_part_whose_end_the_disk_does_not_take_is_told(tmp_path, at):
+def test_a_failed_write_of_the_end_of_a_part_is_reported(tmp_path, at):
     failure = None if at is None else Failure(Kind.WRITE, at, "EIO")
     with Watch([tmp_path], failure) as watch:
         command = [sys.executable, "-c", ENDS_A_PART, str(tmp_path)]

@@ -55,7 +55,7 @@ def test_a_daemon_lives_under_its_units_limit(tmp_path, flood):
 
 
 @limited
-def test_under_a_smaller_limit_it_takes_smaller_maps_and_says_so(tmp_path):
+def test_a_smaller_memory_limit_refuses_large_maps(tmp_path):
     limit = 400 << 20
     with memory_group(limit) as group:
         flood = Flood("maps", 5000, 0.03, 10.0)

@@ -25,7 +25,7 @@ from tests.campaigns.noisy_missions import NoisyMission, building_of, outcome_of
     ],
     ids=str,
 )
-def test_what_has_to_hold_under_noise_does(mission):
+def test_missions_under_noise_have_no_faults(mission):
     found = outcome_of(mission)
     assert not found.faults
     assert found.figures.pose_error_median_m > 0.004

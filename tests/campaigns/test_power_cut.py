@@ -77,9 +77,7 @@ def test_calls_are_seen_in_their_order(trace):
         (8, Bytes.OLD, Names.ALL, {"gone": b"12345678", "lost": b""}),
     ],
 )
-def test_what_was_synchronised_is_there_and_nothing_else_need_be(
-    trace, tmp_path, after, how, names, what
-):
+def test_only_synchronised_data_survives_a_power_cut(trace, tmp_path, after, how, names, what):
     assert left(trace, tmp_path, after, how, names) == what
 
 

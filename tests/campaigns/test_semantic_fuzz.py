@@ -62,7 +62,7 @@ def test_a_seed_says_the_same_again():
     assert sum(each["do"] in SILENT for each in first) < len(first) / 10
 
 
-def test_what_breaks_is_written_down_and_said_again(tmp_path, monkeypatch):
+def test_a_finding_is_written_down_and_repeats(tmp_path, monkeypatch):
     """With the fault that the fuzz found first: a path cut off at a cell that is lost."""
     prefix = ReachableArea.drivable_prefix
     monkeypatch.setattr(

@@ -73,14 +73,14 @@ def check(tmp_path, capsys):
     return run
 
 
-def test_all_that_is_wrong_is_told_with_its_line(check):
+def test_each_fault_is_listed_with_its_line(check):
     code, told = check(WRONG)
     assert code == 78
     found = [(fault["line"], fault["key"], fault["said"]) for fault in told["faults"]]
     assert sorted(found) == TOLD
 
 
-def test_what_does_not_go_together_is_told_at_once(check):
+def test_all_conflicts_are_listed_at_once(check):
     code, told = check(TOGETHER)
     assert code == 78
     lines = [(fault["line"], fault["said"].partition(" must")[0]) for fault in told["faults"]]
@@ -128,7 +128,7 @@ def test_one_round_names_what_is_wrong_with_every_zone(check):
     ],
     ids=["no YAML", "in itself", "an alias", "a list", "a book"],
 )
-def test_files_that_are_no_configuration(check, text, line, said):
+def test_a_file_without_a_configuration_is_one_fault(check, text, line, said):
     code, told = check(text)
     assert code == 78
     (fault,) = told["faults"]
@@ -146,7 +146,7 @@ def test_a_document_that_expands_when_parsed_is_refused(check):
     assert told["faults"][0]["said"].endswith("more than 50000 values, aliases written out")
 
 
-def test_what_is_in_order_is_shown_as_it_is_in_force(check, capsys):
+def test_a_valid_configuration_is_shown_with_defaults(check, capsys):
     code, told = check("robot: {name: mower}\nbus: {connect: ['tcp/h:1#key=secret']}", "--show")
     assert (code, told["faults"]) == (0, [])
     assert told["config"]["robot"] == {
@@ -193,7 +193,7 @@ def test_people_read_a_line_for_each(tmp_path):
     assert (good.code, good.out) == (0, f"{EXAMPLE}: in order\n")
 
 
-def test_the_daemon_names_the_first_fault_and_where_the_others_are(tmp_path):
+def test_the_daemon_names_the_first_fault_and_check_config(tmp_path):
     file = tmp_path / "config.yaml"
     file.write_text(WRONG)
     with pytest.raises(BadConfiguration) as refused:

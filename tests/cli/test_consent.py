@@ -77,7 +77,7 @@ def test_stop_needs_no_consent_and_says_how_to_continue(robot):
     running, outsider = robot
     stopped = mission(running, "stop")
     assert stopped.code == 0
-    assert "`mission start --keep-covered` goes on with the rest" in stopped.err
+    assert "`mission start --keep-covered` covers the rest" in stopped.err
     assert covered(outsider) == 12
 
 
@@ -119,7 +119,7 @@ def test_mistakes_need_no_daemon(words, code, said):
     assert said in ended.err
 
 
-def test_corners_left_of_the_origin_are_no_options(robot):
+def test_negative_corners_are_not_options(robot):
     running, outsider = robot
     words = "keep-out", "add", "--name", "a", "-3,-1", "-2,-1", "-2,0"
     assert mission(running, *words).code == 0

@@ -220,7 +220,7 @@ def check_clearance(grid, trail):
     assert clearance(grid, trail[:: max(1, len(trail) // 500)]).min() > hull_m - 1e-3
 
 
-def test_a_configuration_that_is_no_demos_is_not_overwritten(tmp_path):
+def test_only_a_demos_configuration_is_overwritten(tmp_path):
     (tmp_path / "config.yaml").write_text("robot: {name: maja}\n")
     ended = fasaco_edge("demo", "--out", tmp_path)
     assert ended.code == 78

@@ -71,7 +71,7 @@ def test_the_demo_is_a_live_map_and_then_a_summary(folder):
     [("\x03", (60, 20), {"NO_COLOR": "1"}), ("q", (200, 50), {}), ("\x03", (59, 20), {})],
     ids=["ctrl-c", "q", "ctrl-c in a small one"],
 )
-def test_a_key_ends_it_and_leaves_the_terminal_as_it_was(folder, key, size, env):
+def test_a_key_ends_the_view_and_restores_the_terminal(folder, key, size, env):
     pytest.importorskip("rerun")
     columns, lines = size
     words = ("demo", "--map", "room.yaml", "--out", folder / "demo")
@@ -121,7 +121,7 @@ else:
 """
 
 
-def test_the_view_is_one_that_the_terminal_can_show(tmp_path):
+def test_the_view_suits_the_terminal(tmp_path):
     script = tmp_path / "kinds.py"
     script.write_text(KINDS)
     with Terminal(program=(sys.executable, str(script))) as shell:
@@ -154,7 +154,7 @@ print("the end")
 """
 
 
-def test_what_is_said_meanwhile_stands_on_the_page_and_after_it(tmp_path):
+def test_printed_text_is_on_the_page_and_after_it(tmp_path):
     script, end = tmp_path / "meanwhile.py", tmp_path / "end"
     script.write_text(MEANWHILE)
     with Terminal(program=(sys.executable, str(script), str(end))) as shell:

@@ -80,7 +80,7 @@ def test_each_check_says_what_it_is_in_the_help(capsys):
     assert all(f"\n  {check.name} " in told for check in CHECKS)
 
 
-def test_a_configuration_that_is_refused_is_told_with_what_to_do(doctor, anywhere):
+def test_an_invalid_configuration_is_a_failed_check(doctor, anywhere):
     told, code = doctor(listen=[anywhere])
     assert code == 1
     assert list(told) == ["configuration", *(check.name for check in CHECKS if check.of_machine)]
@@ -88,7 +88,7 @@ def test_a_configuration_that_is_refused_is_told_with_what_to_do(doctor, anywher
     assert "bus.open_to_everyone" in told["configuration"]["to_do"]
 
 
-def test_what_is_open_to_everyone_is_told(doctor, anywhere):
+def test_an_open_endpoint_is_a_warning(doctor, anywhere):
     told, code = doctor(listen=[anywhere], open_to_everyone=True)
     assert code == 0
     assert told["endpoints"]["level"] == "warn"
@@ -138,7 +138,7 @@ def test_certificates_that_others_would_refuse(doctor, ca, tmp_path, spoil, said
 
 
 @needs_openssl
-def test_who_only_connects_needs_no_certificate_for_listening(doctor, ca):
+def test_a_client_needs_no_server_certificate(doctor, ca):
     files = ca.sign("robot", uses="clientAuth", names="DNS:robot")
     told, code = doctor(**tls(files))
     assert code == 1
@@ -156,7 +156,7 @@ def test_who_only_connects_needs_no_certificate_for_listening(doctor, ca):
 
 @needs_openssl
 @pytest.mark.parametrize(("mode", "level"), [(0o600, "ok"), (0o640, "warn"), (0o644, "fail")])
-def test_who_can_read_the_key(doctor, ca, mode, level):
+def test_a_key_that_others_can_read_is_reported(doctor, ca, mode, level):
     files = ca.files("robot")
     Path(files["private_key"]).chmod(mode)
     told, code = doctor(**tls(files))
@@ -167,7 +167,7 @@ def test_who_can_read_the_key(doctor, ca, mode, level):
 
 
 @needs_openssl
-def test_a_role_that_nobody_has(doctor, ca):
+def test_roles_without_names_are_a_warning(doctor, ca):
     told, _ = doctor(**tls(ca.files("robot"), roles={"viewer": ["eye"]}))
     assert told["roles"]["level"] == "warn"
     assert told["roles"]["found"].startswith("no name has the role mapper or operator")
@@ -196,7 +196,7 @@ def test_user_and_password(doctor, tmp_path, anywhere):
     assert "one" not in broken["identity"]["details"]
 
 
-def test_what_a_check_cannot_do_without_is_told_with_what_to_do():
+def test_a_check_that_cannot_run_is_a_warning_with_a_hint():
     def look(patient):
         raise BadConfiguration("there is no home folder", hint="set one")
 

@@ -86,7 +86,7 @@ def test_a_feature_that_is_no_zone_is_named(geometry):
         read_order(read(collection(drawn)))
 
 
-def test_what_is_not_to_be_driven_is_never_floor_to_sweep():
+def test_a_keep_out_or_skipped_feature_is_no_zone():
     room = square(room=3, name="bath")
     drawn = [room | {"properties": room["properties"] | more} for more in KEPT]
     order = read_order(read(collection([*drawn, square(name="hall", priority=90)])))
@@ -100,7 +100,7 @@ KEPT = ({"keep_out": True}, {"skip": True})
 
 
 @pytest.mark.parametrize("features", [{}, {"features": []}, {"features": {"0": 1}}])
-def test_a_file_without_features_is_no_order_for_everything(features):
+def test_a_file_without_features_is_refused(features):
     with pytest.raises(OrderError, match="features: there is none"):
         read({"type": "FeatureCollection"} | features)
 
@@ -152,9 +152,7 @@ CROSSING = [[0, 0], [4, 3], [4, 0], [0, 3], [0, 0]]
         ({}, {"type": "Feature"}, "line 8: type: must be FeatureCollection, got 'Feature'"),
     ],
 )
-def test_faults_of_a_drawn_order_have_a_line_and_the_features_name(
-    tmp_path, feature, members, said
-):
+def test_faults_of_a_drawn_order_have_line_and_feature(tmp_path, feature, members, said):
     properties = {"name": "hall"} | feature
     rings, number = properties.pop("rings", [SQUARE]), properties.pop("id", None)
     drawn = square(**properties) | {"geometry": {"type": "Polygon", "coordinates": rings}}

@@ -14,7 +14,7 @@ from fasaco_edge.cli.console.help import fitted
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_explains(capsys, name):
+def test_each_help_explains_its_command(capsys, name):
     with pytest.raises(SystemExit, match="0"):
         main([name, "--help"])
     told = capsys.readouterr()
@@ -119,7 +119,7 @@ def test_a_command_imports_what_is_heavy_only_where_it_is_used(words, heavy):
     assert ended.stdout.splitlines()[-1] == "loaded:", ended.stderr
 
 
-def test_the_version_is_told(capsys):
+def test_the_version_is_printed(capsys):
     with pytest.raises(SystemExit, match="0"):
         main(["--version"])
     assert capsys.readouterr().out == f"fasaco-edge {__version__}\n"

@@ -52,7 +52,7 @@ def test_ros_and_a_router(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (GIVEN[:4], "--map-by must be given: there is no terminal to ask at"),
+        (GIVEN[:4], "--map-by must be given: there is no terminal for questions"),
         ([], "--robot-radius, --tool-width, --map-by must be given"),
         ([*GIVEN, "--domain", "7"], "--domain and --namespace are for maps from ROS 2"),
         ([*GIVEN, "--robot-radius", "20"], "robot.radius_m: expected float <= 10.0, got 20"),
@@ -60,18 +60,18 @@ def test_ros_and_a_router(tmp_path, capsys):
         ([*GIVEN, "--name", "a/b"], "robot.name: "),
     ],
 )
-def test_what_is_wrong_is_told_and_not_written(words, said, tmp_path, capsys):
+def test_an_invalid_value_is_refused_and_not_written(words, said, tmp_path, capsys):
     file = tmp_path / "robot.yaml"
     assert init(file, *words) == 78
     assert said in capsys.readouterr().err
     assert not file.exists()
 
 
-def test_a_file_that_is_there_is_kept(tmp_path, capsys):
+def test_an_existing_file_is_kept(tmp_path, capsys):
     file = tmp_path / "robot.yaml"
     file.write_text("robot: {name: mine}\n")
     assert init(file, *GIVEN) == 78
-    assert "is there already" in capsys.readouterr().err
+    assert "already exists" in capsys.readouterr().err
     assert file.read_text() == "robot: {name: mine}\n"
 
 
@@ -120,7 +120,7 @@ def test_a_typing_error_is_asked_for_again(tmp_path, typed, capsys):
     assert asked.count("Radius of the disc") == 3
 
 
-def test_what_nobody_answers_is_not_written(tmp_path, typed, capsys):
+def test_without_an_answer_no_file_is_written(tmp_path, typed, capsys):
     typed("0.25\n")
     file = tmp_path / "robot.yaml"
     assert init(file) == 78
@@ -128,7 +128,7 @@ def test_what_nobody_answers_is_not_written(tmp_path, typed, capsys):
     assert not file.exists()
 
 
-def test_it_tells_which_maps_it_heard(tmp_path, capsys):
+def test_it_names_the_maps_that_it_received(tmp_path, capsys):
     file, naming = tmp_path / "robot.yaml", Naming(3)
     words = [*GIVEN[:4], "--map-by", "rmw_zenoh", "--json", "--listen", "6", "--force"]
     endpoint = free_endpoint()

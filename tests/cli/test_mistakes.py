@@ -85,18 +85,22 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --seed -1", 78, "seed must be in 0..2^63 - 1, got -1"),
         ("plan good.npy --png no/walk.png", 78, "cannot write no/walk.png: there is no folder no"),
         ("plan good.npy --png .", 78, "cannot write .: that is a folder"),
-        ("plan good.npy --path-out good.npy", 78, "cannot write good.npy: it is read from"),
-        ("plan good.npy --png w --path-out ./w", 78, "cannot write w: something else is written"),
-        ("plan map.yaml --png map.png", 78, "cannot write map.png: it is read from"),
-        ("plan map.yaml --png link.png", 78, "cannot write link.png: it is read from"),
-        ("plan good.npy --planner mine.py:f --png mine.py", 78, "cannot write mine.py: it is read"),
-        ("simulate map.yaml --trail-out map.png", 78, "cannot write map.png: it is read from"),
-        ("review a.rrd --png a.rrd", 78, "cannot write a.rrd: it is read from"),
-        ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is read from"),
+        ("plan good.npy --path-out good.npy", 78, "cannot write good.npy: it is an input"),
+        ("plan good.npy --png w --path-out ./w", 78, "cannot write w: another option writes it"),
+        ("plan map.yaml --png map.png", 78, "cannot write map.png: it is an input"),
+        ("plan map.yaml --png link.png", 78, "cannot write link.png: it is an input"),
+        (
+            "plan good.npy --planner mine.py:f --png mine.py",
+            78,
+            "cannot write mine.py: it is an input",
+        ),
+        ("simulate map.yaml --trail-out map.png", 78, "cannot write map.png: it is an input"),
+        ("review a.rrd --png a.rrd", 78, "cannot write a.rrd: it is an input"),
+        ("review a.rrd --against b.rrd --png b.rrd", 78, "cannot write b.rrd: it is an input"),
         (
             "mission start --order o --zone a --passes 2",
             1,
-            "got --zone, --passes with it",
+            "got --zone, --passes",
         ),
         ("plan good.npy --png around", 78, "cannot write around: Too many levels of symbolic"),
         (f"plan good.npy --png {'w' * 300}", 78, "File name too long"),
@@ -121,7 +125,7 @@ def folder(tmp_path, monkeypatch):
         (
             'record --out . --fleet hall --ros2 {"kind":"bridge"}',
             78,
-            "--ros2: of a fleet's robots only the native keys are recorded",
+            "--ros2: a fleet's recording has only native keys",
         ),
         ("demo --map nowhere --out o", 1, "no map 'nowhere'"),
         ("demo --speed 0 --out o", 78, "--speed must be above 0, got 0.0"),
@@ -130,7 +134,7 @@ def folder(tmp_path, monkeypatch):
         ("run --config nowhere.yaml", 78, "nowhere.yaml: No such file or directory"),
     ],
 )
-def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
+def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said):
     assert main(words.split()) == code
     told = capsys.readouterr()
     assert told.out == ""
@@ -167,7 +171,7 @@ def test_a_mistake_is_told_with_a_hint(folder, capsys, words, code, said):
         ("maps --log-level loud", "argument --log-level: invalid choice: 'loud'"),
     ],
 )
-def test_a_word_nobody_understands_is_named(folder, capsys, words, said):
+def test_an_unknown_word_is_named(folder, capsys, words, said):
     with pytest.raises(SystemExit, match="2"):
         main(words.split())
     told = capsys.readouterr()
@@ -192,7 +196,7 @@ def test_a_word_nobody_understands_is_named(folder, capsys, words, said):
     ids=lambda words: " ".join(words[:2]),
 )
 @pytest.mark.parametrize("make", [os.mkfifo, lambda name: os.symlink("/dev/zero", name)])
-def test_a_pipe_or_a_device_holds_nobody_up(folder, words, make):
+def test_a_pipe_or_a_device_does_not_block_a_command(folder, words, make):
     """To open a pipe waits for whoever writes to it; a device never ends."""
     pytest.importorskip("pyarrow")
     for ending in ("rrd", "npy", "png", "yaml", "py"):
@@ -225,7 +229,7 @@ def test_a_full_disk_is_named(capsys, folder):
     assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
 
 
-def test_a_reader_that_has_seen_enough_is_no_error(folder):
+def test_a_closed_pipe_is_no_error(folder):
     """As in ``fasaco-edge plan ... --json | head -c 1``."""
     command = [*PROGRAM, "plan", "good.npy", "--ants", "8", "--json"]
     with subprocess.Popen(
@@ -262,7 +266,7 @@ def test_ctrl_c_ends_a_plan_with_the_best_walk_so_far(folder):
     assert len(np.unique(walk, axis=0)) == np.count_nonzero(pillars)
 
 
-def test_a_demo_that_runs_out_of_time_says_so(folder):
+def test_a_demo_reports_that_its_time_is_up(folder):
     ended = fasaco_edge("demo", "--map", "office", "--timeout", 0.1, "--out", "o")
     assert ended.code == 1
     assert "hint: see" in ended.err or "left over" in ended.out or "the time is up" in ended.out
@@ -275,7 +279,7 @@ def test_a_demo_whose_daemon_refuses_shows_why(folder):
     assert "robot.tool_width_m: expected float <= 10.0, got 20.0" in ended.err
 
 
-def test_a_recorder_without_a_folder_says_so(folder):
+def test_a_recorder_without_a_folder_is_an_error(folder):
     pytest.importorskip("rerun")
     from tests.support.outsider import Outsider
     from tests.support.processes import daemon_process
@@ -287,7 +291,7 @@ def test_a_recorder_without_a_folder_says_so(folder):
     assert "cannot record into good.npy" in ended.err
 
 
-def test_a_disk_that_fails_is_no_wrong_configuration():
+def test_a_failing_disk_is_no_configuration_error():
     """Of that a service would never be started again (RestartPreventExitStatus=78)."""
     # Whoever reads this file from its beginning gets an error of the device.
     ended = fasaco_edge("run", "--config", "/proc/self/mem")
@@ -298,7 +302,7 @@ def test_a_disk_that_fails_is_no_wrong_configuration():
 
 
 @pytest.mark.parametrize("error", [MemoryError(), RuntimeError("can't start new thread")])
-def test_a_computer_without_memory_or_threads_is_told(monkeypatch, capsys, error):
+def test_missing_memory_or_threads_are_an_error_with_a_hint(monkeypatch, capsys, error):
     def fail(*_: object) -> None:
         raise error
 

@@ -318,7 +318,7 @@ def test_a_robot_with_a_turning_radius_drives_a_curve(plan, tmp_path, words):
         assert picture.format == "PNG"
 
 
-def test_a_turn_that_does_not_fit_is_told(tmp_path, capsys, caplog):
+def test_a_turn_that_fits_on_no_arc_is_a_warning(tmp_path, capsys, caplog):
     """A corridor 0.5 m wide: forward only, the robot cannot come back to its start."""
     cells = np.zeros((12, 82), np.int8)
     cells[[0, -1]] = cells[:, [0, -1]] = 100
@@ -374,7 +374,7 @@ def test_a_walk_ends_in_the_cell_asked_for(plan, grid_file, planner):
     assert walk[-1] == (2, 6)
 
 
-def test_turns_cost_what_they_take(plan, grid_file):
+def test_turns_cost_their_time(plan, grid_file):
     cells = cells_in(grid_file)
     # Of ants alone: what a local search comes to in its time depends on the machine.
     options = ("--ants", 400, "--velocities", 1, "--seed", 2, "--planner", "fasaco")
@@ -429,7 +429,7 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         ("--planner zigzag --line cells --pheromone-png t.png", "leaves no pheromone"),
     ],
 )
-def test_what_cannot_be_is_refused(capsys, words, said):
+def test_impossible_options_are_refused_by_name(capsys, words, said):
     line = () if "--line" in words else ("--line", "quick")
     assert main(["plan", "office", *line, *words.split()]) == Exit.CONFIG
     assert said in capsys.readouterr().err
@@ -490,7 +490,7 @@ def test_the_trail_of_the_colony_is_drawn(plan, tmp_path, words):
     assert len(colours) > 20
 
 
-def test_figures_are_printed_for_people_too(grid_file, capsys):
+def test_figures_are_printed_as_text(grid_file, capsys):
     assert main(["plan", str(grid_file), "--ants", "8", "--long"]) == 0
     told = capsys.readouterr().out
     assert main(["plan", str(grid_file), "--ants", "8", "--json"]) == 0
@@ -511,7 +511,7 @@ def test_figures_are_printed_for_people_too(grid_file, capsys):
         (("--passes", "edge,auto"), "map line swept pass pass"),
     ],
 )
-def test_what_matters_fits_on_one_screen(words, names, tmp_path):
+def test_the_summary_fits_on_one_screen(words, names, tmp_path):
     png = tmp_path / "plan.png"
     ended = fasaco_edge("plan", "flat", "--budget", "0.1", "--png", png, *words)
     lines = ended.out.splitlines()
@@ -525,7 +525,7 @@ def test_what_matters_fits_on_one_screen(words, names, tmp_path):
     assert re.search(r"^line +.*, \d+ min \d\d s", ended.out, re.MULTILINE)
 
 
-def test_without_a_picture_it_is_said_how_to_have_one(grid_file):
+def test_without_a_picture_its_option_is_named(grid_file):
     ended = fasaco_edge("plan", grid_file, "--ants", 8)
     assert ended.out.endswith("more: --long; a picture: --png FILE\n")
     assert re.search(r"^line +driven: .*, 1 min 20 s without turns", ended.out, re.MULTILINE)

@@ -53,7 +53,7 @@ def recording(tmp_path):
     [
         (PLAN, "steps, [0-9.]+% above the bound ", "map +.*"),
         (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "map +.*"),
-        (("warmup",), "looking at the kernels ", "kernels ready after [0-9.]+ s in .*"),
+        (("warmup",), "checking the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
             ("bench", "planners", "--maps", "office", "--seeds", "1", "--ants", "8"),
             "planners ━* +0/6 ",
@@ -177,7 +177,7 @@ print()
 """
 
 
-def test_what_is_printed_meanwhile_stands_above_the_progress(tmp_path):
+def test_printed_text_appears_above_the_progress(tmp_path):
     script = tmp_path / "meanwhile.py"
     script.write_text(MEANWHILE)
     with Terminal(program=(sys.executable, str(script)), columns=120) as shell:
@@ -198,7 +198,7 @@ def test_what_is_printed_meanwhile_stands_above_the_progress(tmp_path):
         assert len([line for line in during if "at work" in line]) == 1
 
 
-def test_what_is_printed_into_a_file_meanwhile_goes_there(tmp_path):
+def test_output_redirected_to_a_file_goes_there(tmp_path):
     script, out = tmp_path / "meanwhile.py", tmp_path / "out"
     script.write_text(MEANWHILE)
     command = ("sh", "-c", f'"$0" "$1" > "{out}"', sys.executable, str(script))

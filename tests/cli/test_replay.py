@@ -17,7 +17,7 @@ from fasaco_edge.cli import main
         ("RRF2 and then nothing", "holds no samples"),
     ],
 )
-def test_what_is_no_recording_is_named(tmp_path, capsys, content, told):
+def test_a_file_that_is_no_recording_is_named(tmp_path, capsys, content, told):
     path = tmp_path / "a.rrd"
     if content is not None:
         path.write_text(content)

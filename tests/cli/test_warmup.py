@@ -43,7 +43,7 @@ def test_warmup_says_where_the_kernels_are():
     assert "kernels-" in ended.err
 
 
-def test_what_is_ready_is_loaded_and_never_compiled(ready):
+def test_compiled_kernels_are_loaded_and_not_compiled_again(ready):
     assert ready["ready"] is True
     checked = fasaco_edge("warmup", "--check", "--json")
     assert checked.code == 0

@@ -76,7 +76,7 @@ def said(**sections):
         ),
     ],
 )
-def test_what_does_not_go_together_is_named(sections, text):
+def test_settings_that_conflict_give_a_caution(sections, text):
     found = said(**sections)
     assert [text in one for one in found] == ([True] if text else [])
 

@@ -35,7 +35,7 @@ def load(tmp_path: Path) -> Any:
 
 
 @pytest.mark.parametrize("text", ["", "# nothing but a remark\n", "{}", "robot: {}\nplanner: {}"])
-def test_what_is_missing_is_the_default(load, text):
+def test_missing_keys_have_their_defaults(load, text):
     assert load(text) == load_config(None) == DaemonConfig()
 
 
@@ -222,7 +222,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("!!python/object/apply:os.getcwd []", "not plain YAML"),
     ],
 )
-def test_what_is_wrong_is_named(load, tmp_path, text, said):
+def test_a_fault_is_named_with_its_file(load, tmp_path, text, said):
     with pytest.raises(BadConfiguration) as caught:
         load(text)
     assert said in str(caught.value)
@@ -269,12 +269,14 @@ def test_unreadable_files_are_named(tmp_path):
         ("", {}, "/home/pi/.local/state/fasaco-edge"),
     ],
 )
-def test_where_progress_is_kept(monkeypatch, configured, environ, folder):
+def test_the_state_folder_follows_settings_and_environment(
+    monkeypatch, configured, environ, folder
+):
     monkeypatch.setenv("HOME", "/home/pi")
     assert MissionSettings(state_dir=configured).state_folder(environ) == Path(folder)
 
 
-def test_who_has_no_home_has_to_say_where_progress_is_kept():
+def test_without_a_home_the_state_folder_must_be_given():
     with pytest.raises(BadConfiguration, match=r"mission\.state_dir: ~nobody-of-that-name"):
         MissionSettings(state_dir="~nobody-of-that-name/x").state_folder({})
 
@@ -311,7 +313,7 @@ def documents(draw: st.DrawFn) -> object:
 
 @examples(300)
 @given(document=documents())
-def test_whatever_is_written_is_a_configuration_or_refused(tmp_path_factory, document):
+def test_any_document_is_a_configuration_or_is_refused(tmp_path_factory, document):
     file = tmp_path_factory.getbasetemp() / "any.yaml"
     file.write_text(yaml.safe_dump(document))
     try:
@@ -394,7 +396,7 @@ def test_ros_is_left_out_unless_it_stands_there(load):
         ("{kind: rmw_zenoh, frames: {robot: map}}", "frames.map and frames.robot must differ"),
     ],
 )
-def test_what_is_wrong_about_ros_is_named(load, block, text):
+def test_a_fault_in_the_block_ros2_is_named(load, block, text):
     with pytest.raises(BadConfiguration) as caught:
         load(f"ros2: {block}")
     assert text in str(caught.value)

@@ -49,7 +49,7 @@ def test_a_disc_assumes_nothing(tmp_path):
     assert config.robot.assumed == ""
 
 
-def test_what_is_shown_is_read_again(tmp_path):
+def test_a_shown_footprint_can_be_read_again(tmp_path):
     config, _ = inspected(tmp_path, footprint=SCRUBBER)
     again = msgspec.convert(config_document(config), DaemonConfig)
     assert again.robot == config.robot
@@ -75,7 +75,7 @@ def test_mistakes_are_named(tmp_path, robot, said):
     assert any(said in str(fault.error) for fault in faults), faults
 
 
-def test_what_is_assumed_is_said_where_people_look(tmp_path):
+def test_init_check_config_doctor_name_the_assumption(tmp_path):
     file = tmp_path / "robot.yaml"
     words = ("--robot-size", "0.5x0.6", "--tool-width", "0.45", "--map-by", "zenoh", "--no-try")
     made = fasaco_edge("init", file, *words)

@@ -97,7 +97,7 @@ def test_endpoints_beyond_this_computer(tmp_path, endpoint):
     ],
 )
 @pytest.mark.parametrize("key", ["listen", "connect"])
-def test_what_is_no_endpoint_is_named_before_anything_is_opened(tmp_path, key, endpoint, why):
+def test_an_invalid_endpoint_is_refused_before_opening(tmp_path, key, endpoint, why):
     """Zenoh would try for ever to connect there, or refuse to listen without saying why."""
     with pytest.raises(BadConfiguration) as refused:
         load(tmp_path, **{"open_to_everyone": True, key: ["tcp/127.0.0.1:7447", endpoint]})
@@ -116,7 +116,7 @@ def test_to_connect_anywhere_opens_nothing(tmp_path):
     assert config.bus.security.kind == "none"
 
 
-def test_what_listens_everywhere_is_reached_from_here():
+def test_a_wildcard_listener_is_reached_at_localhost():
     assert from_here("tls/0.0.0.0:7447") == "tls/localhost:7447"
     assert from_here("tcp/[::]:7447#a") == "tcp/localhost:7447#a"
     for endpoint in ("tcp/127.0.0.1:7447", "tcp/robot:1", "unixsock-stream//run/x.sock"):
@@ -186,7 +186,7 @@ def user(**more):
         ),
     ],
 )
-def test_what_does_not_go_together_is_refused(tmp_path, bus, said):
+def test_conflicting_security_settings_are_refused(tmp_path, bus, said):
     with pytest.raises(BadConfiguration) as refused:
         load(tmp_path, **bus)
     assert said in str(refused.value)
@@ -212,7 +212,7 @@ def test_a_password_is_read_from_its_file_and_never_shown(tmp_path):
         config.bus.settings("fasaco/@v1/robot")
 
 
-def test_loopback_alone_has_neither_rules_nor_limits(tmp_path):
+def test_a_bus_on_loopback_has_no_rules_and_no_limits(tmp_path):
     assert load(tmp_path).bus.settings("fasaco/@v1/robot").secured == {}
     opened = load(tmp_path, listen=[BEYOND], open_to_everyone=True)
     assert set(opened.bus.settings("fasaco/@v1/robot").secured) == {
@@ -230,7 +230,7 @@ def test_a_role_for_ros_needs_topics(tmp_path):
         )
 
 
-def test_a_recorder_hears_the_topics_of_ros(tmp_path):
+def test_a_recorder_may_receive_the_topics_of_ros(tmp_path):
     files = {name: tmp_path / USER[name] for name in ("password_file", "dictionary_file")}
     for file in files.values():
         file.write_text("robot:secret")

@@ -16,11 +16,13 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.planners import registry
 from fasaco_edge.planners.living_trail import TrailSnapshot
 
-# Width of the map [m] that breaks each of them.
+# Width of the map that makes planner, pheromone or mission fail [m].
 PLANNER_M, PHEROMONE_M, MISSION_M = 4.6, 5.2, 5.8
 PIXEL_M = 0.05
-# Paths that stop the robot that cannot be sent, after the word of this name.
-UNSENT, MOST_UNSENT = "unsent", 3
+# Argument after which stops of the robot cannot be sent.
+UNSENT = "unsent"
+# Number of stops that cannot be sent.
+MOST_UNSENT = 3
 
 
 class BreakingPlanner:

@@ -80,7 +80,7 @@ def told(daemon: Daemon, *words: str) -> Any:
         (b'{"command":"room_split","room":{"id":1,"cut":[[0,0],[1,1]]}}', "not_now", "no map yet"),
     ],
 )  # fmt: skip
-def test_what_is_no_command_is_answered_with_an_error(outsider, payload, code, said):
+def test_an_invalid_command_is_answered_with_an_error(outsider, payload, code, said):
     error = ask(outsider, payload)
     assert error["code"] == code
     assert said in error["message"]
@@ -270,7 +270,7 @@ def test_the_command_line(tmp_path):
         other = fasaco_edge("mission", "status", "--robot", "x", "--connect", running.endpoint)
         assert other.code == 1
         assert "no daemon answers at fasaco/@v1/x" in other.err
-        assert "of robots on this bus there are robot: give one as --robot" in other.err
+        assert "robots on this bus: robot; choose one by --robot" in other.err
 
 
 def begin_idle(outsider: Outsider) -> None:
@@ -292,7 +292,7 @@ def begin_idle(outsider: Outsider) -> None:
         (("status",), "Unable to connect to any of"),
     ],
 )
-def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, capsys, words, said):
+def test_mistakes_are_reported_without_a_daemon(tmp_path: Path, monkeypatch, capsys, words, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "order.yaml").write_text("zones: [{passes: 2}]")
     (tmp_path / "order.json").write_text("{")
@@ -314,7 +314,7 @@ def test_mistakes_are_told_without_a_daemon(tmp_path: Path, monkeypatch, capsys,
         (("pause", "--passes", "2"), "unrecognized arguments"),
     ],
 )
-def test_words_nobody_understands_are_named(capsys, words, said):
+def test_unknown_words_are_named(capsys, words, said):
     with pytest.raises(SystemExit, match="2"):
         main(["mission", *words])
     assert said in capsys.readouterr().err

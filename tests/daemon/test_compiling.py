@@ -32,7 +32,7 @@ def test_compiling_continues_in_a_fresh_process_when_it_is_large(tmp_path):
     assert compiler_in(folder, WALKS) == []
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path):
+def test_a_folder_without_write_permission_is_a_warning(tmp_path):
     (tmp_path / "file").touch()
     ((word, text),) = compiler_in(tmp_path / "file" / "kernels", WALKS)
     assert word == WARNING

@@ -67,7 +67,7 @@ def test_queries_with_junk_are_answered_or_not_but_harm_nothing(outsider):
     assert outsider.ask_status()["state"]
 
 
-def test_noise_on_the_port_harms_nobody(daemon, outsider):
+def test_noise_on_the_port_does_no_harm(daemon, outsider):
     host, _, port = daemon.endpoint.removeprefix("tcp/").partition(":")
     rng = random.Random(0)
     for size in (1, 100, 70_000):

@@ -17,7 +17,7 @@ def aside(folder):
     return sorted(path.name for path in (folder / "state").glob("*.mismatch-*"))
 
 
-def test_one_map_in_a_wrong_frame_after_a_restart_costs_nothing(tmp_path):
+def test_a_map_in_a_wrong_frame_after_a_restart_changes_nothing(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as client:
         begin(client)
         drive(client, lanes(30))

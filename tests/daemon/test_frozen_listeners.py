@@ -65,7 +65,7 @@ def wait_recorder(outsider, state, **more):
     return outsider.wait_status(holds)["recorder"]
 
 
-def test_a_killed_recorder_is_started_again_and_planning_goes_on(tmp_path):
+def test_a_killed_recorder_restarts_and_planning_continues(tmp_path):
     pytest.importorskip("rerun")
     with (
         daemon_process(tmp_path, "--record", str(tmp_path)) as running,

@@ -62,7 +62,7 @@ def wakes(pid):
     return int(line.split()[1])
 
 
-def test_it_sleeps(waiting):
+def test_an_idle_daemon_uses_little_processor_time(waiting):
     before, since = wakes(waiting.pid), time.monotonic()
     time.sleep(4.0)
     each_s = (wakes(waiting.pid) - before) / (time.monotonic() - since)
@@ -111,7 +111,7 @@ def test_a_second_robot_joins_where_one_listens(daemon, tmp_path):
         assert daemon.process.poll() is None
 
 
-def test_an_endpoint_that_is_none_is_an_error_and_no_traceback(tmp_path):
+def test_an_invalid_endpoint_is_an_error_without_traceback(tmp_path):
     with daemon_process(tmp_path, bus={"listen": ["tcp/127.0.0.1:notaport"]}) as running:
         assert running.process.wait(120) != 0
         assert "Traceback" not in running.log_text()

@@ -96,7 +96,7 @@ def test_a_map_does_not_wait_for_a_thousand_poses(arrivals):
     assert sum(map(len, taken)) == 1001, "none is lost"
 
 
-def test_a_battery_is_heard_and_held_until_there_is_a_mission(arrivals):
+def test_battery_messages_are_held_until_there_is_a_mission(arrivals):
     for level in (0.5, 0.4):
         arrivals.post("battery", encode_battery(BatteryState(level, "discharging", "", 7)))
     arrivals.post("battery", b"no battery")
@@ -108,7 +108,7 @@ def test_a_battery_is_heard_and_held_until_there_is_a_mission(arrivals):
     assert held.events == events[-1:]
 
 
-def test_priorities_are_heard_and_held_until_there_is_a_mission(arrivals):
+def test_priorities_are_held_until_there_is_a_mission(arrivals):
     for stamp_ns in (7, 8):
         arrivals.post("priority", map_bytes(pillared_room(), stamp_ns))
     arrivals.post("priority", b"no grid")
@@ -121,7 +121,7 @@ def test_priorities_are_heard_and_held_until_there_is_a_mission(arrivals):
     assert held.events == events
 
 
-def test_priorities_of_more_bytes_than_allowed_are_dropped_by_their_size(arrivals):
+def test_oversized_priorities_are_dropped_on_arrival(arrivals):
     post = poster(arrivals.mailbox, "priority", MAX_PIXELS)
     post(Sample("fasaco/@v1/robot/priority", bytes(MAX_PRIORITY_BYTES + 1)))
     assert arrivals.decode()[0] == []
@@ -164,7 +164,7 @@ FLOOD = [PATCH] * 300
         ([("map_update", b""), ("pose", b""), ("pose", b""), ("pose", POSE)], [PoseReceived], 3),
     ],
 )
-def test_maps_and_updates_in_order_without_what_is_broken_or_lost(arrivals, posted, types, faulty):
+def test_broken_and_lost_samples_keep_the_others_in_order(arrivals, posted, types, faulty):
     for kind, payload in posted:
         arrivals.post(kind, payload)
     events, faults = arrivals.decode()

@@ -78,7 +78,7 @@ def test_it_outlives_a_kill_and_comes_before_any_map(tmp_path):
         assert keep_out(outsider, "remove", {"name": "vase"})["mission"]["keep_outs"] == []
 
 
-def test_what_is_covered_is_not_forgotten_without_consent(tmp_path):
+def test_covered_cells_are_not_forgotten_without_consent(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         taken = outsider.listen("command", late=False)
         begin(outsider)

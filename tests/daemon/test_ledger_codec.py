@@ -47,7 +47,7 @@ def all_of(ledger: LedgerSnapshot) -> object:
     st.sampled_from([0.3, 0.1 + 0.2, 1e-3, 1.0]),
     st.text(max_size=20).filter(str.isprintable),
 )
-def test_what_is_written_is_read(cells, cell_m, frame):
+def test_a_decoded_ledger_equals_the_encoded_one(cells, cell_m, frame):
     ledger = driven(*cells, cell_m=cell_m, frame=frame)
     assert contents(decode_ledger(encode_ledger(ledger), cell_m)) == contents(ledger)
 
@@ -86,7 +86,7 @@ def test_a_trail_is_kept_to_a_share_of_itself_and_then_as_it_is(values):
     assert all_of(decode_ledger(encode_ledger(read), CELL_M)) == all_of(read)
 
 
-def test_what_a_fleet_has_swept_is_kept_in_a_version_of_its_own():
+def test_floor_swept_by_a_fleet_has_a_format_version_of_its_own():
     ledger = replace(driven((-1, 5)), fleet=b'{"version": 1}', note="{}")
     payload = encode_ledger(ledger)
     assert struct.unpack_from("<I", payload, 8) == (4,)
@@ -143,7 +143,7 @@ def test_a_ledger_of_the_previous_version_has_no_swept_floor():
     assert not ledger.is_empty
 
 
-def test_what_is_read_cannot_be_changed():
+def test_a_decoded_ledger_is_read_only():
     ledger = decode_ledger(encode_ledger(lane(3)), CELL_M)
     for tile in (*ledger.tiles.values(), *ledger.floor.tiles.values()):
         with pytest.raises(ValueError, match="read-only"):
@@ -230,7 +230,7 @@ def bomb(tiles, floor):
     return enveloped(zlib.compress(plain, 9))
 
 
-def test_a_ledger_of_as_many_tiles_as_there_may_be_is_read():
+def test_the_largest_allowed_ledger_is_read():
     ledger = decode_ledger(bomb(MOST_TILES, MOST_FLOOR_TILES), CELL_M)
     assert (len(ledger.tiles), len(ledger.floor.tiles)) == (MOST_TILES, MOST_FLOOR_TILES)
 
@@ -239,7 +239,7 @@ def test_a_ledger_of_as_many_tiles_as_there_may_be_is_read():
     ("tiles", "floor"),
     [(MOST_TILES + 1, 0), (MOST_TILES + 1000, 9), (30_000, 0), (0, MOST_FLOOR_TILES + 1)],
 )
-def test_what_would_take_too_much_memory_is_not_read(tiles, floor):
+def test_a_file_that_expands_too_far_is_refused(tiles, floor):
     payload = bomb(tiles, floor)
     tracemalloc.start()
     try:

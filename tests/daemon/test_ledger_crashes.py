@@ -148,7 +148,7 @@ print(len(visits_of(found.ledger)), found.fault)
 
 @pytest.mark.skipif(bool(why_not()), reason=why_not())
 @pytest.mark.parametrize("moved", [False, True])
-def test_a_new_one_that_the_disk_does_not_give_is_told_and_kept(written, moved):
+def test_an_unreadable_new_ledger_is_reported_and_kept(written, moved):
     """It may be the newest whole one: the process died before it had its name."""
     (written / "robot.ledger.new").write_bytes(encode_ledger(lane(5)))
     if moved:

@@ -44,7 +44,7 @@ def check_trouble(running: Daemon, outsider: Outsider, said: str) -> None:
     assert errors in ({"ledger_file": 1}, {"ledger_file": 1, "rooms_file": 1})
 
 
-def test_a_full_disk_is_told_and_nothing_is_lost(tmp_path, small_disk):
+def test_a_full_disk_is_reported_and_loses_nothing(tmp_path, small_disk):
     ballast = small_disk / "ballast"
     with (
         daemon_process(tmp_path, "--state", str(small_disk)) as running,

@@ -30,7 +30,7 @@ from tests.support.ledgers import (
 )
 
 
-def test_where_there_is_nothing_nothing_is_found(tmp_path):
+def test_an_absent_folder_holds_no_ledger(tmp_path):
     found = load(tmp_path / "not yet")
     assert (found.ledger, found.fault) == (None, None)
     assert not (tmp_path / "not yet").exists()
@@ -70,14 +70,14 @@ def test_after_a_fall_back_the_old_ledger_stays_until_the_next(written):
     assert (written / NAMES[1]).read_bytes() == encode_ledger(lane(3))
 
 
-def test_a_newest_that_is_missing_is_said_too(written):
+def test_a_missing_newest_ledger_is_reported(written):
     (written / NAMES[0]).unlink()
     found = load(written)
     assert contents(found.ledger) == contents(lane(3))
     assert "no robot.ledger" in str(found.fault)
 
 
-def test_two_broken_ones_are_said_and_kept(written):
+def test_two_broken_ledgers_are_reported_and_kept(written):
     for name in NAMES:
         (written / name).write_bytes(b"torn " + name.encode())
     found = load(written)
@@ -96,7 +96,7 @@ def test_two_broken_ones_are_said_and_kept(written):
     assert load(written).fault is None
 
 
-def test_what_is_no_file_is_kept_aside(written):
+def test_a_folder_in_place_of_the_ledger_is_kept_aside(written):
     (written / NAMES[0]).unlink()
     (written / NAMES[0]).mkdir()
     file = LedgerFile(written, "robot")
@@ -108,7 +108,7 @@ def test_what_is_no_file_is_kept_aside(written):
 
 
 @pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo])
-def test_what_is_no_file_is_not_in_the_way_of_a_write(written, make):
+def test_a_non_file_in_place_of_a_new_ledger_is_replaced(written, make):
     make(written / "robot.ledger.new")
     found = load(written)
     assert contents(found.ledger) == contents(lane(4))
@@ -117,7 +117,7 @@ def test_what_is_no_file_is_not_in_the_way_of_a_write(written, make):
     assert contents(load(written).ledger) == contents(lane(6))
 
 
-def test_a_pipe_in_place_of_the_lock_holds_nobody_up(tmp_path):
+def test_a_pipe_in_place_of_the_lock_does_not_block(tmp_path):
     os.mkfifo(tmp_path / "robot.ledger.lock")
     first, second = LedgerFile(tmp_path, "robot"), LedgerFile(tmp_path, "robot")
     first.lock()
@@ -129,7 +129,7 @@ def test_a_pipe_in_place_of_the_lock_holds_nobody_up(tmp_path):
     ("make", "kind"),
     [(Path.mkdir, "a folder"), (lambda path: path.symlink_to("nowhere"), "a link")],
 )
-def test_what_lies_in_place_of_the_lock_is_told(tmp_path, make, kind):
+def test_a_non_file_in_place_of_the_lock_is_reported(tmp_path, make, kind):
     """That the ledger could not be opened was said, not what lay there."""
     lock = tmp_path / "robot.ledger.lock"
     make(lock)
@@ -188,7 +188,7 @@ def test_a_ledger_of_something_else_is_kept_and_not_overwritten(written, newest,
     assert contents(load(written).ledger) == contents(lane(1))
 
 
-def test_what_is_set_aside_is_all_there(written):
+def test_a_ledger_set_aside_is_complete(written):
     file = LedgerFile(written, "robot")
     kept = file.set_aside("fresh")
     assert sorted(kept) == names(written)
@@ -226,7 +226,7 @@ def test_a_second_process_is_refused(tmp_path):
     LedgerFile(tmp_path, "mower-2").lock()
 
 
-def test_a_folder_that_cannot_be_is_no_reason_not_to_start(tmp_path):
+def test_an_impossible_folder_does_not_prevent_the_start(tmp_path):
     (tmp_path / "file").write_text("not a folder")
     file = LedgerFile(tmp_path / "file", "robot")
     file.lock()
@@ -235,7 +235,7 @@ def test_a_folder_that_cannot_be_is_no_reason_not_to_start(tmp_path):
         file.write(lane(1))
 
 
-def test_what_appears_after_the_start_is_not_overwritten(tmp_path, written):
+def test_a_ledger_that_appears_later_is_not_overwritten(tmp_path, written):
     """The disk with the ledger on it is mounted after the daemon has looked for it."""
     folder = tmp_path / "mounted late"
     file = LedgerFile(folder, "robot")
@@ -267,7 +267,7 @@ def test_a_folder_that_appears_later_is_locked_before_a_write(tmp_path):
     assert contents(load(folder).ledger) == contents(lane(3))
 
 
-def test_a_disk_without_locks_is_written_all_the_same(tmp_path, monkeypatch):
+def test_a_disk_without_locks_is_written_nevertheless(tmp_path, monkeypatch):
     def failing(*_):
         raise OSError(errno.ENOLCK, "No locks available")
 
@@ -289,7 +289,7 @@ def test_a_file_too_large_is_not_read_but_kept(written):
     assert (written / aside).stat().st_size == 10**9
 
 
-def test_of_ledgers_set_aside_the_newest_and_the_largest_stay(tmp_path):
+def test_the_newest_and_largest_ledgers_set_aside_are_kept(tmp_path):
     """As two hundred resets make them, the first of a whole day's work."""
     file = LedgerFile(tmp_path, "robot")
     for length in [400, *[3 + number % 3 for number in range(30)], 20]:
@@ -304,7 +304,7 @@ def test_of_ledgers_set_aside_the_newest_and_the_largest_stay(tmp_path):
     assert names(tmp_path) == sorted(path.name for path in tmp_path.glob("*.reset-*"))
 
 
-def test_what_is_kept_for_another_reason_is_left_alone(tmp_path):
+def test_ledgers_set_aside_for_other_reasons_are_kept(tmp_path):
     file = LedgerFile(tmp_path, "robot")
     for why in ("mismatch", "broken", *["reset"] * 10):
         file.write(lane(5))

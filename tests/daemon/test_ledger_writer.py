@@ -55,7 +55,7 @@ def retry_soon(monkeypatch):
     monkeypatch.setattr(disk_writer, "RETRY_S", 0.05)
 
 
-def test_what_is_put_is_written(tmp_path):
+def test_a_snapshot_that_is_put_is_written(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     assert writer.restored is None
     path = str(tmp_path / "robot.ledger")
@@ -77,7 +77,7 @@ def test_the_last_thing_put_is_on_disk_when_it_is_closed(tmp_path):
     assert on_disk(tmp_path) == contents(lane(49))
 
 
-def test_what_was_written_is_restored(tmp_path):
+def test_a_written_ledger_is_restored(tmp_path):
     LedgerFile(tmp_path, "robot").write(lane(7))
     writer = open_ledger(tmp_path, "robot", CELL_M)
     assert contents(writer.restored) == contents(lane(7))
@@ -96,7 +96,7 @@ def test_a_fresh_start_keeps_what_there_was_aside(tmp_path):
     assert on_disk(tmp_path) == contents(lane(7))
 
 
-def test_what_was_wrong_on_disk_is_told(tmp_path, caplog):
+def test_a_fault_on_disk_is_reported(tmp_path, caplog):
     LedgerFile(tmp_path, "robot").write(lane(7))
     (tmp_path / "robot.ledger").write_bytes(b"torn")
     writer = open_ledger(tmp_path, "robot", CELL_M)
@@ -151,7 +151,7 @@ def test_the_files_are_kept_aside_although_nothing_follows(tmp_path):
     assert on_disk(tmp_path) is None
 
 
-def test_a_disk_that_fails_is_told_once_and_tried_again(tmp_path, monkeypatch, caplog, retry_soon):
+def test_a_failing_disk_is_reported_once_and_retried(tmp_path, monkeypatch, caplog, retry_soon):
     caplog.set_level(logging.INFO)
     tries, real = [], os.fsync
 
@@ -216,7 +216,7 @@ def test_set_aside_comes_first_also_after_failures(tmp_path, monkeypatch, retry_
     assert list(tmp_path.glob("robot.ledger.mismatch-*"))
 
 
-def test_a_disk_that_hangs_holds_nobody_up(tmp_path, caplog, retry_soon):
+def test_a_hanging_disk_does_not_block_the_caller(tmp_path, caplog, retry_soon):
     """Who opens a pipe to write waits for a reader, as for a disk that does not answer."""
     writer = open_ledger(tmp_path, "robot", CELL_M)
     pipe = tmp_path / "robot.ledger.new"
@@ -235,7 +235,7 @@ def test_a_disk_that_hangs_holds_nobody_up(tmp_path, caplog, retry_soon):
     os.close(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK))  # so that the thread can end
 
 
-def test_a_ledger_that_somebody_writes_is_refused(tmp_path):
+def test_a_ledger_with_another_writer_is_refused(tmp_path):
     writer = open_ledger(tmp_path, "robot", CELL_M)
     with pytest.raises(LedgerFileError, match="another daemon"):
         open_ledger(tmp_path, "robot", CELL_M)
@@ -267,7 +267,7 @@ def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
     writer.disk.close(1.0)
 
 
-def test_time_that_a_paused_robot_spends_is_written_twice_a_minute(tmp_path):
+def test_time_of_a_paused_robot_is_written_twice_a_minute(tmp_path):
     drive = Drive((0, 0), MapReceived(building("....")), pose_at(0, 0))
     drive.command("start", {"until_min": 5.0})
     drive.command("pause")
@@ -287,7 +287,7 @@ def test_time_that_a_paused_robot_spends_is_written_twice_a_minute(tmp_path):
     writer.disk.close(1.0)
 
 
-def test_floor_alone_is_restored_too(tmp_path):
+def test_floor_without_covered_cells_is_restored(tmp_path):
     """A robot that never came over the middle of a cell."""
     first = Drive((0, 0), MapReceived(building("....")), pose_at(0.45, 0.45))
     snapshot = first.mission.snapshot()

@@ -74,7 +74,7 @@ def test_there_is_no_mission_before_the_mask_has_come(tmp_path):
         paths.wait(lambda heard: bool(driven(heard) & AROUND), since=since)
 
 
-def test_one_that_cannot_be_read_leaves_the_last_one_in_force(tmp_path):
+def test_an_unreadable_mask_leaves_the_last_one_in_force(tmp_path):
     with (
         daemon_process(tmp_path, mission=dict(MISSION)) as running,
         Outsider(running.endpoint) as outsider,
@@ -145,7 +145,7 @@ class Mask:
         return config, self.faults
 
 
-def test_a_mask_alone_does_not_read_the_file_again():
+def test_a_new_mask_does_not_read_the_file_again():
     def read():
         raise AssertionError("the file may hold what nobody has put in force yet")
 
@@ -166,7 +166,7 @@ def test_an_unreadable_mask_keeps_the_written_configuration(caplog):
     assert "keep-out mask refused: keep_out_mask: rubbish" in caplog.text
 
 
-def test_what_is_written_does_not_take_the_mask_out_of_force():
+def test_a_reload_keeps_the_received_mask():
     """Whether one comes as a message changes with a restart alone."""
     bus = SimpleNamespace(listen=lambda keys, topic, take: heard.append(take))
     heard = []

@@ -98,7 +98,7 @@ def test_a_mask_is_read_in_what_maps_leave(limit):
 
 
 @given(st.integers(1, MAX_GRID_CELLS))
-def test_what_waits_for_the_loop_is_part_of_it(max_pixels):
+def test_queued_messages_are_part_of_the_estimate(max_pixels):
     rooms = queues(max_pixels)
     waiting = sum(max(rooms[kind].size, most_bytes(kind, max_pixels)) for kind in QUEUE_LENGTHS)
     # The other shares of a pixel are for the turn and for Zenoh.

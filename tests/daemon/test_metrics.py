@@ -89,7 +89,7 @@ def parsed(text):
 
 
 @pytest.mark.parametrize("battery", [None, BatteryReport(level=None), BatteryReport(level=0.5)])
-def test_the_charge_is_told_where_it_is_known(battery):
+def test_the_charge_is_exported_if_known(battery):
     told = parsed(exposition(structs.replace(STATUS, battery=battery), 0.5))
     level = battery and battery.level
     assert told.get(("fasaco_edge_battery_ratio", ())) == level
@@ -122,7 +122,7 @@ def test_the_board_shows_figures_and_labels_that_there_are():
     assert len(shown) > 20
 
 
-def test_a_status_is_told_in_base_units():
+def test_a_status_is_exported_in_base_units():
     told = parsed(exposition(STATUS, 0.5))
     assert told["fasaco_edge_covered_ratio", ()] == 0.25
     assert told["fasaco_edge_swept_square_metres", ()] == 3.5
@@ -137,7 +137,7 @@ def test_a_status_is_told_in_base_units():
     assert [name for name, value in states.items() if value] == ['state="covering"']
 
 
-def test_what_is_not_known_is_left_out():
+def test_unknown_figures_are_left_out():
     told = parsed(exposition(Status(state="idle"), 0.0))
     names = {name for name, _ in told}
     assert "fasaco_edge_covered_ratio" not in names
@@ -189,7 +189,7 @@ def test_before_the_first_status_there_is_no_page():
         refused.value.close()
 
 
-def test_many_who_say_nothing_or_too_much_hold_up_nobody():
+def test_silent_or_talkative_clients_block_no_other():
     with served() as url, ExitStack() as stack:
         address = "127.0.0.1", int(url.rpartition(":")[2])
         for said in (b"GET /metrics HTTP/1.0\r\n", b"x" * 20_000, *[b""] * 40):
@@ -200,7 +200,7 @@ def test_many_who_say_nothing_or_too_much_hold_up_nobody():
         assert time.monotonic() - begun < 5.0, "each of them may take a second to say something"
 
 
-def test_a_flood_of_silent_connections_holds_up_nobody():
+def test_a_flood_of_silent_connections_blocks_no_client():
     with served() as url, ExitStack() as stack:
         address = "127.0.0.1", int(url.rpartition(":")[2])
 
@@ -231,7 +231,7 @@ def test_all_who_ask_at_once_are_answered():
         assert all(each.recv(12) == b"HTTP/1.0 200" for each in asking[::2])
 
 
-def test_who_asks_without_end_gets_a_few_answers_a_second():
+def test_endless_requests_get_a_few_answers_a_second():
     with served() as url:
         address, begun, answers = ("127.0.0.1", int(url.rpartition(":")[2])), time.monotonic(), 0
         while time.monotonic() - begun < 1.0:
@@ -261,7 +261,7 @@ def test_a_taken_port_or_a_closed_server_stops_nothing(caplog):
         ("[::]:9465", "lets other computers read the status"),
     ],
 )
-def test_a_wrong_address_is_told(tmp_path, listen, said):
+def test_a_wrong_address_is_a_fault_with_its_line(tmp_path, listen, said):
     file = tmp_path / "robot.yaml"
     file.write_text(f"metrics:\n  listen: '{listen}'\n")
     config, faults = inspect_config(file)
@@ -272,7 +272,7 @@ def test_a_wrong_address_is_told(tmp_path, listen, said):
         MetricsConfig(listen=listen).address()
 
 
-def test_others_may_read_where_they_are_let_in():
+def test_others_may_read_if_the_address_is_open():
     assert DaemonConfig().metrics.address() is None
     assert MetricsConfig("localhost:1").address() == Address("127.0.0.1", 1)
     assert MetricsConfig("[::1]:1").address() == Address("::1", 1)

@@ -129,7 +129,7 @@ def test_encoding_and_attachment_say_what_it_is(path):
     assert (stamp.sec, stamp.nanosec) == (12, 34)
 
 
-def test_who_asks_gets_the_same_bytes(path, outsider):
+def test_a_query_gets_the_published_bytes(path, outsider):
     for name in ("@rpc/path", "path"):
         answer = outsider.ask(name)
         assert answer == path
@@ -137,7 +137,7 @@ def test_who_asks_gets_the_same_bytes(path, outsider):
         assert outsider.ask(name).json()["state"] == "covering"
 
 
-def test_who_comes_late_gets_it_at_once(path, outsider):
+def test_a_late_joiner_gets_the_path_at_once(path, outsider):
     receiver = outsider.listen("path")
     assert receiver.wait(lambda heard: True) == path
     assert len(receiver.heard) == 1
@@ -163,7 +163,7 @@ def test_the_coverage_tells_what_is_where(path, pixels, outsider):
     assert len(where[100]) == cells.size - len(coverable_cells(pixels))
 
 
-def test_the_status_says_all_there_is_to_know(path, pixels, outsider, daemon):
+def test_the_status_has_all_its_members(path, pixels, outsider, daemon):
     status = outsider.wait_status(lambda status: status["coverage"] is not None)
     fits = coverable_cells(pixels)
     count = len(fits)

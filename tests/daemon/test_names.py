@@ -110,7 +110,7 @@ def waits(daemon):
     return "this one waits" in daemon.log_text()
 
 
-def test_of_two_begun_at_once_one_plans_and_the_other_follows_it(tmp_path, robot_at):
+def test_one_of_two_daemons_plans_and_the_other_succeeds_it(tmp_path, robot_at):
     endpoint = free_endpoint()
     with router_process(endpoint), two_daemons(tmp_path, endpoint, endpoint) as daemons:
         robot = robot_at(endpoint)
@@ -145,7 +145,7 @@ def test_of_two_begun_at_once_one_plans_and_the_other_follows_it(tmp_path, robot
         assert json.loads(until(lambda: robot.statuses.heard[-1:])[0].payload)["state"] != "blocked"
 
 
-def test_a_command_reaches_the_one_that_plans(tmp_path, robot_at):
+def test_a_command_reaches_the_daemon_that_plans(tmp_path, robot_at):
     endpoint = free_endpoint()
     with router_process(endpoint), two_daemons(tmp_path, endpoint, endpoint):
         robot = robot_at(endpoint)
@@ -207,7 +207,7 @@ def _stood_and_went_on(robot, before):
     return "0 steps then some" if False in goes and goes[-1] else ""
 
 
-def test_where_a_network_grows_together_one_goes_on(tmp_path, robot_at):
+def test_after_a_partition_one_daemon_continues(tmp_path, robot_at):
     """Each had its own router and planned; then a router connects the two."""
     one, other = free_endpoint(), free_endpoint()
     with router_process(one), router_process(other), two_daemons(tmp_path, one, other) as daemons:
@@ -259,7 +259,7 @@ def test_a_flood_of_claims_is_survived(tmp_path, robot_at):
         robot.wait_path(heard)
 
 
-def test_one_that_waits_holds_no_more_than_its_maps(tmp_path):
+def test_a_waiting_daemon_keeps_only_its_newest_maps(tmp_path):
     """Updates of all of a map, while it waits and while it loads: each was held."""
     side = 2000
     maps = {"max_pixels": side * side, "max_lattice_cells": 50_000}

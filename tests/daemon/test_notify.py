@@ -38,7 +38,7 @@ def test_each_word_is_one_datagram(listening):
     assert said == [b"STATUS=waiting", *words]
 
 
-def test_who_is_out_of_files_is_not_taken_for_dead(listening):
+def test_a_process_without_descriptors_still_feeds_the_watchdog(listening):
     heard, name = listening
     manager = ServiceManager({"NOTIFY_SOCKET": name})
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -50,7 +50,7 @@ def test_who_is_out_of_files_is_not_taken_for_dead(listening):
     assert heard.recv(4096) == b"WATCHDOG=1"
 
 
-def test_a_status_is_one_line_and_told_once(listening):
+def test_a_status_is_one_line_and_sent_once(listening):
     heard, name = listening
     manager = ServiceManager({"NOTIFY_SOCKET": name})
     for text in ("two\nlines", "two\nlines", "another"):
@@ -83,17 +83,17 @@ def test_children_inherit_nothing_to_speak_with():
         ({}, 0.0),
     ],
 )
-def test_a_watchdog_is_ours_or_none(environ, seconds):
+def test_only_the_watchdog_of_this_process_counts(environ, seconds):
     assert ServiceManager(environ).watchdog_s == seconds
 
 
-def test_a_manager_that_is_gone_costs_nothing_but_a_warning(tmp_path, caplog):
+def test_a_gone_manager_is_only_a_warning(tmp_path, caplog):
     manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
     manager.ready()
     assert "does not accept READY" in caplog.text
 
 
-def test_a_status_that_was_not_taken_is_told_again(tmp_path):
+def test_a_status_that_was_not_received_is_sent_again(tmp_path):
     name = str(tmp_path / "notify")
     manager = ServiceManager({"NOTIFY_SOCKET": name})
     manager.status("waiting")
@@ -104,7 +104,7 @@ def test_a_status_that_was_not_taken_is_told_again(tmp_path):
         assert heard.recv(4096) == b"STATUS=waiting"
 
 
-def test_a_busy_manager_hears_that_it_is_ready(tmp_path):
+def test_a_busy_manager_receives_readiness(tmp_path):
     name = str(tmp_path / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as heard:
         heard.bind(name)
@@ -121,7 +121,7 @@ def test_a_busy_manager_hears_that_it_is_ready(tmp_path):
             said.append(heard.recv(4096))
 
 
-def test_without_one_nothing_is_said(caplog):
+def test_without_a_manager_nothing_is_logged(caplog):
     manager = ServiceManager({})
     manager.ready()
     assert not manager.is_present

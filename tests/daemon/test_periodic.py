@@ -61,7 +61,7 @@ def test_an_unchanged_floor_is_published_again_after_a_while():
     assert len(sent.messages) == 4
 
 
-def test_the_trail_is_kept_without_listeners_and_sent_as_soon_as_there_is_one():
+def test_the_trail_is_sent_once_there_is_a_subscriber():
     drive, sent = settled(*BOTH), Sent(is_heard=False)
     start(drive, f"room {room_at(drive, *IN_EAST).id}")
     drive.plan()

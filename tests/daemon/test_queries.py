@@ -59,7 +59,7 @@ def covering(tmp_path_factory):
         yield outsider
 
 
-def test_versions(covering):
+def test_the_versions_are_answered(covering):
     answer = covering.ask("@rpc/version").json()
     assert answer == {
         "package": "fasaco-edge",
@@ -86,19 +86,19 @@ def test_secrets_are_left_out():
 
 
 @pytest.mark.parametrize("name", ["xyz", "paths", "Path", "pa$*x"])
-def test_who_asks_for_what_is_not_there_hears_what_is(covering, name):
+def test_an_unknown_query_lists_the_known_ones(covering, name):
     answer = error(covering, f"@rpc/{name}")
     assert answer["code"] == "unknown_query"
     assert all(known in answer["message"] for known in RPC_NAMES)
 
 
 @pytest.mark.parametrize("name", ["path", "status", "coverage", "pheromone", "config", "version"])
-def test_what_is_there_is_answered_once(covering, name):
+def test_a_known_query_gets_one_answer(covering, name):
     (reply,) = get(covering, f"@rpc/{name}")
     assert str(reply.ok.key_expr) == f"{covering.prefix}/@rpc/{name}"
 
 
-def test_who_asks_for_everything_gets_it_and_changes_nothing(covering):
+def test_a_query_for_everything_changes_nothing(covering):
     before = covering.ask_status()["plan"]["plans"]
     replies = get(covering, "@rpc/*")
     answered = {str(reply.ok.key_expr).rpartition("/")[2] for reply in replies if reply.ok}
@@ -127,7 +127,7 @@ def test_parameters_of_zenoh_are_stepped_over(covering):
     assert get(covering, "@rpc/version?_time=[now(-1h)..]")[0].ok is not None
 
 
-def test_the_living_trail_is_told_though_nobody_listens(covering):
+def test_the_living_trail_is_answered_without_subscribers(covering):
     def told() -> tuple[bytes, dict]:
         reply = covering.ask("@rpc/pheromone")
         return reply.payload, json.loads(reply.attachment)
@@ -160,7 +160,7 @@ def test_a_full_plan_is_made_when_asked_for_but_not_all_the_time(covering):
     assert len(path.heard) == len(commands.heard) == 1
 
 
-def test_a_path_that_was_asked_for_says_so(tmp_path):
+def test_a_requested_path_has_that_reason(tmp_path):
     with (
         daemon_process(tmp_path, planner={"budget_s": 0.05}) as running,
         Outsider(running.endpoint) as outsider,

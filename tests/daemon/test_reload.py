@@ -59,7 +59,7 @@ def taken_by(reload: Reload) -> tuple[DaemonConfig, list[BadConfiguration]]:
         {"robot": {"speed_m_s": 1.0, "quarter_turn_s": 0.0}},
     ],
 )
-def test_what_can_change_is_taken(sections, caplog):
+def test_changeable_keys_take_effect(sections, caplog):
     written = configured(**sections)
     caplog.set_level("INFO")
     assert reloaded(written) == written
@@ -81,18 +81,18 @@ def test_what_can_change_is_taken(sections, caplog):
         ("ros2", {"ros2": {"kind": "bridge"}}),
     ],
 )
-def test_what_cannot_is_named_and_left_as_it_is(key, sections, caplog):
+def test_other_keys_are_named_and_unchanged(key, sections, caplog):
     assert reloaded(configured(**sections)) == RUNNING
     assert f"{key}: needs a restart" in caplog.text
 
 
-def test_of_both_each_goes_its_own_way():
+def test_changeable_and_other_keys_are_separated():
     written = configured(robot={"name": "other", "speed_m_s": 2.0})
     taken = reloaded(written)
     assert (taken.robot.name, taken.robot.speed_m_s) == ("robot", 2.0)
 
 
-def test_what_is_wrong_is_kept_out(caplog):
+def test_an_invalid_file_changes_nothing(caplog):
     def read() -> DaemonConfig:
         raise BadConfiguration("planner.ants: expected int, got 'many'")
 

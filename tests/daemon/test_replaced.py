@@ -16,7 +16,7 @@ from tests.support.outsider import Outsider
 from tests.support.rooms import FREE, WALL, fill, map_bytes, pose_bytes, room
 from tests.support.waiting import until
 
-# Replacements until all caches are full, and those after that which are measured.
+# Number of replacements until all caches are full, and of measured ones after that.
 FIRST, MEASURED = 20, 40
 # What one may keep, on average [MB]. After the first, memory grows by 1 to 4 MB and then no more;
 # with each mission kept it would grow by 9 MB.
@@ -81,7 +81,7 @@ def send_mask(running, outsider, square):
 
 
 @pytest.mark.parametrize("replace", [reload, send_mask])
-def test_what_a_mission_used_is_released_when_it_is_replaced(tmp_path, replace):
+def test_a_replaced_mission_releases_its_memory(tmp_path, replace):
     mission = {} if replace is reload else dict(MISSION)
     with (
         service(tmp_path, mission=mission, executed=True) as (running, _),

@@ -66,7 +66,7 @@ def wait_cells(folder: Path, cells: int) -> None:
             written = decode_ledger(newest.read_bytes(), CELL_M).cells
 
 
-def test_a_daemon_that_is_killed_at_random_moments_goes_on(tmp_path):
+def test_a_daemon_killed_at_random_moments_continues(tmp_path):
     figures = run_campaign(tmp_path, KILLS, "office")
     print(figures)
     assert figures["resumed"] == KILLS
@@ -74,7 +74,7 @@ def test_a_daemon_that_is_killed_at_random_moments_goes_on(tmp_path):
     assert figures["lost_s_max"] <= 10 * MOST_LOST_S
 
 
-def test_it_goes_on_where_it_was_told_to_end(covered):
+def test_it_continues_where_sigterm_ended_it(covered):
     """SIGTERM loses nothing at all."""
     with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
         status = outsider.ask_status()
@@ -104,7 +104,7 @@ def trail_of(outsider: Outsider) -> tuple[PheromoneMessage, int]:
     return decode_pheromone(told.payload), json.loads(told.attachment)["revision"]
 
 
-def test_the_trail_goes_on_where_it_was_after_a_kill(tmp_path):
+def test_the_trail_survives_a_kill(tmp_path):
     with daemon_process(tmp_path) as running, Outsider(running.endpoint) as outsider:
         begin(outsider)
         drive(outsider, lanes(30))
@@ -133,7 +133,7 @@ def test_a_fresh_start_covers_everything_and_throws_nothing_away(covered):
     assert [name for name in state_files(covered) if name.startswith("robot.ledger.fresh-")]
 
 
-def test_another_tool_goes_on_with_the_floor_that_is_swept(covered):
+def test_another_tool_width_keeps_the_swept_floor(covered):
     robot = {"tool_width_m": 0.25}
     with daemon_process(covered, robot=robot) as running, Outsider(running.endpoint) as outsider:
         status = begin(outsider)
@@ -145,7 +145,7 @@ def test_another_tool_goes_on_with_the_floor_that_is_swept(covered):
         assert begin(outsider)["coverage"]["covered"] >= COVERED - 1
 
 
-def test_another_building_is_told_and_begun_anew(covered):
+def test_another_building_is_reported_and_covered_from_zero(covered):
     with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:
         outsider.put("pose", pose_bytes(0.45, 0.45))
         outsider.put("map", map_bytes(pillars()))
@@ -165,7 +165,7 @@ def test_another_building_is_told_and_begun_anew(covered):
         assert outsider.ask_status()["ledger"]["restored_cells"] == 1
 
 
-def test_a_map_that_has_just_begun_costs_nothing(covered):
+def test_a_map_that_has_just_begun_keeps_the_progress(covered):
     """A mapper restarted with the daemon knows only what is around the robot."""
     small = np.where(np.hypot(*np.indices(HALL.shape)) < 20, HALL, -1).astype(np.int8)
     with daemon_process(covered) as running, Outsider(running.endpoint) as outsider:

@@ -104,7 +104,7 @@ def test_rooms_are_named_ordered_and_known_again(tmp_path):
         assert [room["name"] for room in rooms_of(outsider)["rooms"]].count("kitchen") == 1
 
 
-def test_a_broken_file_is_a_named_fault_and_no_more(tmp_path):
+def test_a_broken_file_of_rooms_is_only_a_named_fault(tmp_path):
     state = tmp_path / "state"
     state.mkdir()
     (state / "robot.rooms.json").write_text("{}")

@@ -55,7 +55,7 @@ def written(book):
     return encode_rooms(book)
 
 
-def test_a_book_is_read_as_it_was_written():
+def test_a_written_book_of_rooms_is_read_back():
     book = full()
     again = decode_rooms(written(book))
     assert [sheet.frame for sheet in again.sheets] == ["map", "downstairs"]
@@ -133,7 +133,7 @@ WRONG = [
 
 
 @pytest.mark.parametrize(("payload", "why"), WRONG)
-def test_what_is_no_file_of_rooms_is_refused_as_a_whole(payload, why):
+def test_an_invalid_file_of_rooms_is_refused_as_a_whole(payload, why):
     octets = payload if isinstance(payload, bytes) else json.dumps(payload).encode()
     with pytest.raises(RoomsFileError, match="no file of rooms") as refused:
         decode_rooms(octets)
@@ -160,7 +160,7 @@ def kept(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_changes_are_on_disk_and_come_back(tmp_path):
+def test_changes_are_written_and_restored(tmp_path):
     keeper = RoomsKeeper(RoomsFile(tmp_path, "robot"))
     for _ in range(HOLD_CHANGE):
         update(keeper.book, found(), "map")
@@ -188,7 +188,7 @@ def test_without_rooms_nothing_is_written(tmp_path):
     assert not (tmp_path / "state").exists()
 
 
-def test_a_broken_file_is_set_aside_and_everything_goes_on(tmp_path):
+def test_a_broken_file_is_set_aside_and_the_daemon_continues(tmp_path):
     (tmp_path / "robot.rooms.json").write_bytes(b"{")
     keeper = RoomsKeeper(RoomsFile(tmp_path, "robot"))
     (fault,) = keeper.take_faults()

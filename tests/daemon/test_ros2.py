@@ -141,7 +141,7 @@ def test_updates_find_the_map_of_ros_and_poses_their_type(naming, tmp_path):
         assert status["errors"]["by_code"] == {"patch_without_base": 1}
 
 
-def test_broken_transforms_cost_themselves_alone(tmp_path):
+def test_broken_transforms_affect_no_others(tmp_path):
     with (
         daemon_process(tmp_path, ros2=ros2(RMW)) as running,
         ros_robot(running.endpoint, RMW) as robot,
@@ -245,7 +245,7 @@ def test_services_command_the_mission_and_diagnostics_show_it(naming, tmp_path):
     }
 
 
-def test_two_robots_on_one_router_do_not_hear_each_other(tmp_path):
+def test_two_robots_on_one_router_stay_separate(tmp_path):
     first, second = Naming(RMW.domain, "/robot1"), Naming(RMW.domain, "/robot2")
     with (
         daemon_process(tmp_path, ros2=ros2(first)) as one,
@@ -296,7 +296,7 @@ def test_it_is_small_with_ros(tmp_path):
 
 
 @pytest.mark.parametrize("naming", [RMW, BRIDGE], ids=["rmw_zenoh", "bridge"])
-def test_where_names_are_shown_ros_has_a_role_of_its_own(naming, tmp_path):
+def test_on_a_bus_with_names_ros_has_a_role_of_its_own(naming, tmp_path):
     for name, text in (("own.txt", "secret\n"), ("all.txt", "ros:one\neye:two\n")):
         (tmp_path / name).write_text(text)
     files = {

@@ -103,7 +103,7 @@ class _Heard:
             self._session.put(f"{PREFIX}/{name}", payload)
 
 
-def test_a_client_waits_for_its_router_and_says_so(tmp_path):
+def test_a_client_waits_for_its_router_and_logs_that(tmp_path):
     endpoint = free_endpoint()
     bus = {"mode": "client", "listen": [], "connect": [endpoint]}
     with daemon_process(tmp_path, bus=bus) as daemon:

@@ -68,7 +68,7 @@ def members(seat):
     return [member["name"] for member in status(seat)["fleet"]["members"]]
 
 
-def test_a_mapper_is_heard_by_its_own_robot_alone(office, sender):
+def test_a_mapper_reaches_only_its_own_robot(office, sender):
     first, second = office
     slam = sender("slam-r1")
     for robot in FLEET:
@@ -128,7 +128,7 @@ def test_a_viewer_views_both(ca, endpoint):
             assert list(tablet.session.get(key, timeout=SILENCE_S, payload=PAUSE)) == []
 
 
-def test_a_robot_alone_claims_its_name(office, sender, ca, endpoint, tmp_path):
+def test_only_a_robot_can_claim_its_own_name(office, sender, ca, endpoint, tmp_path):
     """Whoever else says that it plans is not heard; a second daemon with its certificate is."""
     sessions = [sender(name) for name in ("slam-r1", "tablet", "office", "r2")]
     tokens = [s.liveliness().declare_token("fasaco/@v1/r1/claim/0/plans") for s in sessions]

@@ -58,7 +58,7 @@ def unharmed(boss):
     assert mission(boss.ask_status()) == mission(before)
 
 
-def test_a_mapper_is_heard_and_a_viewer_sees(house, boss):
+def test_a_mapper_may_publish_and_a_viewer_may_view(house, boss):
     with house.guest("eye") as eye, house.sender("slam") as slam:
         path = eye.listen("path")
         path.wait(lambda heard: heard.payload != b"")
@@ -69,7 +69,7 @@ def test_a_mapper_is_heard_and_a_viewer_sees(house, boss):
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "slam"])
-def test_nobody_else_gives_maps_and_poses(house, unharmed, name):
+def test_other_roles_cannot_publish_maps_and_poses(house, unharmed, name):
     with house.sender(name) as sender:
         sender.put("map", map_bytes(room(3.0, 3.0)))
         sender.put("map_update", b"")
@@ -85,7 +85,7 @@ def test_a_mapper_may_not_speak_to_many_at_once(house, unharmed, key):
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "boss"])
-def test_nobody_else_commands(house, unharmed, name):
+def test_other_roles_cannot_command(house, unharmed, name):
     with house.sender(name) as sender:
         for payload in (PAUSE, None):
             key = f"{sender.prefix}/@rpc/mission"
@@ -100,7 +100,7 @@ def test_an_operator_commands(boss):
         boss.wait_status(lambda status, state=state: status["state"] == state)
 
 
-def test_who_has_no_role_hears_nothing(house):
+def test_a_participant_without_a_role_receives_nothing(house):
     receiver, tokens = Collector(), []
     with house.sender("stranger") as stranger:
         session, prefix = stranger.session, stranger.prefix
@@ -119,7 +119,7 @@ def test_who_has_no_role_hears_nothing(house):
 
 
 @pytest.mark.parametrize("name", ["eye", "slam", "boss", "stranger"])
-def test_nobody_passes_for_the_robot(house, boss, name):
+def test_no_other_role_can_publish_as_the_robot(house, boss, name):
     """Neither by what it says, nor by an answer, nor by a token."""
     with house.sender(name) as sender:
         receiver = boss.listen("path", late=False)
@@ -154,7 +154,7 @@ def test_a_map_beyond_the_limit_is_dropped_unread(tmp_path):
             boss.wait_status(lambda s: s["map"]["revision"] == before["map"]["revision"] + 1)
 
 
-def test_of_a_flood_few_are_taken_in_and_the_last_in_the_end(house, boss):
+def test_a_flood_of_maps_is_thinned_and_ends_with_the_newest(house, boss):
     before = boss.ask_status()
     flood, last = map_bytes(pillared_room()), map_bytes(pillared_room(), stamp_ns=7)
     with house.sender("slam") as slam:

@@ -70,7 +70,7 @@ def rewritten(running: Daemon, **sections) -> None:
     running.process.send_signal(signal.SIGHUP)
 
 
-def test_a_reload_is_told_and_in_force(tmp_path):
+def test_a_reload_is_announced_and_takes_effect(tmp_path):
     with service(tmp_path) as (running, manager), Outsider(running.endpoint) as outsider:
         rewritten(running, planner={"seed": 7})
         reloading = manager.wait("RELOADING=1")

@@ -66,7 +66,7 @@ def test_each_update_finds_the_map_of_its_frame():
     assert before.events[-1] is pose
 
 
-def test_what_misfits_is_told_at_once():
+def test_an_update_that_does_not_fit_is_refused_at_once():
     before = HeldEvents()
     assert [str(fault) for fault in before.take([update(0)])] == [
         "map update refused: there is no map yet"
@@ -104,7 +104,7 @@ def start(runner: MissionRunner, **order):
     return answer.error
 
 
-def test_an_order_by_room_before_any_map_belongs_to_the_frame_of_the_room():
+def test_an_order_for_a_room_belongs_to_the_frame_of_the_room():
     """Its outline would lie anywhere on the map of another one."""
     runner = runner_of(DaemonConfig(), rooms=two_rooms())
     runner.rooms.name(1, "kitchen")
@@ -114,7 +114,7 @@ def test_an_order_by_room_before_any_map_belongs_to_the_frame_of_the_room():
     assert state.in_other_frame("it moved").order is None
 
 
-def test_a_zone_named_before_a_map_applies_to_its_map_alone():
+def test_a_zone_named_before_a_map_applies_only_to_its_map():
     kitchen = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5]]}
     mission = {"map_frame": "floor_1", "zones": [kitchen]}
     runner = runner_of(msgspec.convert({"mission": mission}, DaemonConfig))

@@ -67,7 +67,7 @@ def test_a_map_at_the_limit_is_covered(tmp_path):
             receiver.wait(lambda heard: True)
 
 
-def test_a_planner_that_breaks_costs_this_map_alone(breaking):
+def test_a_failing_planner_affects_only_this_map(breaking):
     running, client = breaking
     client.put("map", map_bytes(room(PLANNER_M, 3.0)))
     status = stand(client, lambda status: status["state"] == "blocked")
@@ -78,7 +78,7 @@ def test_a_planner_that_breaks_costs_this_map_alone(breaking):
     assert running.log_text().count("Traceback") == 1
 
 
-def test_a_message_that_cannot_be_made_costs_this_message_alone(breaking):
+def test_an_unencodable_message_affects_no_other(breaking):
     running, client = breaking
     client.listen("pheromone", late=False)
     client.put("map", map_bytes(room(PHEROMONE_M, 3.0)))

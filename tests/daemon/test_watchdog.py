@@ -104,7 +104,7 @@ def test_it_is_fed_in_time_and_not_at_every_turn():
     assert told.beats in (10, 11)
 
 
-def test_a_status_is_told_in_a_line():
+def test_a_status_is_one_line_for_systemd():
     status = Status(
         state="covering",
         coverage=CoverageReport(covered_m2=12.3, to_cover_m2=48.9, fraction=0.9991),
@@ -121,7 +121,7 @@ def test_a_status_is_told_in_a_line():
     assert status_line(Status(state="waiting", reason="no map")) == "waiting: no map"
 
 
-def test_how_long_turns_take_is_told_to_within_ten_percent():
+def test_durations_of_cycles_are_right_to_ten_percent():
     seconds = np.random.default_rng(1).lognormal(-7.0, 2.0, 20_000)
     times = CycleTimes()
     assert times.report() == LoopTimes()
@@ -136,7 +136,7 @@ def test_how_long_turns_take_is_told_to_within_ten_percent():
         assert true <= getattr(told, name) + 0.001 <= 1.1 * true + 0.002
 
 
-def test_turns_beyond_every_bucket_are_told_too():
+def test_cycles_beyond_all_buckets_are_counted():
     times = CycleTimes()
     for seconds in (0.0, 1e-9, 1e7):
         times.note(seconds)

@@ -68,11 +68,11 @@ def test_another_than_root(robot):
     assert "only root may" in refused(robot, *words)
 
 
-def test_no_python(robot):
+def test_an_installation_without_python_is_refused(robot):
     assert "there is no /usr/bin/python3" in apart(robot, f"{HIDE} $(readlink -f /usr/bin/python3)")
 
 
-def test_a_python_where_a_service_cannot_reach_it(robot):
+def test_a_python_that_a_service_cannot_reach_is_refused(robot):
     robot.run("mkdir", "-p", "/home/maja")
     words = "mount --bind /usr /home/maja"
     told = apart(robot, words, "--python", "/home/maja/bin/python3")
@@ -80,23 +80,23 @@ def test_a_python_where_a_service_cannot_reach_it(robot):
     assert "a service cannot reach" in told
 
 
-def test_no_systemd(robot):
+def test_an_installation_without_systemd_is_refused(robot):
     assert "there is no systemd here" in apart(robot, f"{HIDE} /usr/bin/systemctl")
 
 
-def test_a_systemd_that_does_not_run(robot):
+def test_a_systemd_that_does_not_run_is_refused(robot):
     told = apart(robot, "mount -t tmpfs nothing /run/systemd")
     assert "installed but does not run" in told
     assert "--no-start" in told
 
 
-def test_no_wheels(robot):
+def test_an_installation_without_wheels_is_refused(robot):
     told = refused(robot, INSTALL, "--wheels", "/etc")
     assert "/etc is no folder of wheels" in told
     assert "make wheelhouse" in told
 
 
-def test_wheels_for_another_computer(robot):
+def test_wheels_for_another_computer_are_refused(robot):
     told = refused(robot, f"/srv/{ELSEWHERE}/install.sh")
     assert "these wheels are for riscv64" in told
     assert "Python 3.99" in refused(robot, f"/srv/{NEWER}/install.sh")
@@ -124,7 +124,7 @@ def test_two_at_once(robot):
     robot.run("rmdir", PREFIX)
 
 
-def test_one_that_is_interrupted_leaves_nothing(robot):
+def test_an_interrupted_installation_leaves_nothing(robot):
     before = robot.files()
     with subprocess.Popen(robot.words(INSTALL), stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout.readline().startswith("build version 1.0")
@@ -134,7 +134,7 @@ def test_one_that_is_interrupted_leaves_nothing(robot):
     assert robot.files().keys() - before.keys() == set()
 
 
-def test_a_folder_that_somebody_has_prepared(robot):
+def test_a_folder_prepared_by_another_user_is_not_loaded(robot):
     """What lies where root calls it, or where the environment points, is never run."""
     planted, mark = "/srv/planted", "/srv/planted/LOADED"
     for name in ("venv", "sysconfig", "platform", "zipfile", "sitecustomize", "os"):

@@ -15,7 +15,7 @@ def test_it_says_that_it_is_ready(service: Service):
     assert ready["PRIORITY"] == "6"
 
 
-def test_why_it_did_not_start_is_an_error(service: Service):
+def test_the_reason_of_a_failed_start_is_an_error_entry(service: Service):
     service.configure("robot: {radius_m: -1}\n")
     service.start(fails=True)
     (failure,) = [line for line in service.journal() if line["PRIORITY"] == "3"]

@@ -49,7 +49,7 @@ def test_process_one_is_systemd_and_what_is_installed_runs(lab):
     assert seconds < 15.0, "the kernels were compiled again"
 
 
-def test_what_is_written_inside_stays_inside(lab):
+def test_files_written_inside_stay_inside(lab):
     lab.write(MARK, "here")
     assert lab.run("cat", MARK).stdout == "here"
     assert not Path(MARK).exists()
@@ -66,7 +66,7 @@ def test_a_lab_ends_with_the_process_that_booted_it(tmp_path):
     until(lambda: not is_running(systemd))
 
 
-def test_nothing_is_left_of_a_lab(tmp_path):
+def test_a_failed_lab_leaves_nothing_behind(tmp_path):
     if reason := why_not():
         pytest.skip(reason)
     before = cgroups()
@@ -79,7 +79,7 @@ def test_nothing_is_left_of_a_lab(tmp_path):
     assert str(tmp_path) not in Path("/proc/mounts").read_text()
 
 
-def test_what_is_installed_on_the_machine_meanwhile_is_not_seen(lab):
+def test_files_of_the_machine_are_not_visible_inside(lab):
     names = ("/etc", "/opt", "/usr/local/bin", "/var/lib", "/var/cache", "/var/log")
     marks = [Path(folder, f"fasaco-edge-lab-{os.getpid()}") for folder in names]
     try:

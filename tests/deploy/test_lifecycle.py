@@ -63,7 +63,7 @@ def test_it_is_not_ready_before_the_kernels_are_compiled(service: Service):
     assert service.show("Result") == "success"
 
 
-def test_kernels_that_are_all_there_are_found_again(service: Service):
+def test_complete_kernels_are_found_again(service: Service):
     marks = "/var/cache/private/fasaco-edge/numba"
     forget = ("sed", "-i", 's/"zigzag"/"another"/', "{}", "+")
     service.lab.run("find", marks, "-name", "manifest.json", "-exec", *forget)
@@ -71,7 +71,7 @@ def test_kernels_that_are_all_there_are_found_again(service: Service):
     assert "kernels compiled in" in service.text()
 
 
-def test_a_wrong_configuration_is_no_reason_to_try_again(service: Service):
+def test_an_invalid_configuration_is_not_retried(service: Service):
     service.configure("planner: {ants: many}\n")
     service.start(fails=True)
     assert service.show("ExecMainStatus") == "78"
@@ -81,7 +81,7 @@ def test_a_wrong_configuration_is_no_reason_to_try_again(service: Service):
     assert "planner.ants: expected int, got 'many'" in service.text()
 
 
-def test_whatever_ends_it_it_comes_back(service: Service):
+def test_the_service_restarts_after_any_end(service: Service):
     service.start()
     before = service.pid
     service.signal("SEGV")

@@ -14,7 +14,7 @@ from tests.support.processes import STOP_S
 ENDLESS = {"ants": 1_000_000, "budget_s": 3600.0, "name": "fasaco"}
 
 
-def test_a_hang_is_ended_and_the_mission_goes_on(service: Service):
+def test_a_hanging_daemon_is_ended_and_the_mission_continues(service: Service):
     # With the unit's own watchdog: on a slow machine a shorter one ends a daemon that only loads.
     service.start()
     with robot(service.lab):
@@ -43,7 +43,7 @@ def test_it_ends_in_time_while_it_plans(service: Service):
     assert (service.show("Result"), service.show("ExecMainStatus")) == ("success", "0")
 
 
-def test_a_full_disk_is_said_and_the_mission_goes_on(service: Service):
+def test_a_full_disk_is_reported_and_the_mission_continues(service: Service):
     lab = service.lab
     service.start()
     service.stop()  # its folders are there now

@@ -12,7 +12,7 @@ def reload(service: Service) -> None:
     wait_for(lambda: service.show("ActiveState") == "active", 5.0, "reloaded")
 
 
-def test_a_good_configuration_is_taken_and_the_mission_goes_on(service: Service):
+def test_a_valid_reload_takes_effect_during_a_mission(service: Service):
     service.start()
     process = service.pid
     with robot(service.lab):

@@ -33,7 +33,7 @@ def test_each_needs_what_it_needs_on_the_robot_and_not_here(tmp_path):
     assert set(closure_of(tmp_path, PI, ()).files) == {"fasaco-edge", "for-pi", "deeper", "new"}
 
 
-def test_what_is_missing_is_named_with_who_needs_it(tmp_path):
+def test_a_missing_wheel_is_named_with_its_dependant(tmp_path):
     write_wheel(tmp_path, "fasaco_edge", "1.0", needs=OURS)
     write_wheel(tmp_path, "kernels", "2.1", needs=("arrays>=1",))
     with pytest.raises(IncompleteError, match="kernels needs arrays>=1: no wheel"):

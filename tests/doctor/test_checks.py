@@ -56,7 +56,7 @@ def at(
         (MetricsConfig("10.0.0.7:9465", open_to_everyone=True), "other computers"),
     ],
 )
-def test_who_may_read_the_figures_is_told(metrics, where):
+def test_readers_of_the_metrics_are_listed(metrics, where):
     details = security.endpoints(CheckContext(DaemonConfig(metrics=metrics))).details
     assert details[-1] == (
         f"http://{metrics.listen}/metrics: figures, from {where}, without password"
@@ -132,7 +132,7 @@ def test_this_computer_has_a_clock():
     assert error_s >= 0.0
 
 
-def test_a_computer_that_forgot_the_time_is_told(monkeypatch):
+def test_a_reset_clock_fails_the_check(monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 4.0)
     found = machine.clock(CheckContext(DaemonConfig()))
     assert found.level is Level.FAIL
@@ -186,7 +186,7 @@ def test_folders_and_who_may_write_there(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["config.yaml", "state"]
 
 
-def test_a_read_only_disk_is_told(tmp_path):
+def test_a_read_only_disk_fails_the_check(tmp_path):
     config = DaemonConfig(mission=MissionSettings(state_dir="/proc/x"))
     read_only = next(
         (
@@ -203,7 +203,7 @@ def test_a_read_only_disk_is_told(tmp_path):
     assert "read-only" in installation.disk(CheckContext(config)).found
 
 
-def test_what_lies_in_place_of_the_ledgers_lock(tmp_path):
+def test_a_link_in_place_of_the_lock_fails_the_check(tmp_path):
     config = DaemonConfig(mission=MissionSettings(state_dir=str(tmp_path)))
     assert installation.disk(CheckContext(config)).level is Level.OK
     lock = tmp_path / "robot.ledger.lock"
@@ -214,7 +214,7 @@ def test_what_lies_in_place_of_the_ledgers_lock(tmp_path):
     assert found.to_do == f"remove {lock}"
 
 
-def test_kernels_that_are_not_there_or_are_somebody_elses(tmp_path, monkeypatch):
+def test_missing_or_foreign_kernels_are_reported(tmp_path, monkeypatch):
     told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
     context = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
     found = installation.kernels(context)
@@ -258,7 +258,7 @@ def test_kernels_that_are_damaged(tmp_path, monkeypatch):
     assert installation.kernels(CheckContext(DaemonConfig())).level is Level.OK
 
 
-def test_nobody_is_there():
+def test_an_empty_bus_is_reported():
     endpoint = free_endpoint()
     alone = at(endpoint)
     assert session.session(alone).details == (f"{endpoint}: free",)
@@ -328,7 +328,7 @@ def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
         assert session.peers(context).found.startswith("the daemon runs: covering, path ")
 
 
-def test_who_publishes_is_heard_without_a_daemon(tmp_path):
+def test_publishers_are_found_without_a_daemon(tmp_path):
     with (
         daemon_process(tmp_path) as other,
         Outsider(other.endpoint),  # there as soon as the daemon is
@@ -344,7 +344,7 @@ def test_who_publishes_is_heard_without_a_daemon(tmp_path):
     assert f"map: 1 in {session.LISTEN_S} s" in found.details
 
 
-def test_a_program_that_says_nothing_hangs_nobody():
+def test_a_silent_program_does_not_block_the_report():
     """Something listens and never answers: the report is there in time all the same."""
     with socket.socket() as mute:
         mute.bind(("127.0.0.1", 0))
@@ -357,7 +357,7 @@ def test_a_program_that_says_nothing_hangs_nobody():
     assert told["slow"].level in (Level.WARN, Level.FAIL)
 
 
-def test_a_check_that_fails_costs_its_own_line():
+def test_a_crashing_check_fails_only_its_own_line():
     def stumble(_: CheckContext) -> Finding:
         raise KeyError("what")
 

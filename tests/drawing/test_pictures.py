@@ -117,7 +117,7 @@ def test_the_map_may_be_turned():
     assert np.count_nonzero(left & low) > 1.5 * np.count_nonzero(~left & low)
 
 
-def test_covered_again_left_out_and_unreachable_are_told_apart():
+def test_revisited_missed_and_unreachable_cells_look_different():
     free = np.ones((5, 9), bool)
     free[:, 6] = False
     lattice = CoverageLattice.from_free(free)

@@ -31,7 +31,7 @@ def test_spread_holds_every_value(values):
     assert {spread.low, spread.high} <= set(values)
 
 
-def test_spread_of_nothing_is_said_as_such():
+def test_a_spread_without_values_is_none():
     assert Spread.of([]) is None
     assert (median(None), document(None), text(None, 1)) == (None, None, ("-", "-"))
     assert text(Spread(2.04, 1.0, 3.0), 1) == ("2.0", "1.0 .. 3.0")

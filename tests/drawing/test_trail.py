@@ -15,7 +15,7 @@ def trail_of(*cells):
     return np.array([cells], np.float32)
 
 
-def test_a_cell_is_as_decided_as_its_strongest_step_stands_out():
+def test_decidedness_is_the_share_of_the_strongest_step():
     tau = trail_of((1, 0, 0, 0), (2, 0, 2, 0), (1, 1, 7, 1), (0, 0, 0, 0), (3, 0, 1, 0))
     pointed, decided = pointed_and_decided(tau)
     assert pointed[0].tolist() == [0, 0, 2, -1, 0]

@@ -15,7 +15,7 @@ def cancellations():
 
 @pytest.mark.parametrize("answer", [TAKEN, NO_SUCH_GOAL, ENDED_BEFORE, REJECTED, None])
 @pytest.mark.parametrize("accepted", [True, None])
-def test_a_goal_is_cancelled_each_second_until_the_server_confirms(cancellations, answer, accepted):
+def test_a_goal_is_cancelled_each_second_until_confirmed(cancellations, answer, accepted):
     """Also one whose answer was lost: docking cancelled such a goal for good."""
     cancellations.take_accepted(b"a", accepted)
     cancellations.add(b"a")
@@ -24,7 +24,7 @@ def test_a_goal_is_cancelled_each_second_until_the_server_confirms(cancellations
     assert cancellations.are_open == (answer in (REJECTED, None))
 
 
-def test_a_goal_that_was_just_sent_is_cancelled_again_once_it_is_there(cancellations):
+def test_a_goal_unknown_to_the_server_is_cancelled_again(cancellations):
     """The server may not know it yet when the request to cancel comes."""
     cancellations.add(b"a")
     assert cancellations.due(5.0) == [b"a"]
@@ -42,7 +42,7 @@ def test_a_goal_that_was_refused_or_has_ended_is_not_cancelled(cancellations, en
     assert cancellations.due(9.0) == []
 
 
-def test_without_any_answer_only_so_many_goals_are_cancelled(cancellations):
+def test_without_answers_cancellations_are_bounded(cancellations):
     for number in range(500):
         cancellations.add(bytes([number % 250, number // 250]))
     assert len(cancellations.due(0.0)) == MOST_CANCELLED

@@ -23,7 +23,7 @@ def test_time_goes_as_the_simulation_does_and_never_back():
     assert times == sorted(times)
 
 
-def test_between_two_poses_it_goes_on_for_a_while():
+def test_the_clock_runs_on_between_two_poses():
     clock = Clock(20.0)
     begun = clock.take_stamp(0, 100.0)
     assert clock.at(100.002) - begun == pytest.approx(0.04)

@@ -137,7 +137,7 @@ def test_a_corner_that_was_missed_is_driven_back_to():
     assert distances_to(np.array([(1, 1), (3.2, 1), (3, 1), (3, 3)]), way).max() < 0.02
 
 
-def test_a_corner_that_cannot_be_hit_is_not_returned_to_for_ever():
+def test_an_unreachable_corner_is_given_up():
     """A path began where the robot turns about: its pose went round that point for minutes."""
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0), left_m=0.1, pose_hz=5.0)
     loop.send([(1, 1), (1.02, 1.05), (1, 3), (3, 3)])
@@ -199,7 +199,7 @@ def test_it_stands_once_it_is_off_the_path():
     assert loop.world.activity.value == "idle"
 
 
-def test_off_its_path_it_joins_a_path_that_starts_ahead():
+def test_a_robot_off_its_path_joins_a_path_that_starts_ahead():
     """It once followed the path it had left, and then stood for good."""
     loop = ClosedLoop(ROOM, Pose2D(1.0, 1.0))
     loop.send([(1, 1), (5, 1)])

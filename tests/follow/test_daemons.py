@@ -70,7 +70,7 @@ def test_a_path_that_comes_before_its_claim_waits_for_it(daemons):
     assert daemons.news().path == path(B)
 
 
-def test_of_two_that_plan_it_is_the_one_that_will_go_on(daemons):
+def test_of_two_planners_the_smaller_id_counts(daemons):
     claim(daemons, B)
     daemons.take_path(path(B))
     assert (daemons.news().planner, daemons.news().path) == (A, None)
@@ -89,7 +89,7 @@ def test_a_flood_of_daemons_is_bounded_and_keeps_the_planner(daemons):
 
 
 @pytest.mark.parametrize("own", ["!x", "", "0A", "0a" * 17])
-def test_a_token_that_is_no_id_does_not_replace_the_planner(daemons, own):
+def test_an_invalid_token_does_not_replace_the_planner(daemons, own):
     """The daemons ignore it, too: the one that plans goes on."""
     daemons.take_claim(f"fasaco/@v1/robot/claim/{own}/plans", True)
     daemons.take_status(status_of(A), 1.0)
@@ -107,7 +107,7 @@ def test_the_planner_is_still_known_after_a_crowd_of_daemons(daemons):
 
 
 @pytest.mark.parametrize("own", ["!x", "0A", "0a" * 100_000])
-def test_nothing_is_kept_by_an_id_that_is_none(daemons, own):
+def test_invalid_ids_take_no_memory(daemons, own):
     for number in range(3):
         daemons.take_status(status_of(f"{own}{number}"), 1.0)
         daemons.take_path(path(f"{own}{number}"))

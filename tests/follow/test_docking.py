@@ -81,7 +81,7 @@ def test_it_docks_from_the_approach_and_undocks_before_driving(robot):
     assert robot.docking.holds == ""
 
 
-def test_a_degraded_robot_that_may_drive_leaves_its_dock_and_one_that_docks_goes_on(robot):
+def test_a_degraded_robot_undocks_only_if_it_may_drive(robot):
     robot.arrive(DOCK)
     goal = robot.started()
     robot.state = "degraded"
@@ -91,7 +91,7 @@ def test_a_degraded_robot_that_may_drive_leaves_its_dock_and_one_that_docks_goes
     assert robot.started()[0] is Move.UNDOCK
 
 
-def test_a_robot_that_is_switched_on_in_its_dock_undocks_first_and_one_that_passes_does_not(robot):
+def test_only_a_robot_started_in_its_dock_undocks_first(robot):
     assert Robot(here=DOCK).sent()[0] is Move.UNDOCK
     for x in (1.9, 2.0, 2.1):
         robot.here = Pose2D(x, 0.0)
@@ -111,7 +111,7 @@ def test_a_robot_that_is_switched_on_in_its_dock_undocks_first_and_one_that_pass
         (None, ""),
     ],
 )
-def test_an_error_is_told_and_tried_again_after_a_while(robot, ending, why):
+def test_an_error_is_reported_and_retried_after_a_pause(robot, ending, why):
     robot.arrive()
     pause_s = RETRY_S
     for _ in range(4):

@@ -100,7 +100,7 @@ NAN = bytes.fromhex("000000000000f87f")
         stops("no planner", lambda told: told.follower.take_planner(""), State.NO_DAEMON),
     ],
 )
-def test_it_stands_at_once_and_says_why_and_goes_on_when_that_is_over(told, act, state, words):
+def test_it_stands_with_a_reason_and_drives_on_afterwards(told, act, state, words):
     told.drive(1.0)
     command = told.step()
     assert (command.speed, told.follower.state) == (LIMITS.speed, State.DRIVING)
@@ -180,7 +180,7 @@ def test_a_pose_that_jumps_is_believed_if_it_stays(told, x, y, yaw):
     assert told.follower.state is State.OFF_PATH
 
 
-def test_it_resumes_with_the_same_daemon_once_that_has_sent_two_statuses(told):
+def test_it_resumes_after_two_statuses_of_the_same_daemon(told):
     told.follower.take_planner("")
     told.step()
     told.follower.take_planner("a1")
@@ -191,7 +191,7 @@ def test_it_resumes_with_the_same_daemon_once_that_has_sent_two_statuses(told):
     assert told.step().speed > 0.0
 
 
-def test_the_path_of_one_daemon_is_none_of_another(told):
+def test_a_path_is_valid_only_for_its_daemon(told):
     told.follower.take_planner("")
     told.follower.take_planner("b2")
     told.drive(0.2)
@@ -213,7 +213,7 @@ def test_a_daemon_that_says_nothing_stops_it(told):
     assert told.step().speed > 0.0
 
 
-def test_a_robot_that_does_not_move_is_left_alone_for_a_while(told):
+def test_a_robot_that_does_not_move_is_driven_less_often(told):
     """Against a wall, or with its wheels off the ground."""
     states = told.states_where_it_is(10.0)
     assert {*states} == {State.DRIVING, State.NOT_MOVING}
@@ -256,7 +256,7 @@ def test_a_path_that_comes_again_brings_no_more_tries(told, every_s):
     assert told.follower.state is State.NOT_MOVING
 
 
-def test_each_new_direction_gets_three_tries_and_no_more(told):
+def test_each_new_direction_gets_exactly_three_tries(told):
     """A stuck robot that gets paths to all sides tries each of them three times."""
     ways, pushed = [(5.0, 0.0), (0.0, 5.0), (-5.0, 0.0), (0.0, -5.0)], 0.0
     told.states_where_it_is(30.0)
@@ -276,7 +276,7 @@ def test_each_new_direction_gets_three_tries_and_no_more(told):
     assert told.follower.state is State.DRIVING
 
 
-def test_a_robot_that_somebody_turns_may_try_again(told):
+def test_a_robot_that_is_turned_by_hand_tries_again(told):
     told.states_where_it_is(30.0)
     for step in range(80):
         told.pose(yaw=min(0.02 * step, 0.8))
@@ -288,7 +288,7 @@ def test_a_robot_that_somebody_turns_may_try_again(told):
     ("speed", "turn_deg_s", "xy"),
     [(0.09, 60.0, [(0.0, 0.0), (5.0, 0.0)]), (0.3, 25.0, [(0.0, 0.0), (0.0, 5.0)])],
 )
-def test_a_slow_robot_that_does_not_move_is_seen_too(told, speed, turn_deg_s, xy):
+def test_a_slow_robot_that_does_not_move_is_detected(told, speed, turn_deg_s, xy):
     limits = replace(LIMITS, speed=speed, turn_rate=math.radians(turn_deg_s))
     told.begin_anew(xy, limits)
     assert State.NOT_MOVING in told.states_where_it_is(3.5)
@@ -303,7 +303,7 @@ def test_a_delayed_start_after_a_rest_is_not_a_stall(told):
     assert {*told.states_where_it_is(0.5)} == {State.DRIVING}
 
 
-def test_a_pose_whose_stamp_stays_is_no_new_one(told):
+def test_a_pose_with_an_old_stamp_does_not_count_as_new(told):
     for _ in range(round(1.0 / PERIOD_S)):
         told.pose(stamp_ns=7)
         command = told.step()

@@ -54,7 +54,7 @@ class Base:
 @pytest.mark.parametrize("hz", [2.0, 20.0])
 @pytest.mark.parametrize("noise_m", [0.0, 0.02, 0.08])
 @pytest.mark.parametrize("drift_m_s", [0.0, 0.01])
-def test_scatter_and_drift_of_poses_are_no_progress(noise_m, hz, drift_m_s):
+def test_scatter_and_drift_of_poses_do_not_count_as_progress(noise_m, hz, drift_m_s):
     bases = [Base(AHEAD, 0.0, noise_m, hz, drift_m_s, seed).run(120.0) for seed in range(4)]
     mean_s = sum(base.pushed_s for base in bases) / len(bases)
     # Two looks in a try at worst, and at times one that looks like progress.
@@ -76,7 +76,7 @@ def test_odometry_that_runs_on_while_wheels_slip_is_no_progress():
 @pytest.mark.parametrize(
     ("noise_m", "hz", "far_m"), [(0.0, 20.0, 0.15), (0.04, 20.0, 0.4), (0.08, 2.0, 1.0)]
 )
-def test_once_somebody_has_moved_it_it_goes_on(noise_m, hz, far_m):
+def test_a_robot_that_is_moved_by_hand_drives_on(noise_m, hz, far_m):
     base = Base(AHEAD, 0.0, noise_m, hz, seed=3).run(60.0)
     assert base.grip.is_lost(base._estimate, 0.0, 60.0)
     pushed_s = base.pushed_s

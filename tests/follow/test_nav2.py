@@ -177,7 +177,7 @@ def test_the_next_goal_is_sent_even_if_the_last_bend_was_cut():
     assert back.points[-1] == (3.0, -3.0)
 
 
-def test_where_the_rest_is_short_the_next_goal_waits_for_the_end():
+def test_before_a_short_rest_the_next_goal_waits_for_the_end():
     drive = Drive((0.0, 0.0), (3.0, 0.0), (2.8, 0.0))
     goal = drive.begun()
     for step in range(1, 300):
@@ -253,7 +253,7 @@ def test_a_new_path_the_same_way_does_not_shorten_the_pause():
     assert isinstance(goal, SendGoal)
 
 
-def test_replaced_goals_do_not_let_a_blocked_robot_push_forever():
+def test_replaced_goals_do_not_extend_a_blocked_robots_tries():
     """Each path differs, so that Nav2 gets it at once and restarts its progress checker."""
     drive, canceled_at = Drive(*LONG), None
     while canceled_at is None and drive.now < 3 * GIVE_UP_S:
@@ -293,7 +293,7 @@ def test_a_goal_that_is_not_taken_is_another_goal_later(answer, state, said, can
 
 
 @pytest.mark.parametrize("ending", [Ending(UNKNOWN), NO_ANSWER])
-def test_a_server_that_was_started_anew_gets_the_goal_again(ending):
+def test_a_restarted_server_gets_the_goal_again(ending):
     drive = Drive(*LONG)
     goal = drive.begun()
     drive.step(1.0)
@@ -378,7 +378,7 @@ def test_an_empty_path_cancels_what_there_is_and_so_does_the_end(answered):
     assert drive.follower.end() == [CancelGoal(again.id)]
 
 
-def test_an_old_pose_cancels_and_a_new_one_goes_on():
+def test_an_old_pose_cancels_the_goal_and_a_new_one_resends_it():
     drive = Drive(*LONG)
     goal = drive.begun()
     drive.now += 1.0
@@ -406,7 +406,7 @@ def test_a_controller_that_stands_is_asked_and_then_given_up(noise_m):
     assert requests.count(SendPiece) == 1
 
 
-def test_a_piece_ends_where_the_robot_turns_back_and_the_next_one_is_driven_backward():
+def test_a_piece_ends_at_a_change_of_direction():
     drive = Drive((0.0, 0.0), (3.0, 0.0), (1.0, 0.3), (4.0, 0.6), is_curved=True)
     goal = drive.begun()
     assert (goal.points[-1], goal.is_back, goal.end_yaw) == ((3.0, 0.0), False, None)
@@ -434,7 +434,7 @@ def test_a_path_may_begin_backward_and_lead_on_so():
     assert goal.end_yaw == pytest.approx(0.0)
 
 
-def test_poses_of_a_goal_driven_backward_face_away_from_their_way():
+def test_poses_of_a_backward_goal_face_away_from_their_way():
     points = [(1.0, 0.0), (0.0, 0.0)]
     facing = encode_goal(bytes(16), points, "map", 0, ())
     away = encode_goal(bytes(16), points, "map", 0, (), is_back=True)

@@ -94,7 +94,7 @@ def test_a_path_that_crosses_itself_is_driven_without_standing(base, tmp_path):
         (lambda base: base.plans(False), "no daemon"),
     ],
 )
-def test_what_stops_the_robot_cancels_its_goal(base, tmp_path, stop, why):
+def test_each_reason_to_stop_cancels_the_goal(base, tmp_path, stop, why):
     with driving(base, tmp_path, speed=0.3) as (look_alike, log):
         base.send_path((0.0, 0.0), (30.0, 0.0))
         poses = listen(base)
@@ -108,7 +108,7 @@ def test_what_stops_the_robot_cancels_its_goal(base, tmp_path, stop, why):
     assert done["x"] < 28.0
 
 
-def test_no_server_and_an_error_are_said_with_their_reasons(base, tmp_path):
+def test_a_missing_server_and_an_error_are_logged_with_reasons(base, tmp_path):
     base.says_poses = True
     robot = {"endpoint": base.endpoint, "domain": 7, "start": (0.0, 0.0)}
     ros2 = {**kind_of(7), "nav2": {"controller": "Nothing"}}

@@ -80,7 +80,7 @@ def test_a_crossing_ends_a_piece_before_it():
     assert NEAR <= y <= NEAR + 2 * STEP_M
 
 
-def test_what_begins_later_may_go_further():
+def test_a_piece_that_begins_later_may_be_longer():
     """Sent ahead: the crossed part is behind the robot by then."""
     line = line_of((0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (2.0, 2.0), (2.0, -2.0))
     first = end_of_piece(line, 0.0, NEAR)

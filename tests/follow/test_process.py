@@ -61,7 +61,7 @@ def test_it_drives_twenty_times_a_second_and_stays_small(base, tmp_path):
     assert "driving" in log.read_text()
 
 
-def test_it_stops_in_time_whatever_fails():
+def test_it_stops_in_time_after_any_failure():
     """The campaign's short form: each cause once."""
     done = stop_tries.run_tries(len(stop_tries.CAUSES), seed=0, each=True)
     assert {name for name, _ in done} == {cause.__name__ for cause in stop_tries.CAUSES}
@@ -87,7 +87,7 @@ def test_only_a_path_of_the_daemon_that_plans_is_driven(base, tmp_path):
         until(lambda: base.newest() in (None, Command()))
 
 
-def test_it_waits_for_the_bus_and_says_so(tmp_path):
+def test_it_waits_for_the_bus_and_logs_that(tmp_path):
     late = DrivenBase()
     endpoint = late.endpoint
     late.close()
@@ -103,7 +103,7 @@ def test_it_waits_for_the_bus_and_says_so(tmp_path):
             bus.close()
 
 
-def test_it_starts_without_standard_input_and_ends_quietly_while_it_waits(tmp_path):
+def test_it_starts_without_standard_input_and_ends_quietly(tmp_path):
     log = tmp_path / "log"
     words = ["sh", "-c", 'exec "$@" <&-', "sh", *PROGRAM, "follow", "--connect", free_endpoint()]
     with (

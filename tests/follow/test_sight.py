@@ -37,7 +37,7 @@ def test_it_stops_before_an_obstacle_and_resumes_once_it_is_gone():
     assert seeing.pose.x == pytest.approx(4.0, abs=0.01)
 
 
-def test_what_stands_beside_the_path_does_not_stop_it():
+def test_an_obstacle_beside_the_path_does_not_stop_it():
     seeing = Seeing([Disc(2.0, 0.2 + RADIUS_M + MARGIN_M + 0.02)])
     seeing.send((0.0, 0.0), (4.0, 0.0))
     seeing.run(25.0)
@@ -72,7 +72,7 @@ def test_walls_of_the_map_do_not_slow_it_down():
 
 
 @pytest.mark.parametrize("toward", [0.0, 0.6, 1.2, 2.0])
-def test_it_stands_by_the_time_somebody_walks_into_it(toward):
+def test_it_stands_before_a_person_reaches_it(toward):
     """From ahead at a walk, and from aside: whoever touches it then has walked into it."""
     seconds = 7.5
     vx, vy = -0.4 * math.cos(toward), -0.4 * math.sin(toward)
@@ -144,7 +144,7 @@ def test_the_first_thing_on_a_line_with_corners_is_met():
     assert first_met([Thing(-0.3, 0.0, False)], line, 0.2)[0] == math.inf
 
 
-def test_what_moves_behind_the_robot_does_not_hold_it():
+def test_motion_behind_the_robot_does_not_stop_it():
     seeing = Seeing([Disc(-0.5, 0.0)])
     seeing.send((0.0, 0.0), (1.0, 0.0))
     seeing.run(0.5)
@@ -152,7 +152,7 @@ def test_what_moves_behind_the_robot_does_not_hold_it():
     assert seeing.last.speed == pytest.approx(0.45 * LIMITS.acceleration, abs=0.1)
 
 
-def test_people_are_seen_where_the_map_shows_something_too():
+def test_people_beside_mapped_obstacles_are_seen():
     """They leave marks on a map where they walked; what stands there is the map's business."""
     for vy, stops in ((-0.4, True), (0.0, False)):
         seeing = Seeing([Disc(1.5, 0.0 - vy * 6.0, 0.2, 0.0, vy)], wall_y=1.2)

@@ -62,7 +62,7 @@ def test_a_path_that_is_elsewhere_is_reported_without_places():
     check("blocked.json", document)
 
 
-def test_what_goes_away_ends_the_count():
+def test_a_gone_obstacle_ends_the_count():
     seeing = Seeing([Disc(1.0, 0.0)])
     seeing.send((0.0, 0.0), (4.0, 0.0))
     seeing.run(7.0)

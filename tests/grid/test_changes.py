@@ -122,7 +122,7 @@ def looked_at(before, after):
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4])
-def test_only_cells_around_changed_pixels_are_classified_anew(yaw):
+def test_only_cells_around_changed_pixels_are_classified_again(yaw):
     before = hall(yaw=yaw)
     assert looked_at(before, replace(before, cells=before.cells.copy()))[0] == 0
     one = edited(before, Window(150, 150, 151, 151), 100)
@@ -143,7 +143,7 @@ def test_a_value_of_the_same_meaning_is_no_change():
     assert not change
 
 
-def test_what_changes_no_cell_keeps_the_lattice():
+def test_a_change_without_effect_on_cells_keeps_the_lattice():
     """A pixel in the corner of a cell that no disc and no lane touches."""
     before = grid(np.zeros((60, 60)), 0.1)
     footprint = Footprint(2.0, 0.3)
@@ -154,7 +154,7 @@ def test_what_changes_no_cell_keeps_the_lattice():
     assert not change
 
 
-def test_of_a_patched_map_only_the_patch_is_looked_at():
+def test_only_the_patch_of_a_patched_map_is_compared():
     before = hall()
     window = Window(100, 100, 110, 110)
     both = edited(edited(before, window, 100), Window(200, 200, 210, 210), 100)
@@ -165,7 +165,7 @@ def test_of_a_patched_map_only_the_patch_is_looked_at():
 
 
 @pytest.mark.parametrize("yaw", [0.0, math.pi / 6])
-def test_a_map_that_grows_by_nothing_known_costs_its_new_sides(yaw):
+def test_a_map_that_grows_by_unknown_pixels_compares_its_sides(yaw):
     before = hall(yaw=yaw)
     corner = before.geometry.to_map(-12, -30)
     after = grid(np.pad(before.cells, ((30, 5), (12, 60)), constant_values=-1), 0.05, *corner, yaw)
@@ -177,7 +177,7 @@ def test_a_map_that_grows_by_nothing_known_costs_its_new_sides(yaw):
     assert looked < cells - 0.8 * inner
 
 
-def test_a_map_that_shrinks_tells_what_fell_out_of_it():
+def test_a_map_that_shrinks_reports_the_cells_it_lost():
     before = hall()
     lattice = CoverageLattice.from_map(before, CELL)
     after = cropped(before, 0, 0, 300, 150)
@@ -235,7 +235,7 @@ def test_a_lattice_beyond_the_limit_is_refused():
         LatticeChange.first(before, CELL, max_cells=2000)
 
 
-def test_the_lattice_before_is_left_alone():
+def test_the_previous_lattice_does_not_change():
     before = hall()
     lattice = CoverageLattice.from_map(before, CELL)
     states, steps = lattice.states.copy(), lattice.steps.copy()

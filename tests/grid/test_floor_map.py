@@ -167,7 +167,7 @@ def test_a_map_that_grows_a_little_keeps_its_raster():
         known = grown
 
 
-def test_what_a_map_shows_no_more_is_not_free():
+def test_floor_that_a_map_no_longer_shows_is_not_free():
     """Also where it lies beyond the cells of the new map, but on the raster still."""
     whole = room(6.0, 5.0)
     less = part_of(whole, 20, 30, 70, 80)
@@ -202,7 +202,7 @@ def test_a_map_that_grows_by_unknown_pixels_touches_little():
     assert_same(floor, over(grown))
 
 
-def test_what_is_unknown_stays_so():
+def test_unknown_floor_stays_unknown():
     grid = room(3.0, 2.0)
     cells = grid.cells.copy()
     cells[10:] = -1

@@ -23,7 +23,7 @@ def polygons_of(count, seed=0):
 
 
 @pytest.mark.parametrize("origin", [Pose2D(0.0, 0.0), Pose2D(-0.7, 0.31, 0.4)])
-def test_together_they_touch_what_each_touches_alone(origin):
+def test_several_polygons_touch_the_union_of_their_cells(origin):
     geometry, whole = GridGeometry(ROWS, COLS, 0.05, origin), Window(0, 0, ROWS, COLS)
     polygons = polygons_of(60)
     expected = np.zeros((ROWS, COLS), bool)
@@ -44,7 +44,7 @@ def test_corners_lie_where_those_of_one_polygon_do_bit_for_bit():
         assert corners.tolist() == expected
 
 
-def test_a_part_costs_what_is_near_it():
+def test_the_work_depends_on_the_polygons_near_a_part():
     """Each part looked at each of two thousand: three seconds for these."""
     geometry = GridGeometry(ROWS, COLS, 0.05, Pose2D(100.0, 0.0))
     far = PolygonsOnRaster.of(polygons_of(2000), geometry)

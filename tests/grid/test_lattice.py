@@ -114,7 +114,7 @@ def test_an_obstacle_near_a_cell_blocks_it():
 
 
 @pytest.mark.parametrize("value", [-1, 26, 50, 64])
-def test_what_is_not_known_free_is_never_coverable(value):
+def test_only_known_free_floor_is_coverable(value):
     cells = np.zeros((30, 30), np.int8)
     cells[4, 4] = value
     lattice = CoverageLattice.from_map(grid(cells), CELL)

@@ -30,7 +30,7 @@ def test_unknown_of_map_saver_stays_unknown_at_any_threshold(tmp_path, kind, key
     assert "free_thresh: 0.196" in record.getMessage()
 
 
-def test_sixteen_bits_are_no_excuse(tmp_path, caplog):
+def test_sixteen_bit_images_follow_the_same_convention(tmp_path, caplog):
     path = described(tmp_path, Image.fromarray(SAVED.astype(np.uint16) * 257), free_thresh=0.25)
     assert cells(path) == [100, -1, 0]
     assert caplog.records
@@ -43,14 +43,14 @@ def test_a_map_that_was_edited_is_still_map_savers(tmp_path):
     assert read_map(path).cells[:, 1].tolist() == [-1] * 10
 
 
-def test_one_of_many_shades_is_what_the_keys_say(tmp_path, caplog):
+def test_each_shade_follows_the_thresholds(tmp_path, caplog):
     shades = np.arange(256, dtype=np.uint8).reshape(16, 16)
     path = described(tmp_path, Image.fromarray(shades), free_thresh=0.25)
     assert read_map(path).cells[16 - 1 - 205 // 16, 205 % 16] == 0
     assert not caplog.records
 
 
-def test_map_savers_own_keys_of_today_are_no_contradiction(tmp_path, caplog):
+def test_the_keys_of_todays_map_saver_are_consistent(tmp_path, caplog):
     assert cells(described(tmp_path, Image.fromarray(SAVED))) == [100, -1, 0]
     assert not caplog.records
 

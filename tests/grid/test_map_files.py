@@ -99,7 +99,7 @@ def test_the_picture_is_turned_upright_and_placed(tmp_path):
     assert not grid.cells.flags.writeable
 
 
-def test_mode_is_trinary_unless_said(tmp_path):
+def test_the_default_mode_is_trinary(tmp_path):
     image = grey([128])
     assert read_map(described(tmp_path, image)).cells.tolist() == [[-1]]
     assert read_map(described(tmp_path, image, mode="scale")).cells.tolist() == [[67]]
@@ -113,7 +113,7 @@ def test_black_is_occupied_and_white_free_in_every_kind_of_image(tmp_path, mode)
 
 
 @pytest.mark.parametrize("name", ["map.pgm", "map.bmp"])
-def test_other_formats(tmp_path, name):
+def test_other_image_formats_are_read(tmp_path, name):
     grey([0, 255], [254, 205]).save(tmp_path / name)
     assert read_map(_naming(tmp_path, name)).cells.tolist() == [[0, -1], [100, 0]]
 
@@ -134,7 +134,7 @@ def test_thresholds_that_are_missing_are_those_of_map_saver(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["map.png", "map.PGM", "map.bmp", "map.jpg"])
-def test_an_image_alone_is_a_map_with_a_resolution(tmp_path, name):
+def test_an_image_with_a_resolution_is_a_map(tmp_path, name):
     # In blocks of what JPEG compresses as one.
     image = Image.fromarray(
         np.kron(np.array([[0, 255], [255, 205]]), np.ones((16, 16))).astype("B")
@@ -159,7 +159,7 @@ def test_an_image_alone_is_a_map_with_a_resolution(tmp_path, name):
         ("none.png", 0.05, "No such file"),
     ],
 )
-def test_what_is_no_image_alone_is_named(tmp_path, name, resolution_m, said):
+def test_a_file_that_is_no_bare_image_is_named(tmp_path, name, resolution_m, said):
     for there in ("map.yaml", "grid.npy", "map.png"):
         (tmp_path / there).write_text("no image")
     with pytest.raises(MapFileError, match=said) as refused:
@@ -182,7 +182,7 @@ def test_plain_and_binary_pgm(tmp_path, text):
     assert read_map(_naming(tmp_path, "map.pgm")).cells.tolist() == [[100, -1, 0]]
 
 
-def test_sixteen_bits(tmp_path):
+def test_sixteen_bit_images_are_read(tmp_path):
     image = grey([0, 32768, 65535], dtype=np.uint16)
     assert read_map(described(tmp_path, image, mode="scale")).cells.tolist() == [[100, 67, 0]]
     (tmp_path / "map.pgm").write_bytes(b"P5 2 1 65535 \x00\x00\xff\xff")
@@ -270,7 +270,7 @@ def test_missing_keys_are_named(tmp_path, key):
         ("- a", "expected keys and values, got ['a']"),
     ],
 )
-def test_a_file_that_is_nearly_one_is_told_what_it_has(tmp_path, text, said):
+def test_an_incomplete_map_file_error_lists_its_keys(tmp_path, text, said):
     grey([0]).save(tmp_path / "map.png")
     path = tmp_path / "map.yaml"
     rest = {key: value for key, value in DESCRIPTION.items() if key != "resolution"}
@@ -289,7 +289,7 @@ def test_not_a_mapping(tmp_path, text):
         read_map(path)
 
 
-def test_missing_file(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(MapFileError, match=r"none\.yaml"):
         read_map(tmp_path / "none.yaml")
 
@@ -345,7 +345,7 @@ def test_damaged_images_are_read_or_refused(tmp_path, suffix, place, value, end)
     resolution=st.floats(1e-3, 10),
     pose=st.tuples(*[st.floats(-2e7, 2e7)] * 3),
 )
-def test_what_is_written_is_read(tmp_path, cells, resolution, pose):
+def test_a_written_map_is_read_back(tmp_path, cells, resolution, pose):
     grid = OccupancyGrid(GridGeometry(*cells.shape, resolution, Pose2D(*pose)), cells)
     write_map(grid, tmp_path / "written.yaml")
     again = read_map(tmp_path / "written.yaml")
@@ -359,7 +359,7 @@ def test_probabilities_are_written_as_free_occupied_or_unknown(tmp_path):
     assert read_map(tmp_path / "w.yaml").cells.tolist() == [[0, 0, -1, -1, 100, 100, -1]]
 
 
-def test_coverage_grid(tmp_path):
+def test_a_coverage_grid_is_read(tmp_path):
     free = np.array([[True, False], [True, True], [False, True]])
     np.save(tmp_path / "grid.npy", free)
     read = read_coverage_grid(tmp_path / "grid.npy")
@@ -429,7 +429,7 @@ def test_a_path_is_found(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["palace", "", "x" * 5000, "../maps/office", "~nobody-here/x"])
-def test_an_unknown_map_is_told_the_names(name):
+def test_an_unknown_map_gives_the_known_names(name):
     with pytest.raises(MapFileError, match=r"built-in map \(.*basement"):
         find_map(name)
 

@@ -95,7 +95,7 @@ def test_furniture_does_not_separate():
     assert find_rooms(grid_of(cells)).count == 2
 
 
-def test_what_is_behind_furniture_is_no_room():
+def test_floor_behind_furniture_is_no_room():
     """As a scanner maps it: no wall is seen behind bed and wardrobe, nor anything outside."""
     cells = two_rooms()
     for x, y, width, depth in ((0.0, 0.6, 2.2, 1.4), (1.0, 2.8, 1.2, 0.6)):

@@ -80,7 +80,7 @@ def test_the_yaw_of_a_map_counts_in_full():
 
 
 @pytest.mark.parametrize("angle_deg", [0.0, 0.25, -0.25, 90.25])
-def test_a_small_turn_is_none(angle_deg):
+def test_a_small_angle_gives_no_rotation(angle_deg):
     found = wall_direction(grid_of(room(angle_deg)))
     assert abs(found.angle_deg) < 0.5
     assert found.rotation_deg == 0.0
@@ -103,7 +103,7 @@ def test_most_walls_decide():
         assert found.share < 0.8
 
 
-def test_of_a_hexagon_two_sides_count():
+def test_two_sides_of_a_hexagon_give_the_direction():
     y, x = np.mgrid[:300, :300] - 149.5
     away = [abs(x * math.cos(a) + y * math.sin(a)) for a in np.radians((10, 70, 130))]
     found = wall_direction(grid_of(np.where(np.maximum.reduce(away) < 120, FREE, WALL)))
@@ -111,7 +111,7 @@ def test_of_a_hexagon_two_sides_count():
     assert found.share < 0.4
 
 
-def test_the_axes_are_left_for_more_walls_alone():
+def test_the_axes_are_left_only_for_more_walls():
     # Wings as large: the one along the axes of the map frame, whatever its pixels' axes are.
     for yaw in (0.0, 0.5):
         own = -math.degrees(yaw)
@@ -231,7 +231,7 @@ def test_twin_finds_the_same_direction(seed):
     assert (found.angle_deg, found.share) == slow_direction(cells)
 
 
-def test_nothing_depends_on_the_tiles(monkeypatch):
+def test_the_direction_does_not_depend_on_the_tiles(monkeypatch):
     grid = read_map(find_map("basement"))
     expected = [
         wall_direction(one) for one in (grid, grid_of(room(30.0)), grid_of(room(30.0), 0.02))

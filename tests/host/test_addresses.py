@@ -6,7 +6,7 @@ from fasaco_edge.host.addresses import Address
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
-def test_any_address_is_shown_as_one_that_can_be_opened(host):
+def test_a_wildcard_address_is_shown_as_a_reachable_one(host):
     shown = Address(host, 8465).reached
     assert shown.endswith(":8465")
     assert shown not in (f"{host}:8465", f"[{host}]:8465")

@@ -13,7 +13,7 @@ from fasaco_edge.host.files import FileTooLongError, make_own_folder, open_own, 
 NOBODY = 65534
 
 
-def test_a_new_file_and_one_of_ours_are_taken(tmp_path: Path):
+def test_new_and_own_files_are_written(tmp_path: Path):
     file = tmp_path / "a"
     for payload in (b"first and longer", b"second"):
         write_through(file, payload)

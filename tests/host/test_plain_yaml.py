@@ -35,7 +35,7 @@ LAUGHS = "a0: &a0 [lol,lol,lol,lol,lol,lol,lol,lol,lol,lol]\n" + "".join(
         ("[" + "1," * (MOST_VALUES - 1) + "]", None),
     ],
 )
-def test_what_people_write_is_read(text, value):
+def test_common_yaml_is_read(text, value):
     assert value is None or load(text) == value
     load(text)
 
@@ -63,14 +63,14 @@ def test_what_people_write_is_read(text, value):
         ("a: [", "expected the node content"),
     ],
 )
-def test_what_is_not_plain_is_named(text, said):
+def test_other_yaml_is_refused_with_its_cause(text, said):
     with pytest.raises(PlainYamlError, match=r".*") as refused:
         load(text)
     assert said in str(refused.value)
     assert len(str(refused.value)) < 1000
 
 
-def test_a_pipe_is_read_to_its_end_and_not_waited_for_for_ever(tmp_path, monkeypatch):
+def test_a_pipe_is_read_to_its_end_with_a_timeout(tmp_path, monkeypatch):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     writer = threading.Thread(target=pipe.write_text, args=["a: 1"])
@@ -82,7 +82,7 @@ def test_a_pipe_is_read_to_its_end_and_not_waited_for_for_ever(tmp_path, monkeyp
         read_bounded(pipe)
 
 
-def test_what_laughs_takes_no_memory():
+def test_a_billion_laughs_take_no_memory():
     """In a process of its own, with 200 MB more than it has: they stand for three gigabytes."""
     code = (
         "import resource, sys\n"

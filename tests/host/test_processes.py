@@ -36,7 +36,7 @@ assert thread_count() == before[1] == 1
 """
 
 
-def test_who_is_out_of_files_still_knows_its_memory_and_threads():
+def test_memory_and_threads_are_known_without_descriptors():
     subprocess.run([sys.executable, "-c", OUT_OF_FILES], check=True)
 
 
@@ -74,7 +74,7 @@ def test_a_process_that_stands_still_ends_in_time_and_says_where():
     assert 'File "<string>", line 5 in <module>' in ended.stderr
 
 
-def test_nobody_starts_a_module_otherwise():
+def test_modules_are_started_only_by_python_program():
     package = Path(__file__).parents[2] / "fasaco_edge"
     found = [
         file.name
@@ -127,7 +127,7 @@ def test_the_limit_is_that_of_the_group_and_those_above(tmp_path, files, limit):
     assert memory_limit(written(tmp_path, files)) == limit
 
 
-def test_what_is_available_is_no_more_than_the_limit(tmp_path):
+def test_available_memory_is_at_most_the_limit(tmp_path):
     free = {"proc/meminfo": "MemTotal: 4000000 kB\nMemAvailable: 2000000 kB\n"}
     assert available_memory(written(tmp_path / "free", free)) == 2_048_000_000
     limited = free | {

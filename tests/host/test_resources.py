@@ -23,7 +23,7 @@ def test_inside_an_installed_package_and_not_a_neighbours(tmp_path):
     assert folder("maps", tmp_path / "fasaco_edge") == inside
 
 
-def test_absent(tmp_path):
+def test_an_absent_resource_is_an_error(tmp_path):
     (tmp_path / "maps").mkdir()
     with pytest.raises(FileNotFoundError, match="no folder 'maps'"):
         folder("maps", tmp_path / "fasaco_edge")

@@ -20,13 +20,13 @@ def folder(tmp_path):
     return made
 
 
-def test_a_folder_of_ours_that_nobody_else_may_write_is_trusted(folder):
+def test_an_own_folder_without_other_writers_is_trusted(folder):
     assert why_not_trusted(folder) == ""
     folder.chmod(0o755)
     assert why_not_trusted(folder) == ""
 
 
-def test_what_is_not_there_is_judged_by_what_is_above_it(folder):
+def test_a_missing_folder_is_judged_by_its_parents(folder):
     assert why_not_trusted(folder / "later" / "still") == ""
     folder.chmod(0o777)
     assert why_not_trusted(folder / "later") == f"{folder} may be written by all users"
@@ -48,12 +48,12 @@ def test_a_sticky_folder_protects_its_subfolders_but_not_itself(folder):
     assert why_not_trusted(folder.parent) == f"{folder.parent} may be written by all users"
 
 
-def test_what_is_roots_is_trusted_by_everybody():
+def test_folders_of_root_are_trusted():
     assert why_not_trusted(Path("/usr"), os.geteuid() + 1) == ""
 
 
 @needs_root
-def test_what_another_user_owns_on_the_way_is_not(folder):
+def test_a_parent_of_another_user_is_not_trusted(folder):
     os.chown(folder.parent, NOBODY, NOBODY)
     assert why_not_trusted(folder).startswith(f"{folder.parent} belongs to user ")
     # Of a service's user all is as it should be.
@@ -62,7 +62,7 @@ def test_what_another_user_owns_on_the_way_is_not(folder):
 
 
 @needs_root
-def test_a_link_is_as_good_as_who_made_it_and_what_it_leads_to(folder):
+def test_a_link_is_judged_by_its_owner_and_its_target(folder):
     link = folder / "link"
     real = folder / "real"
     real.mkdir(0o700)
@@ -78,7 +78,7 @@ def test_a_link_is_as_good_as_who_made_it_and_what_it_leads_to(folder):
     assert why_not_trusted(link) == f"{real} may be written by all users"
 
 
-def test_links_in_a_circle_and_files_in_the_way_are_told(folder):
+def test_loops_of_links_and_files_in_the_way_are_named(folder):
     (folder / "circle").symlink_to("circle")
     assert "too many links" in why_not_trusted(folder / "circle" / "x")
     (folder / "file").touch()
@@ -92,7 +92,7 @@ def test_our_folder_in_the_real_temporary_folder_is_trusted():
 
 
 @pytest.mark.parametrize("mode", [0o400, 0o600, 0o644])
-def test_a_file_that_others_may_read_alone_is_read(folder, mode):
+def test_a_file_that_others_may_only_read_is_read(folder, mode):
     file = folder / "file"
     file.write_bytes(b"content")
     file.chmod(mode)
@@ -108,7 +108,7 @@ def test_a_file_that_others_may_write_is_not_read(folder):
             read_trusted(file)
 
 
-def test_what_is_no_plain_file_is_not_read_nor_waited_for(folder):
+def test_pipes_folders_and_links_are_refused_at_once(folder):
     os.mkfifo(folder / "pipe", 0o600)
     (folder / "folder").mkdir()
     for name in ("pipe", "folder"):

@@ -55,7 +55,7 @@ def test_a_bend_that_is_steered_is_no_stop():
 
 
 @pytest.mark.parametrize("bend_deg", [2.0, 30.0, 58.0, 90.0, 180.0])
-def test_what_the_planner_takes_a_turn_for_is_what_it_takes(bend_deg):
+def test_the_planner_and_the_judge_agree_on_turns(bend_deg):
     """On ways that are long enough to reach the speed; the judge and the planner share no code."""
     turning = limited_turning(
         LIMITS.turn_deg_s,
@@ -102,7 +102,7 @@ def test_an_arc_turns_on_the_spot_only_if_it_is_too_tight(radius_m, are_spots):
 
 
 @pytest.mark.parametrize("curvature", [-2.0, 0.0, 2.0])
-def test_a_turn_back_along_the_tangent_reverses_and_a_corner_does_not_fit(curvature):
+def test_a_turn_back_reverses_and_a_corner_is_a_spot_turn(curvature):
     _, _, bends = bends_of(driven_along((2.0, 0.5), (curvature, -0.5)))
     assert (int(bends.reverses.sum()), int(bends.spots.sum())) == (1, 0)
     _, _, bends = bends_of(np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)]))

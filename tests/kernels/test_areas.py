@@ -61,7 +61,7 @@ def test_a_spiral_is_one_area(side):
     assert len(find_areas(grid).cells) == 1
 
 
-def test_a_hundred_thousand_chambers_are_told_apart():
+def test_a_hundred_thousand_chambers_are_distinguished():
     side = 640
     grid = np.zeros((side, side), np.uint8)
     grid[::2, ::2] = 1

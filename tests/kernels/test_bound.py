@@ -155,7 +155,7 @@ def test_the_colours_of_start_and_end_give_the_parity_of_steps():
     assert drawn("o..oo.", "...oS.", "....oo") == 11
 
 
-def test_what_cannot_be_reached_is_left_out():
+def test_unreachable_cells_do_not_count_in_the_bound():
     ground = lattice("..#..", "..#..")
     assert bound(ground, (0, 0)) == 3
     assert bound(ground, (0, 0), (0, 0)) == 4

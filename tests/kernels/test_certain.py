@@ -81,7 +81,7 @@ def test_without_tiles_nothing_is_left():
     assert [place for place, _ in left] == sorted(tiles)
 
 
-def test_a_tile_has_as_many_pixels_as_the_kernel_thinks():
+def test_kernel_and_tile_have_the_same_size():
     assert (certain.TILE, certain.BLOCKS) == (FLOOR_TILE, FLOOR_TILE // 8)
 
 

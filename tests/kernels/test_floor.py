@@ -82,7 +82,7 @@ def test_a_wall_as_far_as_the_radius_is_not_touched():
     assert not is_clear(bits_of(blocked), 10.0, 17.6, 30.0, 17.6, 7.0)
 
 
-def test_what_lies_outside_is_blocked():
+def test_floor_outside_the_raster_is_blocked():
     table = bits_of(np.zeros((SIDE, SIDE), np.bool_))
     assert is_clear(table, 10.0, 10.0, 10.0, 32.0, 7.0)
     assert not is_clear(table, 10.0, 10.0, 10.0, 33.0, 7.0)
@@ -110,7 +110,7 @@ def test_sweeps_are_counted_and_taken_back(segments, radius):
 
 @examples(300)
 @given(SEGMENTS, SEGMENTS, SEGMENTS, st.floats(0.5, 7.0))
-def test_what_a_change_sweeps_more_is_what_sweeping_it_shows(before, after, others, radius):
+def test_the_predicted_gain_equals_the_counted_one(before, after, others, radius):
     counts = np.zeros((SIDE, SIDE), np.int16)
     counts[:, 20:24] = NEVER
     sweeps = Sweeps(counts, np.zeros((SIDE // 8, SIDE // 8), np.int32))

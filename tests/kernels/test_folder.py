@@ -118,7 +118,7 @@ def test_another_processor_has_a_folder_of_its_own(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("umask", [0o000, 0o002])
-def test_what_others_may_write_is_not_loaded(installed, umask):
+def test_code_that_others_may_write_is_not_loaded(installed, umask):
     """As of a compiler without a umask of its own."""
     installed.compile(umask=umask)
     told = installed.tell()
@@ -172,7 +172,7 @@ def test_a_folder_that_others_could_have_filled_is_never_used(compiled, tmp, har
 
 
 @needs_root
-def test_root_with_the_home_of_another_user_leaves_it_alone(installed, tmp_path, tmp):
+def test_root_does_not_use_another_users_home(installed, tmp_path, tmp):
     home = tmp_path / "home"
     home.mkdir()
     os.chown(home, NOBODY, NOBODY)

@@ -131,7 +131,7 @@ def test_pixels_may_be_ever_so_much_smaller_than_the_robot():
         (50, 50, COVERABLE),
     ],
 )
-def test_of_a_disc_of_many_pixels_each_counts(row, col, expected):
+def test_each_pixel_of_a_large_disc_counts(row, col, expected):
     """The disc touches 100 pixels to each side of the cell's centre."""
     cells = np.zeros((300, 300), np.int8)
     cells[row, col] = 100

@@ -43,7 +43,7 @@ def test_changed_sources_never_meet_the_code_of_others(compiled):
     assert not Path(told.folder).exists()
 
 
-def test_what_is_compiled_is_loaded(installed):
+def test_compiled_kernels_are_loaded(installed):
     first = installed.compile()
     assert (first.loaded, first.compiled, first.warnings) == (0, 2, [])
     again = installed.tell()

@@ -119,7 +119,7 @@ class Room:
 @pytest.mark.parametrize("turning", TURNINGS)
 @pytest.mark.parametrize("stage", ["polish", "anneal", "patches", "reorder"])
 @pytest.mark.parametrize("clear", [ROBOT, ROBOT + 1.5])
-def test_what_is_gained_is_what_a_slow_count_shows(stage, turning, clear):
+def test_the_gain_equals_a_slow_count(stage, turning, clear):
     room = Room(turning, clear=clear)
     before = room.cost_s()
     gained = room.run(stage)
@@ -235,7 +235,7 @@ def test_a_chain_longer_than_a_move_is_replaced_as_well():
     assert (room.floor.sweeps.counts[below] == room.recounted().counts[below]).all()
 
 
-def test_what_is_tried_is_bounded():
+def test_the_number_of_moves_tried_is_bounded():
     for stage in ("polish", "anneal", "patches"):
         room = Room()
         room.run(stage, 300)

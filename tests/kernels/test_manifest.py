@@ -56,7 +56,7 @@ def test_a_harmed_file_is_seen_and_cleared_away(tmp_path, harm):
 
 
 @pytest.mark.parametrize("harm", ALL)
-def test_a_folder_with_a_harmed_manifest_is_begun_anew(tmp_path, harm):
+def test_a_folder_with_a_damaged_manifest_is_compiled_again(tmp_path, harm):
     folder = fill_with(tmp_path, 3)
     harm(folder / MANIFEST)
     assert why_missing(folder, STAGES).startswith(
@@ -143,7 +143,7 @@ def test_a_reader_waits_for_who_compiles(compiled):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
-def test_what_ends_amid_the_compiling_is_begun_again(installed, number):
+def test_an_interrupted_compilation_starts_again(installed, number):
     amid = f"assert seven.seven(1) == 7\nimport os; os.kill(os.getpid(), {int(number)})"
     process = installed.start(amid, env=COMPILES)
     process.communicate(timeout=100)
@@ -156,7 +156,7 @@ def test_what_ends_amid_the_compiling_is_begun_again(installed, number):
 
 
 @pytest.mark.parametrize("name", ["gone", "altered in the middle", "another pickle"])
-def test_a_process_runs_nothing_harmed_and_says_so_once(compiled, name):
+def test_damaged_kernels_are_not_run_and_reported_once(compiled, name):
     file = next(compiled.folder.glob("seven.eight-*.nbi"))
     (HARMS | MISDEEDS)[name](file)
     told = compiled.tell()

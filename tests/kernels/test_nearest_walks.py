@@ -56,7 +56,7 @@ def test_the_nearest_cell_comes_first_even_if_the_walk_is_longer():
     assert walks(HALL[:1], [[0, -1, -1, 0, -1, -1, -1, -1, 0]], [(0, 2)]) == [[1 + 3 + 8, 4]]
 
 
-def test_what_a_robot_cannot_reach_counts_as_a_step_each():
+def test_unreachable_cells_count_as_a_step_each():
     free = HALL.copy()
     free[:, 4] = False
     parts = np.where(free, 0, -1)

@@ -63,7 +63,7 @@ def left_of(counts):
     st.floats(0.0, 1.0),
 )
 @examples(60)
-def test_what_is_open_is_asked_for_not_swept_and_two_pixels_wide(seed, corner, is_asked, share):
+def test_open_floor_is_wanted_unswept_and_two_pixels_wide(seed, corner, is_asked, share):
     rng = np.random.default_rng(seed)
     flags = WANTED * (rng.random((SIDE, SIDE)) < 0.8) | SWEPT * (rng.random((SIDE, SIDE)) < share)
     passed = rng.random(flags.shape) < 0.1

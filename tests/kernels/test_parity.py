@@ -75,7 +75,7 @@ def test_steps_are_counted_in_either_direction(task):
 
 @examples(120)
 @given(task=tasks(), noted=st.booleans(), seed=st.integers(0, 2**32))
-def test_an_euler_walk_takes_each_step_as_often_as_it_is_told(task, noted, seed):
+def test_an_euler_walk_takes_each_step_the_given_times(task, noted, seed):
     ground, walk, tally = set_up(task)
     before = cells_of(walk)
     if noted:
@@ -91,7 +91,7 @@ def test_an_euler_walk_takes_each_step_as_often_as_it_is_told(task, noted, seed)
     assert_guards_hold(walk, tally)
 
 
-def test_a_steady_euler_walk_goes_on_as_the_walk_did_of_old():
+def test_a_steady_euler_walk_keeps_the_old_order():
     kept = []
     for seed in range(200):
         task = drawn_task(seed)

@@ -195,7 +195,7 @@ def test_a_spots_surroundings_are_improved_at_each_temperature(radius):
 
 @examples(60)
 @given(task=tasks(), prices=st.sampled_from(PRICES), seed=st.integers(0, 2**32))
-def test_improving_given_cells_makes_the_walk_better_or_leaves_it(task, prices, seed):
+def test_improving_given_cells_never_worsens_the_walk(task, prices, seed):
     search = set_up(task, prices)
     ground, walk, _, _, memory, _ = search
     random = stream(seed)

@@ -199,7 +199,7 @@ def assert_whole_walk(task, region, cells):
 
 @examples(200)
 @given(seed=SEEDS, prices=st.sampled_from(PRICES), hot=st.booleans(), perturbed=st.booleans())
-def test_whatever_is_done_in_a_region_the_whole_is_a_walk(seed, prices, hot, perturbed):
+def test_changes_in_a_region_leave_a_whole_walk(seed, prices, hot, perturbed):
     task, region = drawn_cut(seed, prices)
     if region is None:
         return
@@ -265,7 +265,7 @@ def there_and(*stops):
         ((0, 9, 0), [0, 9], 0, [(1, 8), (10, 17)], 19),
     ],
 )
-def test_sections_and_limits_are_as_told(stops, inside, before, sections, after):
+def test_sections_and_limits_match_the_given_ones(stops, inside, before, sections, after):
     walk = there_and(*stops)
     _, region = corridor(*walk, cols_inside=list(inside))
     made = int(region.tally.counts[JUMPS])
@@ -279,11 +279,11 @@ def test_sections_and_limits_are_as_told(stops, inside, before, sections, after)
     assert inner == [region.ground.bound + number for number in range(made)]
 
 
-def test_a_walk_that_never_comes_there_is_told():
+def test_a_walk_that_misses_the_region_gives_none():
     assert corridor(*range(5), cols_inside=[7, 8])[1] is None
 
 
-def test_what_does_not_fit_is_told():
+def test_a_region_that_does_not_fit_is_refused():
     walk = there_and(4, 8, 4, 9, 4)
     fits = corridor(*walk, cols_inside=range(8), jumps=2, room=30)[1]
     assert fits is not None

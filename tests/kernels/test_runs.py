@@ -17,7 +17,7 @@ def walk_of(seed: int, steps: int) -> np.ndarray:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 60), st.data())
-def test_runs_are_the_same_cells_and_share_no_step(seed, steps, data):
+def test_runs_have_the_same_cells_and_share_no_step(seed, steps, data):
     before = walk_of(seed, steps)
     # A part of it is turned round, and something else comes between.
     first = data.draw(st.integers(0, steps))

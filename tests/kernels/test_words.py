@@ -60,7 +60,7 @@ def test_each_word_ends_at_its_goal(goal, reverses):
         ((4.0, 4.0, math.pi / 2), math.pi / 2 + math.sqrt(18.0), math.pi / 2 + math.sqrt(18.0)),
     ],
 )
-def test_what_is_known_of_the_shortest(goal, ahead, both):
+def test_known_shortest_words_are_found(goal, ahead, both):
     if ahead is not None:
         assert shortest(goal, reverses=False) == pytest.approx(ahead)
     assert shortest(goal, reverses=True) == pytest.approx(both)

@@ -26,8 +26,10 @@ from fasaco_edge.planners.search.near_optimal import NearOptimal
 
 TOOL_M, RADIUS_M, CELL_M = 0.3, 0.18, 0.276
 STEP_S, QUARTER_TURN_S, MOST_S = 0.1, 0.5, 1500.0
-# It does not go back for the path that has begun behind it meanwhile.
-NEAR_M, BEHIND_M = 0.05, 0.15
+# Largest distance of the base from the part of a new path that it skips [m].
+NEAR_M = 0.05
+# Largest length of that part beyond the distance driven meanwhile [m].
+BEHIND_M = 0.15
 START = (1.0, 1.0)
 
 

@@ -42,7 +42,7 @@ def test_the_sum_of_squared_distances_is_the_least(seed):
     assert apart(aligned(points, places)) == pytest.approx(min(map(apart, orders)))
 
 
-def test_a_cell_without_a_stand_is_nobodys():
+def test_a_cell_without_a_stand_gets_no_point():
     places = LANES[:10].copy()
     places[3:6] = np.nan
     assert aligned(LANES[[0, 4, 9]], places)[1] in (2, 6)

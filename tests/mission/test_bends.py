@@ -18,7 +18,7 @@ def between(end, yaws, farthest_m=FAR_M):
 
 
 @pytest.mark.parametrize("yaws", [(0.0, 0.0), (0.0, 1.0), (-0.5, 0.0)])
-def test_one_that_left_or_came_straight_turned_at_a_place(yaws):
+def test_a_turn_beside_a_straight_drive_is_on_the_spot(yaws):
     assert beside_m(*between((1.0, 0.0), yaws)) == 0.0
 
 

@@ -15,8 +15,10 @@ from fasaco_edge.mission.core.events import FollowerBlocked, PatchReceived
 from fasaco_edge.mission.map.obstacles import CLOSED_S, WIDEN_AFTER_S, Obstacles
 from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
 
-# The follower keeps this far from things [m], and says after so long that it stands [s].
-MARGIN_M, HELD_S = 0.06, 5.0
+# Distance that the follower keeps from things [m].
+MARGIN_M = 0.06
+# Standstill after which it reports an obstacle [s].
+HELD_S = 5.0
 START = (0.6, 0.6)
 TRIES_AGAIN = replace(CONFIG, policy=MissionPolicy(lost_pose_s=0.0))
 
@@ -89,7 +91,7 @@ def codes(robot):
     return {trouble.code for trouble in robot.mission.troubles}
 
 
-def test_it_sweeps_elsewhere_and_then_where_somebody_stood():
+def test_it_sweeps_the_place_of_a_person_later():
     robot = SeeingRobot(room(), START, disc(2.0, 1.5))
     assert robot.wait(400.0, lambda robot: robot.held_s >= HELD_S)
     assert robot.wait(3.0, lambda robot: "blocked" in codes(robot))
@@ -103,7 +105,7 @@ def test_it_sweeps_elsewhere_and_then_where_somebody_stood():
     assert "blocked" not in codes(robot)
 
 
-def test_what_never_goes_away_is_left_out_and_said():
+def test_a_lasting_obstacle_is_left_out_and_reported():
     robot = SeeingRobot(two_rooms(), START, closed_door())
     assert robot.wait(1500.0, lambda robot: robot.mission.state == "done")
     assert "not reached" in robot.mission.reason

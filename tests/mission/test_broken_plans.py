@@ -19,7 +19,7 @@ def breaks(drive):
     return drive.tell(PlanBroken(request.number, PlanFailed(f"plan {request.number} failed: Oh")))
 
 
-def test_the_robot_stands_and_the_reason_is_told():
+def test_the_robot_stands_with_the_reason():
     drive = started(*ROOM)
     drive.go()
     drive.tell(patch("#", at=(2, 2)))
@@ -55,7 +55,7 @@ def test_it_is_tried_again_after_a_while_and_when_asked_for():
     drive.finish()
 
 
-def test_a_plan_for_another_order_that_breaks_costs_nothing():
+def test_a_failed_plan_for_another_order_changes_nothing():
     drive = started(*ROOM)
     drive.tell(patch("#", at=(2, 2)))
     drive.command("reset")
@@ -95,7 +95,7 @@ def test_a_planner_that_fails_on_each_map_runs_less_often():
     assert drive.mission.reason.endswith("tried again with the next map, or after 30 s")
 
 
-def test_a_wait_for_another_robot_is_no_other_chance():
+def test_a_wait_for_another_robot_gives_no_new_try():
     drive = planned()
     drive.tell(patch("#", at=(1, 10)))
     breaks(drive)

@@ -56,7 +56,7 @@ def test_cells_are_in_the_rooms_that_they_lie_in(watch, lattice_deg):
     assert len(np.unique(rooms)) > 4
 
 
-def test_without_rooms_or_a_wish_for_them_a_problem_stays_as_it_is(watch):
+def test_without_rooms_a_problem_does_not_change(watch):
     problem, _ = problem_at(0.0)
     assert RoomPrice("never", RoomCells(watch, 0.0)).added_to(problem) is problem
     assert RoomPrice("auto", RoomCells(RoomWatch(), 0.0)).added_to(problem) is problem

@@ -58,7 +58,7 @@ def test_the_way_back_counts_and_so_does_what_driving_drains():
     assert 0.2 < far <= 0.1 + 1.2 * 0.01 * 12
 
 
-def test_it_goes_on_at_what_the_rest_needs_where_that_is_less():
+def test_it_continues_at_the_level_that_the_rest_needs():
     drive = Battery(0.19, rows=WALLED)
     drive.mission.charging.gauge._drains.extend([0.001] * 5)
     drive.run(State.CHARGING)
@@ -70,7 +70,7 @@ def test_it_goes_on_at_what_the_rest_needs_where_that_is_less():
     drive.finish()
 
 
-def test_what_lies_beyond_the_map_counts_as_rest():
+def test_floor_beyond_the_map_counts_as_work_left():
     levels = []
     for door in "#", "?":
         drive = Battery(0.19, rows=(*WALLED[:-1], "####" + door + "#####"))
@@ -118,7 +118,7 @@ def test_a_charge_that_jumps_and_comes_back_is_not_believed(lie):
     assert drive.mission.charging.gauge.level == lie, "what stays is true"
 
 
-def test_a_charge_that_drains_fast_is_believed_all_the_same():
+def test_a_fast_discharge_is_accepted():
     gauge = BatteryGauge()
     for second in range(8):
         gauge.note(BatteryReceived(0.9 - 0.02 * second), float(second), drives=True)
@@ -135,14 +135,14 @@ def test_a_silent_battery_is_reported_and_does_not_stop_the_way():
     drive.finish()
 
 
-def test_one_that_never_speaks_is_told_of_too():
+def test_a_battery_that_never_reports_is_a_trouble():
     drive = Battery(None)
     drive.plan()
     drive.tell(pose_at(0, 0), after=61.0)
     assert drive.mission.state is State.DEGRADED
 
 
-def test_a_charge_that_jumps_to_and_fro_is_told_of():
+def test_a_charge_that_jumps_to_and_fro_is_a_trouble():
     drive = Battery(0.3)
     drive.run(State.COVERING)
     assert drive.mission.charging.gauge.level is None
@@ -170,7 +170,7 @@ def test_silent_while_it_charges_it_stays_where_it_is():
     drive.finish()
 
 
-def test_a_charge_that_is_not_known_is_none():
+def test_an_unknown_charge_keeps_the_last_level():
     drive = Battery(0.8)
     for _ in range(100):
         drive.tell(pose_at(0, 0), BatteryReceived(None), after=1.0)
@@ -274,7 +274,7 @@ def test_cancelled_on_the_way_it_stays_where_it_stands():
     assert drive.cell == AT_DOCK
 
 
-def test_paused_it_stands_and_once_it_goes_on_it_charges_on():
+def test_a_resumed_robot_continues_to_charge():
     drive = Battery(0.15)
     drive.run(State.CHARGING)
     drive.command("pause")

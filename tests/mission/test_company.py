@@ -24,7 +24,7 @@ def test_the_mission_of_one_robot_loads_nothing_of_a_fleet():
     assert run.stdout == "\n"
 
 
-def test_a_robot_alone_has_no_others():
+def test_a_single_robot_has_no_company():
     assert type(Mission(CONFIG).company) is Company
 
 

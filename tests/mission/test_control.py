@@ -47,7 +47,7 @@ def follow(drive, ticks=600):
     raise AssertionError(f"not done: {drive.mission.state}, {drive.mission.reason}")
 
 
-def test_without_an_order_it_stands_and_says_so():
+def test_without_an_order_it_stands_with_that_reason():
     drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "no order yet")
     drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
@@ -58,7 +58,7 @@ def test_without_an_order_it_stands_and_says_so():
     assert drive.visited == {(0, 0), (0, 1), (0, 2), (0, 3)}, "it counts all the same"
 
 
-def test_an_order_for_everything():
+def test_an_order_for_everything_covers_all_reachable_cells():
     drive = idle(*ROOM)
     decision = drive.command("start")
     assert decision.plan.reason == "everything reachable"
@@ -112,7 +112,7 @@ def test_an_order_covers_all_again_unless_it_says_otherwise():
     follow(drive)
 
 
-def test_a_zone_forgets_its_own_cells_alone():
+def test_a_zone_forgets_only_its_own_cells():
     drive = started(*ROOM)
     drive.finish()
     decision = drive.command("start", {"zones": [{"name": "west", "polygon": WEST}]})
@@ -280,7 +280,7 @@ def test_resume_repairs_the_path_where_the_map_changed():
     drive.finish()
 
 
-def test_a_plan_that_a_pause_came_before_is_made_when_it_goes_on():
+def test_a_plan_delayed_by_a_pause_is_made_on_resume():
     drive = started(*ROOM)
     drive.tell(MapReceived(building("........", *ROOM)))
     drive.command("pause")
@@ -529,7 +529,7 @@ def explore(drive, mapper, ticks=600):
 HOUSE = ("....#.......", "....#.####..", "....#.#..#..", "......#.....", "....#.#..#..")
 
 
-def test_a_zone_nobody_has_seen_yet_is_looked_for():
+def test_an_unseen_zone_is_searched_for():
     mapper = Mapper(*HOUSE)
     drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), order_state=OrderState.idle("none"))
     # Through the door in the middle, around the corner, and in from behind.

@@ -95,7 +95,7 @@ def test_without_a_radius_a_path_has_no_headings_of_its_own():
     assert path.yaw is None
 
 
-def test_headings_turn_round_where_the_robot_changes_its_direction():
+def test_headings_turn_round_at_a_change_of_direction():
     xy = np.array([(0.0, 0.0), (1.0, 0.0), (0.5, 0.0), (0.4, 0.1), (1.4, 0.1)])
     both, ahead = (
         Curver(CurveConfig(TURN_M, reverses, 0.25, 0.25, 0.5, 200.0)) for reverses in (True, False)
@@ -169,7 +169,7 @@ def test_piece_by_piece_a_line_becomes_a_curve():
     assert ahead.line.points[-1] == pytest.approx(end, abs=1e-3)
 
 
-def test_a_curve_is_made_anew_from_a_robot_that_has_left_it():
+def test_a_curve_starts_again_at_a_robot_that_has_left_it():
     ahead, floor = laid(LANES)
     curver = Curver(configured().sweeping.curves)
     while curver.curve(ahead, floor, Pose2D(0.6, 0.6)):
@@ -198,7 +198,7 @@ def test_a_robot_whose_disc_does_not_fit_may_leave_its_place():
     assert not bends_of(xy).spots.any()
 
 
-def test_headings_are_published_in_the_map_frame_as_the_points_are(driven):
+def test_headings_are_published_in_the_map_frame(driven):
     _, update = driven.paths[0]
     told = LatticeRotation(30.0).path(update, driven.mission.lattice)
     ways, turned = np.diff(update.xy[:2], axis=0)[0], np.diff(told.xy[:2], axis=0)[0]

@@ -73,14 +73,14 @@ def test_half_turns_take_less_than_two_quarter_turns():
 
 @pytest.mark.parametrize("scatter_m", [0.0, 0.01, 0.02])
 @pytest.mark.parametrize("at_point", [0, 8])
-def test_a_robot_that_waits_for_somebody_is_no_slower(at_point, scatter_m):
+def test_waiting_does_not_lower_the_measured_speed(at_point, scatter_m):
     told = poses(LANES, SLOW, stops_at=at_point, stopped_s=300.0)
     times = measured(told, scatter_m, 0.5 * scatter_m)
     assert times.speed_m_s == pytest.approx(SLOW.speed_m_s, rel=0.05)
     assert times.quarter_turn_s == pytest.approx(expected(SLOW, 90.0), rel=0.08)
 
 
-def test_three_quarters_of_a_turn_are_no_quarter_turn():
+def test_a_turn_by_270_degrees_is_no_quarter_turn():
     round_and_on = [(0.0, 0.0), (4.0, 0.0)]
     seen = list(poses(round_and_on, SLOW))
     meter, at, yaw = DriveMeter(), 0.0, 0.0

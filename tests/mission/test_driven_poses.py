@@ -68,7 +68,7 @@ def test_a_pose_that_comes_back_counts_for_nothing():
     ]
 
 
-def test_one_that_stays_counts_with_the_next():
+def test_a_held_pose_counts_once_the_next_confirms_it():
     *_, held, last = taken(0.0, 3.0, 3.4)
     assert held == []
     assert last == [
@@ -84,6 +84,6 @@ def test_a_robot_faster_than_configured_sweeps_where_it_is_alone():
 
 
 @pytest.mark.parametrize(("speed_m_s", "every_s"), [(0.0, 1.0), (0.5, 0.0), (0.5, 4.0)])
-def test_where_nothing_is_known_of_the_way_all_count(speed_m_s, every_s):
+def test_without_speed_or_stamps_all_poses_count(speed_m_s, every_s):
     found = taken(0.0, 3.0, 0.1, speed_m_s=speed_m_s, every_s=every_s)
     assert [len(each) for each in found] == [1, 1, 1]

@@ -144,7 +144,7 @@ def test_walls_that_come_and_go_never_lead_to_an_illegal_step(seed, pace):
     assert drive.visited == set(np.ndindex(6, 7))
 
 
-def test_a_zone_that_stays_out_of_reach_is_named_at_the_end():
+def test_an_unreachable_zone_is_named_at_the_end():
     drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
     drive.tell(MapReceived(building("....#....")), pose_at(0, 0))
     drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(0, 6, 1, 8)}]})
@@ -161,7 +161,7 @@ def test_a_zone_that_stays_out_of_reach_is_named_at_the_end():
         ("?", 6, 8, "0.2"),
     ],
 )
-def test_the_area_of_a_zone_that_was_not_reached_is_said(wall, col0, col1, area):
+def test_the_area_of_an_unreached_zone_is_reported(wall, col0, col1, area):
     drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
     rows = (f"...#{wall}#...",) * 2
     drive.tell(MapReceived(building(*rows)), pose_at(0, 0))
@@ -194,7 +194,7 @@ def test_a_zone_covered_before_its_door_shut_is_not_named():
 
 
 @pytest.mark.parametrize("over", [False, True])
-def test_a_mapper_that_begins_anew_hides_no_floor_of_an_order(over):
+def test_a_restarted_mapper_hides_no_floor_of_an_order(over):
     """What is covered in sight is not all: beyond it the map showed more before the restart."""
     wall = "#" * 14
     seen = building(wall, "#........     ", wall)
@@ -224,7 +224,7 @@ def test_a_mapper_that_begins_anew_hides_no_floor_of_an_order(over):
         assert len(again.visited) == 12
 
 
-def test_on_the_same_map_after_a_restart_nobody_looks_where_it_ends():
+def test_a_restart_on_the_same_map_explores_no_border():
     wall = "#" * 14
     seen = building(wall, "#........     ", wall)
     drive = Drive((1, 8), MapReceived(seen), pose_at(1, 8))

@@ -72,7 +72,7 @@ def test_a_lattice_is_the_same_wherever_it_lies(place, yaw):
         (0.0, 2.0 * MOST_INDEX * 0.001, 0.001),
     ],
 )
-def test_what_nothing_could_be_told_of_is_refused(x, y, cell_m):
+def test_a_lattice_too_far_from_zero_is_refused(x, y, cell_m):
     geometry = GridGeometry(3, 3, cell_m, Pose2D(x, y))
     grid = OccupancyGrid(geometry, np.zeros((3, 3), np.int8))
     with pytest.raises(MapTooFar, match=r"a lattice from \(.*\) m, of cells of .* reaches beyond"):

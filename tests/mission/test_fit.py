@@ -85,7 +85,7 @@ def test_a_building_is_never_taken_for_another(buildings, ledgers, name, reach_m
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_most_other_buildings_are_told_by_their_whole_maps(buildings, ledgers, name):
+def test_most_other_buildings_are_detected_by_their_whole_maps(buildings, ledgers, name):
     others = [verdict(ledgers[name], buildings[other]) for other in MAPS if other != name]
     assert others.count(Verdict.OTHER) >= (2 if name == "office" else 3)
 
@@ -94,7 +94,7 @@ def fit(known, blocked, chance, covered=100):
     return Fit(covered, known, blocked, chance).verdict
 
 
-def test_the_rule():
+def test_the_verdict_follows_the_measured_agreement():
     assert fit(0, 0, 0.0) is Verdict.OPEN
     assert fit(9, 9, 1.0) is Verdict.OPEN, "too few to tell"
     assert fit(30, 10, 1.0) is Verdict.OTHER
@@ -122,7 +122,7 @@ def resumed(before, cell, *events):
     return drive
 
 
-def test_a_mission_goes_on_where_it_stopped():
+def test_a_mission_continues_where_it_stopped():
     first = started(*HALL, cell=(1, 1))
     for _ in range(60):
         first.go()
@@ -145,7 +145,7 @@ def test_a_finished_mission_stays_finished():
     assert again.decisions[-1] == Decision()
 
 
-def test_a_mapper_that_begins_again_does_not_cost_the_ledger():
+def test_a_restarted_mapper_keeps_the_ledger():
     first = started(*HALL, cell=(1, 1))
     for _ in range(60):
         first.go()
@@ -158,7 +158,7 @@ def test_a_mapper_that_begins_again_does_not_cost_the_ledger():
     assert again.mission.ledger.snapshot().cells == 61
 
 
-def test_another_building_is_said_and_begun_anew():
+def test_another_building_is_reported_and_covered_from_zero():
     first = started(*HALL, cell=(1, 1))
     first.finish()
     other = MapReceived(building(*PILLARS))
@@ -176,7 +176,7 @@ def test_another_building_is_said_and_begun_anew():
     assert again.tell(MapReceived(building(*HALL))).faults == ()
 
 
-def test_new_furniture_does_not_cost_the_ledger():
+def test_new_furniture_keeps_the_ledger():
     first = started(*HALL, cell=(1, 1))
     first.finish()
     again = resumed(after(first), (1, 1), MapReceived(building(*HALL)))

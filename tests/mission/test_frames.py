@@ -38,7 +38,7 @@ def told_for(drive, seconds, *events):
     return faults
 
 
-def test_one_map_in_another_frame_costs_nothing(driven):
+def test_a_single_map_in_another_frame_changes_nothing(driven):
     """As it comes from a tf prefix, or from SLAM that was started with other parameters."""
     again = restarted(driven, ODOM)
     assert again.mission.state is State.WAITING_FOR_MAP
@@ -90,7 +90,7 @@ def test_the_state_says_which_frame_is_where():
     assert drive.mission.reason == "poses arrive in frame 'map', the map is in 'odom'"
 
 
-def test_a_lost_pose_is_told_with_the_frame_that_poses_come_in():
+def test_a_lost_pose_is_reported_with_the_frame_of_other_poses():
     drive = Drive((1, 1), MAP, HERE, config=with_policy(CONFIG, lost_pose_s=3.0))
     drive.plan()
     told_for(drive, 5.0, THERE)
@@ -133,14 +133,14 @@ def test_a_pose_in_the_frame_of_the_progress_keeps_the_progress(driven):
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
 
 
-def test_single_poses_far_apart_are_no_stream(driven):
+def test_single_poses_do_not_change_the_frame(driven):
     again = restarted(driven, ODOM)
     for _ in range(4):
         again.tell(THERE, after=PATIENCE_S + 1.0)
     assert again.mission.snapshot().cells == driven.mission.snapshot().cells
 
 
-def test_a_mapper_that_begins_anew_in_another_frame_takes_over(driven):
+def test_a_mapper_restarted_in_another_frame_takes_over(driven):
     """And the robot does not drive on along a path that leads through another map."""
     walked = driven.walk
     assert walked

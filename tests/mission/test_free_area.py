@@ -47,7 +47,7 @@ def test_it_is_what_its_twin_counts(data):
 
 @examples(100)
 @given(st.data(), occupancy_grids(max_side=40))
-def test_where_nothing_is_reached_every_free_pixel_counts_once(data, grid):
+def test_without_reachable_cells_each_free_pixel_counts_once(data, grid):
     """Also those on the border of two cells, or of the lattice, where rounding decides."""
     lattice = CoverageLattice.from_map(grid, FOOTPRINT)
     rng = np.random.default_rng(data.draw(st.integers(0, 99)))
@@ -59,7 +59,7 @@ def test_where_nothing_is_reached_every_free_pixel_counts_once(data, grid):
     assert sum(halves) == everything
 
 
-def test_a_new_map_or_reach_is_counted_anew():
+def test_a_new_map_or_reach_is_counted_again():
     area = FreeArea(25)
     one, other = building("...", "..#"), building("...", "...")
     lattice = CoverageLattice.from_map(other, Footprint(CELL, CELL / 2))

@@ -60,7 +60,7 @@ def arrive(drive, ticks=80):
         ({"home": HOME, "dock": DOCK}, (5, 0)),
     ],
 )
-def test_it_drives_home_stands_there_and_goes_on_where_it_was(policy, there):
+def test_it_drives_home_and_resume_continues_the_order(policy, there):
     drive = covering(**policy)
     decision = drive.command("home")
     assert (decision.path.reason, drive.mission.state) == ("drives home", State.RETURNING)
@@ -87,7 +87,7 @@ def test_the_way_home_begins_at_the_robot_even_off_its_path():
     assert len(path.cells) == 1 + abs(drive.cell[0] - 5) + abs(drive.cell[1] - 0)
 
 
-def test_it_goes_on_at_the_nearer_end_of_what_is_left():
+def test_it_continues_at_the_nearer_end_of_the_rest():
     row, col = covering().mission.route.path.cells[-1].tolist()
     drive = covering(home=Place(x_m=(col + 0.5) * CELL, y_m=(row + 0.5) * CELL))
     drive.command("home")
@@ -116,7 +116,7 @@ def test_resumed_on_the_way_it_drives_on_home():
     assert (drive.cell, drive.mission.reason) == ((0, 0), "at home, paused by command")
 
 
-def test_the_same_order_started_on_the_way_goes_on_at_once():
+def test_an_equal_order_on_the_way_home_continues_at_once():
     drive = covering(20)
     drive.command("home")
     drive.go()
@@ -126,7 +126,7 @@ def test_the_same_order_started_on_the_way_goes_on_at_once():
     drive.finish()
 
 
-def test_home_told_twice_is_home_told_once():
+def test_a_second_command_home_changes_nothing():
     drive = covering()
     revision = drive.command("home").path.revision
     assert drive.command("home").path is None
@@ -221,7 +221,7 @@ def test_after_a_reset_home_is_where_the_next_order_begins():
     assert drive.cell == began != (0, 0)
 
 
-def test_without_an_order_it_stops_on_the_way_and_goes_on_home():
+def test_without_an_order_resume_continues_the_drive_home():
     drive = robot((0, 7), OrderState.idle("no order yet"), home=HOME)
     drive.command("home")
     drive.go()
@@ -232,7 +232,7 @@ def test_without_an_order_it_stops_on_the_way_and_goes_on_home():
     assert (drive.cell, drive.mission.reason) == ((5, 0), "at home")
 
 
-def test_where_there_is_no_home_that_is_said():
+def test_without_a_home_the_command_is_refused():
     drive = robot(order_state=OrderState.idle("no order yet"))
     drive.command("home")
     assert str(drive.refused) == "there is no home yet"

@@ -31,7 +31,7 @@ def remove(drive, name):
     return drive.command("keep_out_remove", keep_out=KeepOut(name))
 
 
-def test_in_mid_mission_coverage_stays_and_the_order_goes_on():
+def test_a_keep_out_during_a_mission_keeps_coverage_and_order():
     drive = started(*ROOM)
     for _ in range(12):
         drive.go()
@@ -89,7 +89,7 @@ def test_a_robot_at_a_keep_out_border_stops_and_is_led_out():
     assert (row, col) not in drive.driven[4:]
 
 
-def test_what_is_kept_out_is_covered_once_it_is_removed():
+def test_cells_of_a_removed_keep_out_are_covered():
     drive = started(*ROOM)
     add(drive, VASE)
     for _ in range(10):
@@ -175,7 +175,7 @@ def test_added_twice_it_is_added_once():
     assert drive.mission.route.revision == revision
 
 
-def test_what_cannot_be_is_refused_by_name_and_changes_nothing():
+def test_an_invalid_keep_out_is_refused_and_changes_nothing():
     drive = started(*ROOM)
     add(drive, VASE)
     for give, said in (

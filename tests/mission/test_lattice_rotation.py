@@ -261,7 +261,7 @@ def test_floor_that_is_carried_over_lies_where_it_was():
     assert relaid_ledger(before, 0.0, CELL_M) is before
 
 
-def test_cells_of_another_size_count_by_the_floor_at_their_centres():
+def test_cells_of_another_size_count_by_their_centres():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(3.0, 2.4)))
     robot.drive(60)
@@ -301,7 +301,7 @@ def test_walls_are_observed_only_until_they_are_certain():
     assert looks(OccupancyGrid(GridGeometry(120, 120, 0.05, Pose2D(0, 0)), cells)) == []
 
 
-def test_a_pose_that_jumps_is_no_drive_to_look_again_after():
+def test_a_jump_of_the_pose_does_not_count_as_a_drive():
     watch, grid = WallWatch(), turned(room(2.6, 2.0), 20.0)
     found = [watch.look(grid, Pose2D(50.0 * step, 0.0)) for step in range(50)]
     assert found == [None] * 50

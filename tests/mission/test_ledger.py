@@ -122,7 +122,7 @@ def test_a_window_beside_what_was_driven_is_empty():
     assert CoverageLedger(CELL).visits(Window(0, 0, 2, 2)).tolist() == [[0, 0], [0, 0]]
 
 
-def test_what_is_returned_is_a_copy():
+def test_the_returned_array_is_a_copy():
     ledger, _ = drive((0.5, 0.5))
     ledger.visits(Window(0, 0, 1, 1))[0, 0] = 9
     assert counts(ledger) == {(0, 0): 1}
@@ -218,7 +218,7 @@ def test_a_snapshot_copies_only_what_has_changed():
     assert second.tiles[0, 3] is not first.tiles[0, 3]
 
 
-def test_a_restored_ledger_goes_on_as_if_nothing_had_been():
+def test_a_restored_ledger_continues_without_a_difference():
     points = [(0.5, 0.5 + 0.4 * step) for step in range(12)]
     whole, _ = drive(*points, *points[::-1])
     begun, _ = drive(*points)
@@ -230,7 +230,7 @@ def test_a_restored_ledger_goes_on_as_if_nothing_had_been():
     assert begun.total < restored.total, "they share nothing"
 
 
-def test_what_was_driven_while_nobody_listened_is_not_invented():
+def test_cells_between_the_last_and_first_pose_are_not_covered():
     """Around a corner, and not straight to where the robot is heard of again."""
     ledger, _ = drive((0.5, 0.5))
     restored = CoverageLedger.restored(ledger.snapshot())
@@ -238,7 +238,7 @@ def test_what_was_driven_while_nobody_listened_is_not_invented():
     assert counts(restored) == {(0, 0): 1, (0, 2): 1}
 
 
-def test_a_robot_that_stood_still_visits_nothing_anew():
+def test_a_standing_robot_visits_no_cell_again():
     ledger, _ = drive((0.5, 0.5))
     restored = CoverageLedger.restored(ledger.snapshot())
     assert restored.record(Pose2D(0.6 * CELL, 0.5 * CELL)) == set()
@@ -260,7 +260,7 @@ def test_poses_that_jump_over_the_world_keep_the_ledger_bounded():
     assert set(ledger.snapshot().tiles) == set(CoverageLedger.restored(ledger.snapshot())._tiles)
 
 
-def test_what_is_nearest_to_the_robot_stays():
+def test_the_tiles_nearest_to_the_robot_are_kept():
     ledger = CoverageLedger(CELL)
     for number in range(MOST_TILES + 1):
         ledger.record(Pose2D((number * TILE + 0.5) * CELL, 0.5 * CELL))

@@ -51,14 +51,14 @@ def test_a_way_home_that_opens_leads_over_the_floor_left(retries):
     assert drive.cell == (0, 0)
 
 
-def test_a_row_along_a_wall_that_opens_calls_nobody_back():
+def test_a_narrow_opening_does_not_turn_the_robot_back():
     drive = returning(rows=("##########", *ROOMS))
     drive.tell(patch("......", at=(4, 4)))
     until(drive, lambda: drive.now > 60.0)
     assert drive.mission.order_state.stage is Stage.RETURNING
 
 
-def test_a_door_that_opens_whenever_the_robot_has_left_ends_too():
+def test_a_door_that_opens_repeatedly_does_not_delay_the_end():
     drive = returning()
     turned = 0
     for _ in range(10):

@@ -22,7 +22,7 @@ def drive_short(drive, cells, *events):
     drive.tell(pose_at(*short), *events, after=1.0)
 
 
-def test_a_cell_that_the_map_shows_now_and_then_is_no_progress():
+def test_a_flickering_cell_does_not_count_as_progress():
     drive = drives("##.##", ".....", cell=(0, 2))
     drive.command("start", {"zones": []})
     for tick in range(200):

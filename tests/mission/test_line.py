@@ -403,7 +403,7 @@ def assert_clear(robot, grid, most_m=2.4):
             return
 
 
-def test_what_comes_into_the_way_is_driven_round_at_once():
+def test_a_new_obstacle_is_driven_round_at_once():
     grid = room(3.0, 2.4)
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(grid))
@@ -501,7 +501,7 @@ def test_a_robot_that_stands_gets_its_line_again():
     robot.finish()
 
 
-def test_how_long_a_robot_stands_is_told_by_its_own_clock():
+def test_standstills_are_timed_by_the_robots_clock():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(6.0, 3.0)))
     for _ in range(20):
@@ -687,7 +687,7 @@ def test_a_line_on_a_growing_map_never_becomes_worse():
     assert costs[-1] < costs[0] - 1.0
 
 
-def test_the_robot_is_told_of_another_line_when_it_comes_near_it():
+def test_a_changed_line_is_published_when_the_robot_is_near():
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(6.0, 3.0)))
     for _ in range(100):
@@ -709,7 +709,7 @@ def test_the_robot_is_told_of_another_line_when_it_comes_near_it():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
-def test_a_map_on_another_raster_costs_the_polish_alone(yaw):
+def test_a_map_on_another_raster_loses_only_the_polish(yaw):
     grid = room(3.0, 2.4, yaw)
     robot = Robot(Mission(CONFIG))
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -723,7 +723,7 @@ def test_a_map_on_another_raster_costs_the_polish_alone(yaw):
 
 
 @pytest.mark.parametrize("poses_a_step", [1, 32])
-def test_what_is_forgotten_is_to_be_swept_again(poses_a_step):
+def test_forgotten_floor_is_swept_again(poses_a_step):
     """However many poses come with the news, as after a slow step."""
     robot = Robot(Mission(CONFIG))
     robot.tell(MapReceived(room(3.0, 2.4)))

@@ -59,7 +59,7 @@ def test_the_same_walk_keeps_the_line():
     assert (found.cells == np.arange(len(BEFORE))).all()
 
 
-def test_what_is_just_ahead_of_the_robot_stays_however_short():
+def test_a_short_piece_just_ahead_of_the_robot_is_kept():
     """Where the walk changed within eight cells, the line began with stands all anew."""
     line = polished(BEFORE)
     after = cells(*lane(0, range(4)), *lane(1, range(3, -1, -1)))
@@ -68,7 +68,7 @@ def test_what_is_just_ahead_of_the_robot_stays_however_short():
     assert (found.points[3:] == stand(after[3:])).all()
 
 
-def test_what_comes_between_goes_over_stands():
+def test_a_detour_between_pieces_goes_over_stands():
     detour = cells(*lane(0, range(10)), (1, 9), (2, 9), (2, 10), (1, 10), *lane(0, range(10, 20)))
     after = cells(*detour.tolist(), *lane(1, range(19, -1, -1)))
     line = polished(BEFORE)
@@ -138,7 +138,7 @@ def test_a_stand_is_left_out_only_if_the_way_past_it_is_clear():
     assert found.points[-1].tolist() == stand((2, 5)).tolist()
 
 
-def test_where_no_stand_comes_between_the_line_goes_on():
+def test_pieces_without_a_stand_between_them_are_joined():
     walk = cells(*lane(0, range(6)))
     line = polished(walk)
 

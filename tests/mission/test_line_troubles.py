@@ -59,7 +59,7 @@ def test_a_tool_much_narrower_or_wider_than_the_robot(tool_m):
     assert figures.illegal_share == 0.0
 
 
-def test_a_free_line_that_is_too_narrow_for_the_robot():
+def test_a_lane_too_narrow_for_the_robot_is_not_driven():
     free = np.zeros((40, 80), np.bool_)
     free[20, 4:76] = True
     robot = Robot(Mission(CONFIG), (2.0, 1.025))
@@ -69,7 +69,7 @@ def test_a_free_line_that_is_too_narrow_for_the_robot():
     assert not robot.line
 
 
-def test_a_free_line_as_wide_as_the_robot():
+def test_a_free_lane_as_wide_as_the_robot_is_driven():
     free = np.zeros((40, 80), np.bool_)
     free[16:24, 4:76] = True
     figures, _ = finish(grid_of(free), (2.0, 1.0))
@@ -197,7 +197,7 @@ def test_a_line_ends_at_a_cut_that_stays():
     assert counts.max() > NEVER
 
 
-def test_what_lies_between_two_blocked_lanes_stays():
+def test_lanes_between_two_blocked_lanes_are_kept():
     """It was laid anew, with all the lanes between."""
     free = np.ones((120, 120), bool)
     ahead, floor = polished_line(before := grid_of(free))

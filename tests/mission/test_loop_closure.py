@@ -51,7 +51,7 @@ def test_walls_elsewhere_all_over_are_a_loop_closure(jump):
         (rooms(), rooms(known=0.5)),
     ],
 )
-def test_doors_and_news_are_none(before, after):
+def test_doors_and_new_floor_are_no_loop_closure(before, after):
     assert not has_moved(change(before, after))
 
 
@@ -71,7 +71,7 @@ def test_a_motion_is_gone_back_by_shares():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_nothing_counts_that_the_tool_did_not_pass_over(seed):
+def test_only_floor_that_the_tool_passed_over_counts(seed):
     """Wherever the map came to lie, what is left is a part of what was covered, moved along."""
     rng = np.random.default_rng(seed)
     ledger = CoverageLedger(0.3)
@@ -107,7 +107,7 @@ def test_the_corner_of_four_cells_was_not_under_a_round_tool(shift, counts):
     assert doubt.any() != counts
 
 
-def test_who_stood_still_forgets_nothing():
+def test_a_robot_that_stood_still_forgets_nothing():
     ledger = CoverageLedger(0.3)
     for step in range(40):
         ledger.record(Pose2D(0.1 * step, 0.15))

@@ -78,7 +78,7 @@ def test_coverage_of_a_cancelled_order_is_forgotten_by_consent():
     assert refused(drive, "start", {"keep_covered": True}) is None
 
 
-def test_an_order_that_is_over_loses_nothing_to_the_next():
+def test_a_finished_order_needs_no_consent():
     drive = started(*ROOM)
     drive.finish()
     assert refused(drive, "start", OTHER) is None
@@ -104,7 +104,7 @@ def test_before_there_is_a_map_all_that_was_covered_counts():
 
 
 @pytest.mark.parametrize("at", [(0, 0), (40, 40)])
-def test_what_is_covered_beyond_a_map_that_has_shrunk_counts_too(at):
+def test_covered_cells_beyond_a_smaller_map_count(at):
     """A mapper that begins again shows little at first."""
     drive = covering(12)
     drive.tell(MapReceived(building("..", "..", at=at)))
@@ -112,7 +112,7 @@ def test_what_is_covered_beyond_a_map_that_has_shrunk_counts_too(at):
     assert "start forgets 11 covered cells (0.7 m2)" in refused(drive, "start", OTHER)
 
 
-def test_of_a_zone_too_what_is_covered_beyond_the_map_counts():
+def test_covered_cells_of_a_zone_beyond_the_map_count():
     drive = covering(12)
     drive.tell(MapReceived(building("..", "..")))
     west = {"zones": [{"name": "west", "polygon": rectangle(0, 0, 6, 3)}]}
@@ -127,7 +127,7 @@ def refused_without_map(drive):
     return str(drive.refused)
 
 
-def test_none_is_said_to_be_less_than_it_is():
+def test_a_small_share_is_never_reported_as_nothing():
     """A share never rounds to nothing."""
     drive = Drive((0, 0), MapReceived(building(*("." * 20,) * 20)), pose_at(0, 0))
     drive.plan()

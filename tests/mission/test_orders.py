@@ -35,12 +35,12 @@ def zones(*polygons, **rest):
     return {"zones": named, **rest}
 
 
-def test_nothing_means_everything_once():
+def test_an_empty_order_covers_everything_once():
     assert read_order(None) == read_order({}) == EVERYTHING_ONCE == MissionOrder()
     assert read_order({"passes": 3}).zones == (Zone("everything", None, 3),)
 
 
-def test_an_order_with_all_there_is():
+def test_an_order_may_have_all_its_members():
     order = read_order(
         {
             "zones": [KITCHEN, {"name": "hall", "polygon": SQUARE, "passes": 3}],
@@ -146,7 +146,7 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
         (zones(*[SQUARE] * 101), "zones: expected array of length <= 100"),
     ],
 )
-def test_what_is_wrong_is_named(document, said):
+def test_a_wrong_member_is_named(document, said):
     with pytest.raises(OrderError) as caught:
         read_order(document)
     assert said in str(caught.value)
@@ -159,7 +159,7 @@ def test_a_polygon_of_a_thousand_points_is_no_burden():
     read_order(zones([[5 * math.cos(a), 5 * math.sin(a)] for a in angles]))
 
 
-def test_commands():
+def test_each_command_is_read():
     assert read_command({"command": "pause"}) == Command("pause")
     assert read_command({"command": "start", "order": {"passes": 2}}).order.zones[0].passes == 2
     for command in (
@@ -225,7 +225,7 @@ anything = st.recursive(
 
 @examples(300)
 @given(anything)
-def test_whatever_is_written_is_an_order_or_refused(document):
+def test_any_document_is_an_order_or_is_refused(document):
     try:
         order = read_order(document)
     except OrderError:
@@ -261,7 +261,7 @@ def test_the_legs_of_an_order():
         OrderState(TWO, reached=REACHED),
     ],
 )
-def test_what_is_kept_is_what_was(order_state):
+def test_a_stored_state_is_read_back(order_state):
     assert OrderState.from_json(order_state.to_json()) == order_state
 
 

@@ -79,7 +79,7 @@ def test_the_floor_at_the_other_end_of_a_lift_is_swept(other):
     assert len(drive.driven) > drive.mission.coverage().coverable
 
 
-def test_another_floor_is_never_said_to_be_done():
+def test_another_floor_is_never_reported_as_done():
     drive = swept(*FLOOR)
     states = states_of(drive, 8, NEW)
     assert State.DONE not in states[1:]
@@ -117,7 +117,7 @@ def test_a_map_turned_around_under_a_still_robot_is_another_one():
     assert [type(fault) for fault in faults] == [LedgerMismatchError]
 
 
-def test_a_map_that_comes_in_parts_is_another_one_too():
+def test_another_building_is_detected_in_a_partial_map():
     drive = swept(*FLOOR)
     faults = []
     for row in range(0, 12, 2):
@@ -126,7 +126,7 @@ def test_a_map_that_comes_in_parts_is_another_one_too():
     assert [type(fault) for fault in faults] == [LedgerMismatchError]
 
 
-def test_a_robot_without_repeated_poses_does_not_wait_for_ever():
+def test_without_repeated_poses_the_building_is_decided():
     drive = swept(*FLOOR)
     drive.tell(NEW)
     faults = [fault for _ in range(80) for fault in drive.tell().faults]
@@ -163,7 +163,7 @@ def test_a_map_that_grows_is_the_same_building():
     assert faults == []
 
 
-def test_moved_furniture_does_not_cost_the_ledger():
+def test_moved_furniture_keeps_the_ledger():
     drive = swept(*FLOOR)
     covered = drive.mission.ledger.snapshot().cells
     rows = [list(row) for row in FLOOR]
@@ -245,7 +245,7 @@ def test_a_paused_robot_stays_paused_on_the_other_floor():
 
 
 @pytest.mark.parametrize("other", [OTHER, OPEN], ids=["walls elsewhere", "walls gone"])
-def test_a_mission_that_replaces_another_goes_on_with_its_doubt(other):
+def test_a_reload_keeps_the_doubt_about_the_building(other):
     """As after a reload of the configuration, while the robot stands between the floors."""
     first = swept(*FLOOR)
     shown = MapReceived(building(*other))

@@ -33,7 +33,7 @@ def foreign_assignments(source: str) -> list[str]:
     return found
 
 
-def test_what_it_finds():
+def test_assignments_to_members_of_others_are_found():
     assert foreign_assignments("self.route.path = 1") == ["1: self.route.path"]
     assert foreign_assignments("a, parts.now = 1, 2") == ["1: parts.now"]
     assert foreign_assignments("route.plans += 1") == ["1: route.plans"]
@@ -41,5 +41,5 @@ def test_what_it_finds():
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.stem)
-def test_state_is_assigned_by_its_owner_alone(path):
+def test_state_is_assigned_only_by_its_owner(path):
     assert foreign_assignments(path.read_text(encoding="utf-8")) == []

@@ -32,7 +32,7 @@ def distance_to_walls(pixels, points):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_wherever_the_robot_is_pushed_to_the_path_begins_there(seed):
+def test_the_path_begins_where_the_robot_is_pushed_to(seed):
     rng = np.random.default_rng(seed)
     pixels = room_with_box()
     robot = LineRobot(pixels, (0.75, 0.75))

@@ -119,7 +119,7 @@ def test_a_daemon_that_waits_for_another_sends_nothing():
     assert len(sent.paths) == 1
 
 
-def test_nothing_new_is_sent_while_nothing_changes():
+def test_without_a_change_no_path_is_sent():
     drive, exit_, sent = driving()
     for _ in range(3):
         step(drive, exit_, sent)

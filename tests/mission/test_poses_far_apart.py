@@ -45,7 +45,7 @@ def status_of(mission):
     )
 
 
-def test_what_lies_between_poses_is_said_not_to_count():
+def test_poses_too_far_apart_are_reported():
     found = robot(40, 60)
     assert found.wait(100.0, lambda robot: "poses are too far apart" in robot.mission.reason)
     assert found.mission.state == "degraded"

@@ -44,7 +44,7 @@ def test_a_near_change_waits_briefly_for_a_running_plan():
 
 
 @pytest.mark.parametrize("left", [1, 2, 3])
-def test_what_is_just_ahead_does_not_wait(left):
+def test_a_change_just_ahead_does_not_wait(left):
     published = PublishedLine(0.25)
     published.take(ZIGZAG, len(ZIGZAG))
     assert look(published, ZIGZAG[:left], is_settled=False)

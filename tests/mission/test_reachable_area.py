@@ -216,7 +216,7 @@ def test_cells_hold_up_to_the_first_illegal_step(given_ground, headings, jump_at
     assert ReachableArea.around(lattice, start).drivable_prefix(path(*walk)) == expected
 
 
-def test_a_walk_that_begins_where_nobody_can_be_does_not_hold():
+def test_a_walk_from_an_impossible_cell_cannot_be_driven():
     room = ground("..#")
     assert room.drivable_prefix(path()) == 0
     assert room.drivable_prefix(path((0, 1))) == 1

@@ -64,7 +64,7 @@ def test_the_end_says_what_is_out_of_reach_now(how, is_restarted, why):
 
 
 @pytest.mark.parametrize("how", ["closed", "unknown"])
-def test_what_was_reachable_turns_with_the_lattice(how):
+def test_reached_cells_turn_with_the_lattice(how):
     """As after a restart with another ``lattice_deg``."""
     robot = in_first_room()
     robot.show(changed(how))
@@ -87,7 +87,7 @@ def test_a_robot_that_is_shut_in_is_not_done_after_a_restart():
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
 
 
-def test_one_that_is_shut_in_with_nothing_left_beyond_is_done():
+def test_a_shut_in_robot_with_no_floor_left_is_done():
     robot = LineRobot(two_rooms(is_open=True), START)
     assert robot.wait(300.0, lambda robot: robot.mission.coverage().remaining < 15)
     assert robot.x > 3.3
@@ -123,7 +123,7 @@ TURNED, SHIFTED = (0.0, 0.0, 3.0), (0.1, 0.1, 0.0)
         (30.0, (0.14, 0.0, 0.0)),
     ],
 )
-def test_what_was_reachable_moves_with_the_map(after_s, motion):
+def test_reached_cells_move_with_the_map(after_s, motion):
     robot = LineRobot(two_rooms(is_open=True), START)
     robot.wait(after_s, lambda _: False)
     with_map_moved(robot, two_rooms(is_open=True), *motion)
@@ -134,7 +134,7 @@ def test_what_was_reachable_moves_with_the_map(after_s, motion):
 
 
 @pytest.mark.parametrize("motion", [TURNED, SHIFTED])
-def test_a_room_that_is_closed_as_the_map_moves_is_told_once(motion):
+def test_a_room_closed_as_the_map_moves_is_reported_once(motion):
     robot = LineRobot(two_rooms(is_open=True), START)
     assert robot.wait(100.0, lambda robot: robot.x < 2.0)
     with_map_moved(robot, changed("closed"), *motion)

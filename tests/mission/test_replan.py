@@ -66,7 +66,7 @@ def test_a_map_change_does_not_hide_a_requested_replan():
         (lambda: Drive((9, 9), MapReceived(building(*ROOM)), pose_at(9, 9)), "outside of the map"),
     ],
 )
-def test_where_there_is_nothing_to_plan_it_says_why(drive, said):
+def test_a_replan_without_work_is_refused_with_the_reason(drive, said):
     robot = drive()
     decision = robot.command("replan")
     assert isinstance(robot.refused, CommandError)
@@ -111,7 +111,7 @@ def test_a_path_cut_off_says_where():
     assert drive.updates[-1].changed == Window(0, 4, 1, 8)
 
 
-def test_what_was_cut_off_is_kept_where_it_holds():
+def test_the_cut_off_part_is_kept_where_it_is_valid():
     drive = started(*ROOM)
     ahead = drive.mission.route.path.ahead
     row, col = ahead[12].tolist()
@@ -133,7 +133,7 @@ def test_what_was_cut_off_is_kept_where_it_holds():
     ],
     ids=["blocked", "beyond the map", "carried elsewhere"],
 )
-def test_nobody_is_sent_to_a_cell_that_is_none_any_more(events, goes_on_at):
+def test_no_path_leads_to_a_cell_that_is_blocked_now(events, goes_on_at):
     drive = started("........")
     decision = drive.tell(*events)
     assert decision.path.reason == "path blocked at cell (0, 0)"

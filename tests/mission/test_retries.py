@@ -92,7 +92,7 @@ def test_a_door_that_opens_ends_the_wait_for_another_try():
     assert reasons(drive) == []
 
 
-def test_what_never_could_be_reached_is_named_and_not_waited_for():
+def test_cells_that_were_never_reachable_are_not_waited_for():
     drive = drives("...#..", "...#..")
     drive.run(State.DONE)
     assert drive.now < 5.0
@@ -110,7 +110,7 @@ def test_rows_left_along_a_wall_are_named_and_not_tried_again():
     assert reasons(drive) == [(6, "no longer free on the map")]
 
 
-def test_what_was_covered_before_it_was_closed_is_no_loss():
+def test_cells_covered_before_they_closed_are_no_loss():
     drive = drives(*["......"] * 4)
     drive.run(State.DONE)
     drive.tell(patch("###", "###", at=(1, 1)))

@@ -19,7 +19,7 @@ from fasaco_edge.mission.map.room_edits import merge, move, split
 from fasaco_edge.mission.map.room_matching import HOLD_CHANGE, HOLD_NEW
 from fasaco_edge.mission.map.room_watch import update
 
-# A letter is a square of 1 m, drawn as 10 x 10 pixels; equal letters are one region.
+# A letter is a square of 1 m, drawn as 10 x 10 pixels of 0.1 m; equal letters are one region.
 PIXELS, SIDE_M = 10, 0.1
 
 
@@ -169,7 +169,7 @@ def test_a_large_loop_closure_is_followed_by_the_robots_pose():
     assert (x, y) == pytest.approx(moved.geometry.to_map(45.0, -5.0))
 
 
-def test_an_unnamed_room_joins_its_neighbour_in_the_end_and_comes_back_by_its_number():
+def test_a_room_that_joins_its_neighbour_gets_its_number_back():
     book = known(FLAT)
     ids = {place: at(book, *place) for place in (KITCHEN, BATH)}
     shown(book, WITHOUT_WALL, HOLD_CHANGE - 1)
@@ -181,7 +181,7 @@ def test_an_unnamed_room_joins_its_neighbour_in_the_end_and_comes_back_by_its_nu
     assert book.next_id == 4
 
 
-def test_a_room_is_parted_in_the_end_and_its_largest_part_stays():
+def test_the_largest_part_of_a_divided_room_keeps_its_number():
     book = known(WITHOUT_WALL)
     number = at(book, *KITCHEN)
     shown(book, FLAT, HOLD_CHANGE)
@@ -189,7 +189,7 @@ def test_a_room_is_parted_in_the_end_and_its_largest_part_stays():
     assert number in (at(book, *KITCHEN), at(book, *BATH))
 
 
-def test_two_named_rooms_under_one_region_are_divided_by_memory_for_ever():
+def test_two_named_rooms_in_one_region_stay_divided():
     book = known(FLAT)
     book.name(at(book, *KITCHEN), "kitchen")
     book.name(at(book, *BATH), "bath")
@@ -298,7 +298,7 @@ def test_a_name_is_taken_away_and_free_again():
         (lambda book: merge(book, [1, 2, 3], "room 4"), "read as the number of a room"),
     ],
 )
-def test_what_cannot_be_done_is_refused_by_name(change, why):
+def test_an_impossible_change_is_refused_by_name(change, why):
     book = known(FLAT)
     book.name(at(book, *KITCHEN), "kitchen")
     before = book.rooms
@@ -308,7 +308,7 @@ def test_what_cannot_be_done_is_refused_by_name(change, why):
     assert book.rooms == before
 
 
-def test_another_building_gets_a_sheet_of_its_own_and_the_first_one_comes_back():
+def test_each_building_has_a_sheet_of_its_own():
     book = known(FLAT)
     book.name(at(book, *KITCHEN), "kitchen")
     other = regions("aabb", "aabb", "ccbb", "ccbb", at=(0.5, 0.5))
@@ -345,7 +345,7 @@ def test_a_building_seen_again_from_a_corner_gets_its_names_back():
     assert book.find("garage") is None
 
 
-def test_a_split_for_which_there_are_too_many_rooms_changes_nothing(monkeypatch):
+def test_a_split_beyond_the_limit_of_rooms_changes_nothing(monkeypatch):
     book = known(regions("aaaaaaaaa", "aa..a..aa"))
     monkeypatch.setattr(room_book, "MOST_ROOMS", 2)
     before, next_id = book.rooms, book.next_id

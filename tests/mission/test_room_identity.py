@@ -20,8 +20,10 @@ from tests.support.poses import composed
 
 SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)
 LOOKS = 8
-# Rooms are named once so much was seen, those of which so much lies in one true room.
-NAMED_FROM, PURE = 0.6, 0.7
+# Share of the building that is seen when rooms are named.
+NAMED_FROM = 0.6
+# Least share of a named room that lies in one true room.
+PURE = 0.7
 
 
 def noisy(cells, rng):

@@ -112,7 +112,7 @@ def test_a_room_is_ordered_by_its_name_and_by_its_number():
     assert len(visited(drive, WEST_COLUMNS)) == 90
 
 
-def test_what_is_unknown_is_refused_with_what_there_is():
+def test_an_unknown_room_is_refused_with_the_known_ones():
     zone = StandingZone(name="rug", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
     drive = settled(*BOTH, config=with_policy(CONFIG, zones=(zone,)))
     name(drive, room_at(drive, *IN_EAST).id, "kitchen")
@@ -146,7 +146,7 @@ def test_a_zone_follows_its_room_as_the_map_grows():
     assert len(visited(drive, WEST_COLUMNS)) == 90
 
 
-def test_the_same_order_by_name_goes_on_after_its_room_has_grown():
+def test_an_equal_order_continues_after_its_room_has_grown():
     drive = settled(*tuple(row[:6] + "?" * 15 for row in BOTH))
     name(drive, 1, "hall")
     start(drive, "hall")
@@ -194,7 +194,7 @@ def test_a_wait_before_anything_else_stands_and_can_be_cancelled():
     assert drive.mission.state is State.IDLE
 
 
-def test_settings_of_a_room_are_used_where_the_order_says_nothing():
+def test_settings_of_a_room_apply_to_orders_without_them():
     drive = settled(*BOTH)
     number = room_at(drive, *IN_EAST).id
     drive.command("room_set", room=RoomRequest(number, passes=["auto", "cross"]))
@@ -207,7 +207,7 @@ def test_settings_of_a_room_are_used_where_the_order_says_nothing():
     assert drive.mission.rooms.room(number).settings.passes == 2
 
 
-def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so(monkeypatch):
+def test_an_order_for_everything_reports_the_skipped_room(monkeypatch):
     drive = settled(*BOTH)
     name(drive, room_at(drive, *IN_EAST).id, "bath")
     drive.command("room_set", room=RoomRequest("bath", skip=True))
@@ -241,7 +241,7 @@ def test_an_order_for_everything_leaves_a_skipped_room_out_and_says_so(monkeypat
     ],
 )
 @pytest.mark.parametrize("unknown", ["refuse", "wait"])
-def test_a_number_that_no_room_has_is_refused_even_by_an_order_that_waits(zone, where, unknown):
+def test_an_unknown_room_number_is_always_refused(zone, where, unknown):
     """Whatever room gets the number next would be swept."""
     bay = StandingZone(name="bay", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
     drive = settled(*BOTH, config=with_policy(CONFIG, zones=(bay,)))
@@ -386,7 +386,7 @@ def test_documents_are_read_as_they_were_written():
         ({"command": "start", "order": {"unknown": "ask"}}, "order.unknown: expected refuse, wait"),
     ],
 )
-def test_what_is_wrong_with_a_request_is_named(document, said):
+def test_a_wrong_member_of_a_request_is_named(document, said):
     with pytest.raises(OrderError) as refused:
         read_command(document)
     assert said in str(refused.value)

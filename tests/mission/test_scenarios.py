@@ -206,7 +206,7 @@ def test_a_wall_around_the_robot_blocks_it_until_its_removal():
     drive.finish()
 
 
-def test_a_robot_that_stops_short_is_not_resent_for_ever():
+def test_a_robot_that_stops_short_is_resent_a_few_times():
     drive = started("...")
     drive.go()
     x, y = (drive.cell[1] + 1) * 0.25 + 0.01, 0.01  # in the last cell's corner
@@ -227,7 +227,7 @@ def test_a_robot_that_stops_short_is_not_resent_for_ever():
     assert drive.mission.orders.unreached().areas == ()
 
 
-def test_a_map_that_jumps_far_away_costs_no_memory_in_between():
+def test_a_map_that_jumps_far_away_takes_no_memory_in_between():
     """As when a mapper adopts UTM coordinates."""
     drive = started(*ROOM)
     drive.go()
@@ -311,7 +311,7 @@ def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
     assert drive.mission.route.path.ahead.tolist() == [[0, col] for col in range(4, 9)]
 
 
-def test_an_answer_nobody_asked_for_changes_nothing():
+def test_an_unrequested_plan_changes_nothing():
     drive = started(*CORRIDOR)
     path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
     assert drive.tell(PlanReady(99, path, 0.1)) == Decision()
@@ -356,7 +356,7 @@ def test_an_update_that_does_not_fit_is_a_fault():
     drive.finish()
 
 
-def test_updates_that_come_together_cost_one_map():
+def test_updates_of_one_cycle_are_one_change_of_the_map():
     """A flood of small ones on a large map held the loop up for seconds, a copy for each."""
     drive, others = started(*ROOM), started(*ROOM)
     updates = [patch("#", at=(2, col)) for col in (2, 4, 2)] + [patch(".", at=(2, 4))]
@@ -405,7 +405,7 @@ def test_a_map_too_large_is_a_fault_and_the_old_one_stays():
     drive.finish()
 
 
-def test_one_bad_event_does_not_cost_the_others():
+def test_a_bad_event_does_not_affect_the_others():
     drive = Drive((0, 0))
     decision = drive.tell(
         patch("#"), MapReceived(building(*ROOM)), pose_at(0, 0, frame="odom"), pose_at(0, 0)

@@ -54,7 +54,7 @@ def test_it_drives_out_along_its_track_and_sweeps_on():
     assert covered.covered == covered.coverable > 140
 
 
-def test_where_there_is_no_way_it_waits_and_is_never_done():
+def test_without_a_way_it_waits_and_is_never_done():
     robot = shut_in(by=5)
     floor_m2 = LineRobot(room_with_niche(), START).mission.line.left.areas.asked_m2
     assert not robot.wait(400.0, lambda robot: robot.mission.state == "done")
@@ -152,7 +152,7 @@ def inside_wall():
     return robot
 
 
-def test_a_robot_inside_a_wall_says_so_until_it_is_out():
+def test_a_robot_inside_a_wall_is_a_trouble_until_it_is_out():
     robot = inside_wall()
     assert not robot.wait(19.0, troubles)
     assert robot.wait(2.0, lambda robot: troubles(robot) == {"shut_in"})

@@ -220,7 +220,7 @@ def test_a_tiny_saving_does_not_change_the_path():
 
 
 @pytest.mark.parametrize("what", ["driven on", "path is new"])
-def test_what_comes_too_late_is_dropped(what):
+def test_a_better_path_that_comes_too_late_is_dropped(what):
     drive = driving()
     request, drive.request = drive.request, None
     better = PlanReady(request.number, NearOptimal().plan(request.problem, never), 0.05)
@@ -240,7 +240,7 @@ def test_what_comes_too_late_is_dropped(what):
         assert not drive.mission.route.is_improving
 
 
-def test_what_is_needed_comes_next():
+def test_a_needed_plan_comes_after_the_attempt():
     """A map that changes while an attempt is under way: its repair is asked for after it."""
     drive = driving()
     request, drive.request = drive.request, None

@@ -74,7 +74,7 @@ def test_back_on_their_floor_the_places_count_again():
     assert drive.mission.home == (4, 8)
 
 
-def test_which_floor_it_was_outlives_a_restart():
+def test_the_floor_of_the_places_survives_a_restart():
     drive, _ = on_another_floor()
     again = restarted(drive, WITH_ALL)
     assert codes(stand(again, "map_2", 2)) == ["places_elsewhere"]
@@ -180,7 +180,7 @@ def test_a_mask_of_the_previous_building_is_not_used():
     assert again.mission.home == HERE, "and not that of the configuration"
 
 
-def test_without_places_nothing_is_said():
+def test_without_places_none_are_reported():
     drive, faults = on_another_floor(CONFIG)
     assert codes(faults) == ["ledger_mismatch"]
     assert drive.mission.state is not State.BLOCKED

@@ -81,7 +81,7 @@ def test_a_zone_by_name_is_written_as_it_was_read():
     assert read_order(document) == order
 
 
-def test_standing_keep_out_zones_hold_for_every_order():
+def test_configured_keep_out_zones_apply_to_each_order():
     drive = drive_with(keep_out=(COLUMN,))
     drive.command("start")
     drive.finish()
@@ -154,7 +154,7 @@ def test_a_mask_of_another_frame_than_the_maps_stops_the_robot(lattice_deg):
     assert drive.mission.state is State.COVERING
 
 
-def test_masks_that_are_none_are_refused(tmp_path):
+def test_invalid_masks_are_refused(tmp_path):
     with pytest.raises(BadConfiguration, match=r"mission\.keep_out_mask: .*mask\.yaml"):
         inline_mask(tmp_path / "mask.yaml", 65)
     stripes = np.indices((64, 200)).sum(axis=0) % 2 == 0

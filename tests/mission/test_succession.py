@@ -38,7 +38,7 @@ def live_through(drive, seconds, without="", **battery):
 
 @pytest.mark.parametrize("kind", SILENT)
 @pytest.mark.parametrize("state", AT_REST)
-def test_what_is_silent_is_said_within_a_minute(state, kind):
+def test_silence_at_rest_is_reported_within_a_minute(state, kind):
     drive = AT_REST[state]()
     live_through(drive, PERIOD_S, rise=0.001)
     assert (drive.mission.state, codes(drive)) == (state, [])

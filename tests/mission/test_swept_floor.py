@@ -98,13 +98,13 @@ def test_all_that_is_swept_is_counted_once():
     assert floor.changes == changes
 
 
-def test_a_jump_is_no_drive():
+def test_a_jump_of_the_pose_sweeps_nothing():
     jumped = drive((0.0, 0.0), (JUMP_TOOLS * TOOL + 0.01, 0.0))
     assert not jumped.swept_in(Window(-1, 10, 1, 14)).any()
     assert drive((0.0, 0.0), (JUMP_TOOLS * TOOL, 0.0)).swept_in(Window(-1, 10, 1, 14)).all()
 
 
-def test_where_the_way_is_unknown_nothing_is_swept():
+def test_an_unknown_track_sweeps_nothing():
     floor = drive((0.0, 0.0))
     floor.break_track()
     floor.record(Pose2D(0.5, 0.0))
@@ -176,7 +176,7 @@ def test_a_snapshot_is_constant_and_shares_unchanged_parts():
         first.tiles[9, 9] = first.tiles[0, 0]
 
 
-def test_a_restored_floor_goes_on_as_if_nothing_had_been():
+def test_a_restored_floor_continues_without_a_difference():
     points = [(0.1 * step, 0.03 * step) for step in range(40)]
     whole, begun = drive(*points, *points[::-1]), drive(*points)
     restored = SweptFloor.restored(begun.snapshot(), TOOL)
@@ -218,7 +218,7 @@ def test_the_scatter_of_poses_is_what_they_err(sigma_m):
     assert scatter.sigma_m == pytest.approx(sigma_m, rel=0.4)
 
 
-def test_few_poses_tell_no_scatter_and_corners_are_none():
+def test_few_poses_and_corners_show_no_noise():
     scatter = PoseScatter(0.15)
     for number, (x, y) in enumerate([(0.25 * min(n, 6), 0.25 * max(n - 6, 0)) for n in range(13)]):
         scatter.note(Pose2D(x, y))
@@ -226,7 +226,7 @@ def test_few_poses_tell_no_scatter_and_corners_are_none():
 
 
 @pytest.mark.parametrize("sigma_m", [0.0, 0.01, 0.03])
-def test_what_is_said_to_be_swept_is_swept_however_poses_scatter(sigma_m):
+def test_reported_floor_is_swept_despite_noisy_poses(sigma_m):
     """A straight lane: all that the poses add to either side is wrong."""
     points = wobbling(sigma_m)
     floor = drive(*points)
@@ -255,7 +255,7 @@ def test_exact_poses_are_kept_at_once_and_others_seen_at_once():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
-def test_what_is_not_kept_yet_is_carried_onto_another_raster_too(yaw):
+def test_preliminary_floor_is_shown_on_another_raster(yaw):
     floor = drive(*wobbling(0.03, 60))
     geometry = GridGeometry(60, 100, 0.025, Pose2D(-0.5, -0.5, yaw))
     seen = floor.swept_on(geometry)
@@ -263,7 +263,7 @@ def test_what_is_not_kept_yet_is_carried_onto_another_raster_too(yaw):
     assert np.array_equal(seen, floor.swept_on(geometry))
 
 
-def test_a_pose_that_is_told_again_hides_no_scatter():
+def test_a_repeated_pose_hides_no_noise():
     """As each map tells the mission to look at the newest pose again."""
     once, twice = SweptFloor(TOOL), SweptFloor(TOOL)
     for x, y in wobbling(0.03, 60):
@@ -275,7 +275,7 @@ def test_a_pose_that_is_told_again_hides_no_scatter():
 
 
 @pytest.mark.parametrize("sigma_m", [0.0, 0.01, 0.03])
-def test_places_on_a_steady_track_are_as_right_as_they_say(sigma_m):
+def test_errors_of_filtered_positions_keep_their_bounds(sigma_m):
     track = SteadyTrack(TOOL)
     poses = wobbling(sigma_m)
     places = [place for x, y in poses for place in track.add(Pose2D(x, y))] + track.end()
@@ -312,7 +312,7 @@ def test_after_a_loop_closure_only_surely_swept_floor_counts(seed):
     assert left[inner].all()
 
 
-def test_who_stood_still_forgets_nothing():
+def test_a_robot_that_stood_still_forgets_no_floor():
     floor = drive(*[(0.1 * n, 0.0) for n in range(20)])
     before = floor.snapshot()
     assert not certain_floor(before, Motion(Pose2D(0, 0), Pose2D(0, 0)))(before.tiles)
@@ -363,7 +363,7 @@ def test_floor_before_a_restart_counts_until_a_map_contradicts():
 
 
 @pytest.mark.parametrize("sigma_m", [0.0, 0.03])
-def test_whoever_looks_again_where_it_says_knows_it_all(sigma_m):
+def test_the_reported_windows_contain_all_changes(sigma_m):
     """A raster that is kept up to date by the windows of changes alone."""
     floor, geometry = SweptFloor(TOOL), GridGeometry(70, 460, 0.025, Pose2D(-0.5, -0.8, 0.1))
     whole, known, changes = Window(0, 0, 70, 460), np.zeros((70, 460), bool), 0

@@ -104,7 +104,7 @@ def beside(xy, most_m):
         (small_flat(), LINE, 0.03, 0.05, 0.995, 0.9),
     ],
 )
-def test_what_is_said_to_be_swept_is_swept(ground, config, noise_m, beside_m, right, known):
+def test_floor_reported_as_swept_is_truly_swept(ground, config, noise_m, beside_m, right, known):
     mission, track = driven(ground, config, noise_m, beside_m)
     judged = judge_floor(ground, track, SweepingRobot(TOOL_M, RADIUS_M))
     said = mission.covered.floor.swept_on(judged.geometry) & judged.reachable

@@ -88,7 +88,7 @@ def test_a_line_leads_straight_home():
     assert robot.mission.reason.startswith("time is up after 2 min in zone 'far', before 'near': ")
 
 
-def test_the_limit_of_the_configuration_counts_where_the_order_gives_none():
+def test_the_configured_limit_applies_to_orders_without_one():
     drive = Clocked(order={}, until_min=0.5)
     drive.finish()
     assert drive.mission.reason.startswith("time is up after 0.5 min: ")
@@ -97,7 +97,7 @@ def test_the_limit_of_the_configuration_counts_where_the_order_gives_none():
     assert drive.mission.reason == "every reachable cell is covered"
 
 
-def test_an_order_by_itself_ends_too_and_new_floor_does_not_reopen_it():
+def test_new_floor_does_not_reopen_an_order_out_of_time():
     drive = Battery(None, rows=HALL, dock=None, until_min=0.5)
     drive.run(State.DONE)
     assert drive.now < 36.0
@@ -107,7 +107,7 @@ def test_an_order_by_itself_ends_too_and_new_floor_does_not_reopen_it():
     assert (drive.mission.state, drive.request) == (State.DONE, None)
 
 
-def test_zones_that_were_not_begun_are_named():
+def test_zones_that_have_not_begun_are_named():
     west, east = rectangle(0, 0, 4, 15), rectangle(0, 15, 4, 30)
     zones = [{"name": "west", "polygon": west, "passes": 2}, {"name": "east", "polygon": east}]
     drive = Clocked(order={"zones": zones, "until_min": 0.5})
@@ -117,7 +117,7 @@ def test_zones_that_were_not_begun_are_named():
 
 
 @pytest.mark.parametrize("covered", [3, 20])
-def test_the_time_goes_on_over_a_restart(covered):
+def test_the_time_limit_survives_a_restart(covered):
     drive = Clocked(order={"until_min": 1.0})
     drive.run(State.COVERING)
     for _ in range(covered):

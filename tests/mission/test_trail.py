@@ -84,7 +84,7 @@ def test_a_planned_path_strengthens_it_and_what_was_driven_fades():
     np.testing.assert_array_equal(along(drive, walk[5:]), planned[5:])
 
 
-def test_a_path_that_is_only_cut_off_is_nobodys_choice():
+def test_a_path_that_is_only_cut_off_strengthens_no_trail():
     drive = started(*ROOMS)
     before = drive.mission.trail.snapshot().tau
     row, col = drive.walk[12]
@@ -97,7 +97,7 @@ def test_a_path_that_is_only_cut_off_is_nobodys_choice():
     assert not tau_of(drive)[row, col].any()
 
 
-def test_it_goes_on_after_a_restart():
+def test_the_trail_continues_after_a_restart():
     drive = started(*ROOMS)
     for _ in range(8):
         drive.go()
@@ -110,7 +110,7 @@ def test_it_goes_on_after_a_restart():
     np.testing.assert_array_equal(again.trail.snapshot().tau, kept.trail.tau)
 
 
-def test_it_begins_anew_with_a_reset_and_in_another_frame():
+def test_the_trail_is_cleared_by_a_reset_or_another_frame():
     drive = started(*ROOMS)
     assert tau_of(drive).max() > TAU0
     drive.command("reset")
@@ -162,7 +162,7 @@ def test_a_plan_starts_from_the_trail():
     assert (drive.request.problem.trail.tau > 0.11).any()
 
 
-def test_a_colony_that_goes_on_comes_to_the_same_mission_again():
+def test_missions_on_the_living_trail_are_reproducible():
     drives = []
     for _ in range(2):
         drive = Drive(

@@ -124,7 +124,7 @@ def test_a_robot_without_work_may_be_switched_off(state, kind):
     assert (drive.mission.state, codes(drive)) == (state, [])
 
 
-def test_what_never_came_is_missing_too():
+def test_a_first_map_and_pose_are_reported_missing():
     drive = Drive((0, 0), config=with_policy(CONFIG, **PATIENT))
     drive.tell(after=31.0)
     assert (drive.mission.state, codes(drive)) == (State.WAITING_FOR_MAP, ["no_pose", "no_map"])
@@ -166,7 +166,7 @@ def test_battery_messages_that_say_nothing_are_a_silence(kind):
 
 
 @pytest.mark.parametrize("power", ["discharging", "not charging", "unknown"])
-def test_a_dock_without_current_is_said_within_a_minute(power):
+def test_a_dock_without_current_is_reported_within_a_minute(power):
     drive = charging(power)
     live(drive, A_MINUTE_S)
     assert (drive.mission.state, codes(drive)) == (State.CHARGING, ["no_current"])

@@ -39,7 +39,7 @@ def driving(*rows, steps=4, config=WATCHFUL):
     return drive
 
 
-def test_poses_that_stop_are_told_and_the_path_is_kept():
+def test_a_lost_pose_is_reported_and_the_path_kept():
     drive = driving(*ROOM)
     walk = drive.walk
     assert drive.tell(after=1.9).path is None
@@ -105,7 +105,7 @@ def test_a_resting_robot_with_a_silent_localiser_gets_a_plan():
     drive.finish()
 
 
-def test_a_pose_that_jumps_is_told_and_planned_from():
+def test_a_jump_of_the_pose_is_reported_and_replanned():
     drive = driving(*ROOM)
     before = drive.visited
     drive.cell = (3, 9)
@@ -121,7 +121,7 @@ def test_a_pose_that_jumps_is_told_and_planned_from():
     drive.finish()
 
 
-def test_a_pose_that_flickers_costs_no_plan():
+def test_a_flickering_pose_requests_no_plan():
     drive = driving(*ROOM)
     here = drive.cell
     for _ in range(20):
@@ -150,7 +150,7 @@ def test_a_pose_that_jumps_while_a_plan_is_made_gets_another():
     drive.finish()
 
 
-def test_a_map_that_stops_coming_is_told_and_the_mission_goes_on():
+def test_a_stale_map_is_reported_and_the_mission_continues():
     drive = driving(*ROOM)
     row, col = drive.cell
     for tick in range(70):
@@ -211,7 +211,7 @@ def test_a_standing_robot_is_reported_though_the_map_flickers():
     assert drive.mission.reason.startswith("the robot stands")
 
 
-def test_a_robot_that_stood_is_not_told_of_with_another_order():
+def test_a_standstill_is_not_reported_under_another_order():
     drive = driving(*ROOM, config=CONFIG)
     for _ in range(65):
         drive.tell(pose_at(*drive.cell), after=1.0)
@@ -222,7 +222,7 @@ def test_a_robot_that_stood_is_not_told_of_with_another_order():
     assert drive.mission.state is State.COVERING
 
 
-def test_a_robot_that_does_not_drive_home_is_told():
+def test_a_robot_that_does_not_drive_home_is_reported():
     drive = driving(*ROOM, config=CONFIG)
     drive.command("home")
     for _ in range(65):
@@ -236,7 +236,7 @@ def test_a_robot_that_does_not_drive_home_is_told():
     assert drive.mission.state is not State.DEGRADED
 
 
-def test_none_of_this_is_looked_at_unless_asked_for():
+def test_without_timeouts_no_trouble_is_reported():
     drive = driving(*ROOM, config=CONFIG)
     drive.tell(after=1000.0)
     assert drive.mission.state is State.COVERING

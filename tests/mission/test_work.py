@@ -64,7 +64,7 @@ def report(mission):
 
 
 @pytest.mark.parametrize("side", [5, 40])
-def test_a_report_costs_the_same_for_many_closed_chambers(side):
+def test_a_report_on_many_closed_chambers_takes_no_longer(side):
     few, _ = calls_of(report, mission_in(chambers(side)))
     _, least = calls_of(report, mission_in(chambers(5)))
     _, count = calls_of(report, mission_in(chambers(side)))

@@ -65,7 +65,7 @@ def ranked(priority, **settings):
     return drive
 
 
-def test_the_room_of_higher_priority_comes_first_where_time_is_short():
+def test_if_time_is_short_the_room_of_higher_priority_is_first():
     assert finish(ranked(None, until_min=TIGHT_MIN))[1] < 60
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
@@ -79,7 +79,7 @@ def test_the_room_of_higher_priority_comes_first_where_time_is_short():
 
 
 @pytest.mark.parametrize("settings", [{}, {"until_min": 60.0}, {"until_min": 0.0}])
-def test_where_all_can_be_done_the_path_is_the_same_bit_for_bit(settings):
+def test_with_enough_time_priorities_change_no_path(settings):
     driven = []
     for priority in None, 80:
         drive = ranked(priority, **settings)
@@ -105,7 +105,7 @@ def test_a_robot_that_turns_out_too_slow_turns_to_what_matters():
     assert "what comes first is done: the rest" in [each.reason for each in drive.updates]
 
 
-def test_nothing_is_planned_first_once_time_is_up():
+def test_after_the_time_limit_no_floor_comes_first():
     drive = ranked(80, until_min=0.5)
     drive.plan()
     assert drive.mission.orders.scope.worth.least == 80
@@ -141,7 +141,7 @@ def test_the_battery_is_a_limit_too():
     assert shares[1] == 1.0
 
 
-def test_what_comes_first_and_cannot_be_reached_does_not_keep_the_rest():
+def test_unreachable_floor_of_high_priority_is_given_up():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
     orders = drive.mission.orders
@@ -180,7 +180,7 @@ def test_a_map_of_dirt_says_what_comes_first():
     assert np.count_nonzero(decision.plan.problem.to_cover) == 90
 
 
-def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
+def test_a_new_map_of_dirt_counts_only_if_time_is_short():
     drive = ranked(80, until_min=TIGHT_MIN)
     drive.plan()
     assert drive.mission.orders.scope.worth.least == 80
@@ -201,7 +201,7 @@ def test_a_new_map_of_dirt_counts_at_once_and_only_where_time_is_short():
     assert (drive.request, drive.mission.orders.scope.worth.least) == (None, 0)
 
 
-def test_a_map_of_dirt_in_another_frame_is_refused_and_changes_nothing():
+def test_a_map_of_dirt_in_another_frame_is_refused():
     drive = settled(*BOTH)
     early = Drive((0, 0), dirt(90, frame="odom"))
     first_map = MapReceived(building(*BOTH)), pose_at(0, 0)
@@ -227,7 +227,7 @@ def test_one_slow_path_does_not_count_in_later_passes():
     assert not worth.are_too_many(everything.size)
 
 
-def test_a_map_of_dirt_on_a_large_lattice_takes_some_bytes_a_cell():
+def test_a_map_of_dirt_takes_a_few_bytes_per_cell():
     window = Window(-400, -700, 1600, 1300)
     worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
     worth.take(dirt(90).grid)
@@ -267,7 +267,7 @@ def zones(west=None, east=None):
         ({"east": 51}, 0.0, "west"),
     ],
 )
-def test_zones_of_higher_priority_come_first_where_time_is_short(priorities, until_min, first):
+def test_if_time_is_short_zones_of_higher_priority_are_first(priorities, until_min, first):
     drive = settled(*BOTH)
     order = {"zones": zones(**priorities), "until_min": until_min}
     drive.command("start", order)
@@ -330,7 +330,7 @@ def test_a_room_gives_its_priority_to_the_zone_of_its_name():
         ({0: 5, 100: 5}, 0.0, 100),
     ],
 )
-def test_which_priorities_fit(cells, may_work_s, least):
+def test_the_least_priority_that_fits_is_found(cells, may_work_s, least):
     counts = np.zeros(101, np.int64)
     counts[list(cells)] = list(cells.values())
     assert least_priority(counts, 1.0, may_work_s) == least

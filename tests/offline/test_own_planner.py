@@ -108,7 +108,7 @@ def test_from_python_a_class_and_its_object_are_planners_too():
         plan(WALK)
 
 
-def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
+def test_bench_shows_the_planner_as_a_row(mine, capsys):
     np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
     # Another planner of that name, which does not end at home.
     other = mine.parent / "other" / "mine.py"
@@ -131,7 +131,7 @@ def test_bench_has_it_as_a_row_beside_the_others(mine, capsys):
     assert all(row["runs"] == 2 for row in rows.values())
 
 
-def test_bench_goes_on_where_one_planner_fails(mine, capsys):
+def test_bench_continues_after_a_failed_planner(mine, capsys):
     np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
     mine.write_text("def short(problem):\n    return [problem.start]\n")
     words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "2", "--budget", "0.1"]
@@ -186,14 +186,14 @@ def test_an_own_planner_gets_a_read_only_and_correct_problem():
         (["x" * 10_000_000], r"must be \(row, col\), got 'x{90,100}\.\.\."),
     ],
 )
-def test_a_wrong_walk_is_told_where_it_is_wrong(walk, said):
+def test_an_illegal_walk_is_an_error_with_the_step(walk, said):
     with pytest.raises((IllegalWalk, PlannerFailed), match=said) as caught:
         plan(lambda problem: walk)
     assert ("return cells" in caught.value.hint) == (caught.type is IllegalWalk)
 
 
 @pytest.mark.parametrize("planner", [lambda: WALK, type("Needy", (), {"plan": lambda self: WALK})])
-def test_a_planner_that_cannot_be_called_is_not_told_of_lines_of_its_own(planner):
+def test_a_planner_that_cannot_be_called_gets_a_hint(planner):
     with pytest.raises(PlannerFailed, match="TypeError") as caught:
         plan(planner)
     assert caught.value.hint == CALLED_WITH
@@ -212,7 +212,7 @@ def test_a_walk_ends_where_it_was_asked_to():
         plan(lambda problem: WALK, end="home")
 
 
-def test_an_exception_is_shown_with_the_user_s_lines_alone(mine, capsys):
+def test_an_exception_shows_only_lines_of_the_user(mine, capsys):
     mine.write_text("def deep(x):\n    return 1 / x\n\n\ndef walk(problem):\n    return deep(0)\n")
     assert main(["plan", "office", "--planner", f"{mine}:walk"]) == 1
     said = capsys.readouterr().err
@@ -230,7 +230,7 @@ def test_an_exception_is_shown_with_the_user_s_lines_alone(mine, capsys):
         ("def walk(problem):\n    raise OSError(28, 'full')\n", "OSError: [Errno 28] full"),
     ],
 )
-def test_a_planner_that_ends_everything_is_no_plan(mine, text, said, capsys):
+def test_a_planner_that_exits_is_an_error(mine, text, said, capsys):
     mine.write_text(text)
     assert main(["plan", "office", "--planner", f"{mine}:walk"]) == 1
     told = capsys.readouterr().err
@@ -288,7 +288,7 @@ def test_without_a_budget_a_planner_ends_too(monkeypatch):
             plan(forever, search=settings)
 
 
-def test_bench_goes_on_where_one_planner_does_not_end(mine, capsys):
+def test_bench_continues_after_a_planner_that_never_ends(mine, capsys):
     mine.write_text(ENDLESS)
     np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
     words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "2", "--budget", "0.1"]
@@ -326,7 +326,7 @@ def test_a_program_s_own_timer_is_left_alone():
         (None, "walk", BadConfiguration, "cannot read"),
     ],
 )
-def test_a_file_that_cannot_be_loaded_is_told(mine, text, name, error, said, capsys):
+def test_a_file_that_cannot_be_loaded_is_an_error(mine, text, name, error, said, capsys):
     if text is None:
         mine.unlink()
     else:

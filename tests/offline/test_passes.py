@@ -46,7 +46,7 @@ def test_an_edge_pass_keeps_to_the_walls(flat):
     assert edge.swept_share < 0.75 < auto.swept_share
 
 
-def test_each_pass_begins_where_the_one_before_ends_and_the_last_ends_at_home(flat):
+def test_passes_are_joined_and_the_last_ends_at_home(flat):
     for before, after in zip(flat.plans, flat.plans[1:], strict=False):
         assert np.hypot(*(before.xy[-1] - after.xy[0])) < ROBOT.tool_width_m
     assert np.hypot(*(flat.xy[0] - flat.xy[-1])) < ROBOT.tool_width_m
@@ -116,17 +116,17 @@ def test_the_time_of_all_is_by_the_speed_of_each():
         ("--passes cross", r"--passes\[0\]: cross goes after a pass with lanes"),
         ("--passes auto@2", "a pass at 2 m/s is faster than the robot, 0.25 m/s"),
         ("--passes auto --planner fasaco", "--passes: only colony-search has passes"),
-        ("--passes auto --pheromone-png p.png", "leave no single trail"),
+        ("--passes auto --pheromone-png p.png", "has a trail of its own"),
         ("--passes 30deg --line cells", "the centres of cells lie along the axes"),
         ("--passes auto --turn-radius 0.3", "a robot that turns on the spot"),
     ],
 )
-def test_what_passes_cannot_be_is_said(capsys, words, said):
+def test_impossible_passes_are_refused_with_the_reason(capsys, words, said):
     assert main(["plan", "office", "--budget", "0.05", *words.split()]) == 78
     assert said.replace("\\", "") in " ".join(capsys.readouterr().err.split())
 
 
-def test_a_pass_that_is_none_is_a_usage_error(capsys):
+def test_an_unknown_pass_is_a_usage_error(capsys):
     with pytest.raises(SystemExit) as caught:
         main(["plan", "office", "--passes", "edge,corner"])
     assert caught.value.code == 2

@@ -151,7 +151,7 @@ def test_numbers_of_numpy_s_are_numbers():
         (np.ones((3, 3), bool), {"unknown_free": True}, "is for maps of pixels"),
     ],
 )
-def test_what_is_no_map_is_named(source, option, said):
+def test_a_file_that_is_no_map_is_named(source, option, said):
     with pytest.raises(MapFileError, match=said):
         fe.load_map(source, **option)
 
@@ -180,7 +180,7 @@ def test_a_time_says_whether_turns_count(capsys):
     assert "without turns" not in capsys.readouterr().out
 
 
-def test_a_picture_says_what_is_said_of_the_line_elsewhere(monkeypatch):
+def test_the_picture_has_the_figures_of_the_summary(monkeypatch):
     told = []
     draw = result.draw_walk
     monkeypatch.setattr(

@@ -87,7 +87,7 @@ def test_the_first_line_is_completed_whatever_the_budget():
 
 
 @pytest.mark.parametrize("better", [0, 1])
-def test_the_better_of_two_walks_goes_on_with_its_line(monkeypatch, better):
+def test_the_better_of_two_walks_is_improved(monkeypatch, better):
     """Whichever line is the better one, its walk and its pheromone are those of the plan."""
     seen, searches = [], []
     laid = Ground.line_search
@@ -107,7 +107,7 @@ def test_the_better_of_two_walks_goes_on_with_its_line(monkeypatch, better):
     assert searches[0][0].tolist() != searches[1][0].tolist()
 
 
-def test_pheromone_is_shown_while_ants_alone_walk():
+def test_pheromone_is_shown_while_only_ants_walk():
     ground = Ground.of_floor(room(0), ROBOT, (0.5, 0.5), WALLS)
     problem = _problem(ground, ROBOT, ANYWHERE)
     search = fe.Search(planner="fasaco", ants=64)
@@ -128,7 +128,7 @@ def test_a_line_through_cells_is_searched_for_until_the_end():
     assert xy[0] == pytest.approx(ground.lattice.centres(path.cells[:1])[0])
 
 
-def test_a_share_that_is_asked_for_is_worked_on_whatever_the_budget():
+def test_a_requested_share_is_searched_for_beyond_the_budget():
     """The price of floor is found in three stages; a budget once ended after the first."""
     grid, shares = fe.load_map("office"), []
     for swept in (None, 0.995):

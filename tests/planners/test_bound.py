@@ -59,7 +59,7 @@ def test_start_and_end_are_cells_of_the_map_frame():
         assert lower_bound_steps(problem) == steps
 
 
-def test_what_is_covered_needs_no_visit():
+def test_covered_cells_need_no_visit():
     ground = lattice("....", "#.##", "#.##")
     done = np.zeros((3, 4), bool)
     done[:2] = True

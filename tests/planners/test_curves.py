@@ -96,7 +96,7 @@ def test_it_drives_out_of_a_dead_end_backward():
     assert curve.backward_m > 2.0
 
 
-def test_a_turn_that_does_not_fit_stays_on_the_spot_and_is_counted():
+def test_a_turn_that_does_not_fit_is_a_counted_spot_turn():
     """It stands in a dead end, and looks at its wall: only backward can it come out."""
     grid = room(6.0, 4.0, walls=[(3.0, 0.0, 6.0, 1.6), (3.0, 2.3, 6.0, 4.0)])
     line_xy = np.array([(5.7, 1.95), (1.5, 1.95), (1.5, 3.5)])

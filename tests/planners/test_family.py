@@ -167,7 +167,7 @@ def test_stc_ends_an_open_walk_at_the_last_uncovered_cell():
         ("paper_basement", "zigzag", 271),
     ],
 )
-def test_baselines_are_no_worse_than_the_authors_own(name, planner, most):
+def test_baselines_are_as_good_as_the_authors_own(name, planner, most):
     found = reference(name)
     if found is None:
         pytest.skip("the paper's grids are not at hand")

@@ -113,7 +113,7 @@ def test_a_budget_that_is_gone_still_gives_a_whole_walk():
     assert_answers(problem, path)
 
 
-def test_the_stopping_criterion_hears_how_far_the_search_is():
+def test_the_stopping_criterion_gets_the_progress():
     heard = []
     problem = CoverageProblem.of(*ROOMS["rooms"], cost=CoverageCost(0.5, 2.0))
     listen = {"stop": lambda progress: bool(heard.append(progress))}

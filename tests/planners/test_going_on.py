@@ -42,7 +42,7 @@ def going_on(cols=14, times=8):
     return replace(problem, trail=trail_of(problem.lattice, *[walk] * times)), walk
 
 
-def test_as_many_ants_walk_as_cells_are_new():
+def test_the_number_of_ants_follows_the_new_cells():
     problem, walk = going_on()
     on_walk = {tuple(cell) for cell in walk.tolist()}
     to_cover = {tuple(cell) for cell in np.argwhere(problem.to_cover).tolist()}
@@ -77,7 +77,7 @@ def test_the_walk_is_complete_and_the_same_again(cols, threads):
     np.testing.assert_array_equal(path.cells, Fasaco(COLONY).plan(problem).cells)
 
 
-def test_what_has_not_changed_is_never_done_worse():
+def test_an_unchanged_problem_never_gets_a_worse_walk():
     problem, walk = going_on(cols=12)
     for seed in range(5):
         assert Fasaco(replace(COLONY, seed=seed)).plan(problem).steps <= len(walk) - 1

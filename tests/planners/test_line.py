@@ -156,7 +156,7 @@ def test_a_fixed_end_stays(planned):
     assert line.xy[0].tolist() == plain[0].tolist()
 
 
-def test_nothing_comes_nearer_to_a_wall_than_the_robot_is_wide(planned):
+def test_the_line_keeps_the_robots_radius_from_walls(planned):
     grid, floor, stands, walk = planned
     line = line_over(walk, stands, floor, LineConfig(moves_m2=1000), is_end_fixed=False)
     geometry = grid.geometry

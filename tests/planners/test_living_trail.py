@@ -179,7 +179,7 @@ def test_a_path_that_turned_round_is_forgotten_step_by_step():
     assert there == [False, False, True, True, True, True]
 
 
-def test_what_it_showed_before_stays_as_it_was():
+def test_an_earlier_snapshot_does_not_change():
     trail = ready()
     before = trail.snapshot()
     copy = before.tau.copy()
@@ -200,7 +200,7 @@ def test_changes_are_counted():
     assert trail.changes > before
 
 
-def test_where_a_path_leads_off_the_lattice_nothing_comes_of_it():
+def test_moves_off_the_lattice_strengthen_nothing():
     trail = ready()
     before = trail.snapshot().tau
     trail.strengthen(np.array([(5, 5), (5, 6), (-1, 0), (0, 0), (2, 0)], np.int32), 0.75)

@@ -93,7 +93,7 @@ def test_a_problem_is_closed_if_it_ends_where_it_starts():
     assert not CoverageProblem.of(GROUND, (-2, 5)).closed
 
 
-def test_nothing_is_left_to_cover():
+def test_a_covered_floor_leaves_nothing_to_cover():
     with pytest.raises(NothingToCover, match="every reachable cell is covered"):
         CoverageProblem.of(GROUND, (-2, 5), covered=np.ones((4, 3), bool))
     with pytest.raises(NothingToCover):
@@ -105,7 +105,7 @@ def test_nothing_is_left_to_cover():
         CoverageProblem.of(GROUND, (-2, 5), covered=covered)
 
 
-def test_what_cannot_be_reached_is_reported_and_not_asked_for():
+def test_unreachable_cells_are_reported_and_not_wanted():
     problem = CoverageProblem.of(GROUND, (-2, 6))
     assert np.argwhere(problem.to_cover).tolist() == [[0, 0], [0, 1], [0, 2]]
     assert np.argwhere(problem.unreachable).tolist() == [[2, 0], [2, 1], [3, 0], [3, 1]]

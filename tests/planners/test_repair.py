@@ -82,7 +82,7 @@ def test_a_completed_walk_is_legal_and_complete(seed, change, home, held):
 
 @examples(50)
 @given(seed=st.integers(0, 10**6))
-def test_where_nothing_changed_the_walk_is_what_it_was(seed):
+def test_without_a_change_the_walk_stays(seed):
     problem = driven_halfway(seed, change=0.0)
     assume(not problem.to_cover[problem.start])  # else the whole walk was driven
     framed = FramedGround.of(problem)
@@ -91,7 +91,7 @@ def test_where_nothing_changed_the_walk_is_what_it_was(seed):
     assert np.array_equal(kept, problem.before[: len(kept)])
 
 
-def test_what_can_wait_leaves_the_next_steps_alone():
+def test_cells_that_can_wait_leave_the_next_steps_alone():
     """A row appears between one that is about to be driven and one that comes later."""
     free = np.ones((3, 12), bool)
     free[1, :11] = False
@@ -208,7 +208,7 @@ def test_many_changes_on_a_large_ground_are_all_repaired():
     assert path.steps / least - 1 < 0.5 * (only_completed / least - 1)
 
 
-def test_a_walk_far_above_its_bound_is_planned_anew():
+def test_a_walk_far_above_its_bound_is_searched_again():
     free = np.ones((12, 12), bool)
     lattice = CoverageLattice.from_free(free)
     there_and_back = [(0, col) for col in range(12)] + [(0, col) for col in range(10, -1, -1)]

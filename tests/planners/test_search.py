@@ -192,7 +192,7 @@ def test_it_is_asked_often_whether_to_stop(cost):
     assert len(watched.seen) > 30
 
 
-def test_who_observes_sees_the_trail_and_changes_nothing():
+def test_an_observer_sees_the_trail_and_changes_nothing():
     problem, seen = CoverageProblem.of(*ROOMS["rooms"]), []
     config = ColonyConfig(ants=32, seed=2)
     path = NearOptimal(config).plan(problem, after(perturbations=40), seen.append)
@@ -219,7 +219,7 @@ def test_lanes_run_in_the_direction_that_is_preferred(lanes):
         assert path.lower_bound_cost_s <= path.cost_s
 
 
-def test_without_a_price_on_turns_lanes_run_in_that_direction_too():
+def test_lanes_keep_their_direction_if_turns_are_free():
     """The walk of the fewest steps is known at once; that it runs along lanes is not."""
     ground = CoverageLattice.from_free(np.ones((10, 10), bool))
     problem = CoverageProblem.of(ground, (0, 0), cost=CoverageCost().along(COLUMNS))

@@ -35,7 +35,7 @@ def test_functions_that_the_first_lacks_are_moved(tmp_path, two_cores):
     assert any(name.startswith("areas.cells_beside-") and name.endswith(".nbc") for name in names)
 
 
-def test_nothing_is_moved_of_one_that_failed(tmp_path, two_cores, monkeypatch):
+def test_a_failed_compilation_hands_over_nothing(tmp_path, two_cores, monkeypatch):
     monkeypatch.setattr(compiling, "APART", ("no stage",))
     (tmp_path / "own").mkdir()
     assert handed_over(tmp_path / "own", (WALKS, "no stage")) == set()

@@ -70,7 +70,7 @@ def test_a_search_is_repeated(planner, question):
     assert repeated.work == path.work
 
 
-def test_one_that_was_never_stopped_is_not_stopped():
+def test_a_search_that_was_never_stopped_repeats_so():
     problem = poor_problem()
     stop = StopRecorder(never)
     path = NearOptimal().plan(problem, stop)

@@ -20,7 +20,7 @@ def test_the_common_beginning_ends_where_walks_part(at, axis):
     assert common_beginning(walk, other) == common_beginning(other, walk) == at
 
 
-def test_nothing_is_common_with_no_walk():
+def test_an_empty_walk_has_no_common_beginning():
     assert common_beginning(np.empty((0, 2), np.int32), np.ones((3, 2), np.int32)) == 0
 
 

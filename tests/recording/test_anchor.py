@@ -95,7 +95,7 @@ def test_the_rectangle_of_a_reason_is_moved_with_all_else(recorded):
     assert all(np.abs(box).max() < 100.0 for box in boxes)
 
 
-def test_where_it_is_drawn_from_is_told(recorded):
+def test_the_origin_of_the_drawing_is_recorded(recorded):
     path, _ = recorded
     (where,) = read_static(path, entities.WORLD, "Transform3D:translation")[-1]
     assert np.allclose(where, [*DRAWN_FROM, 0.0])
@@ -103,7 +103,7 @@ def test_where_it_is_drawn_from_is_told(recorded):
     assert "| drawn from | x 500000 m, y 5500000 m of the map's frame |" in card
 
 
-def test_what_was_heard_is_kept_as_it_came(recorded):
+def test_received_samples_are_kept_unchanged(recorded):
     samples = RecordedSamples([recorded[0]])
     maps = [sample.sample.payload for sample in samples if sample.topic == "map"]
     origin = decode_occupancy_grid(maps[-1]).geometry.origin

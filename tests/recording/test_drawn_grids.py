@@ -59,7 +59,7 @@ def test_a_grid_stands_upright_and_a_tint_is_its_opacity():
         np.testing.assert_array_equal(grid.pixels, [[1, 2, 3], [9, 8, 7]])
 
 
-def test_a_grid_of_another_size_than_told_is_refused():
+def test_a_grid_whose_size_does_not_match_is_refused():
     rows = rows_of(np.zeros((2, 2), np.uint8))
     wrong = pa.array([[{"width": 3, "height": 2}]])
     broken = rows.set_column(rows.schema.get_field_index("GridMap:format"), "GridMap:format", wrong)

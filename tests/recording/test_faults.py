@@ -15,7 +15,7 @@ disk = disk_fixture(DISK)
 PATIENCE_S = 9.0
 
 
-def test_each_full_disk_is_told_once_and_all_parts_are_readable(disk):
+def test_a_full_disk_is_reported_once_and_parts_stay_readable(disk):
     done = run_episodes(disk, episodes=2)
     assert done.on_log == done.in_recording == 2
     assert done.parts == 3
@@ -24,7 +24,7 @@ def test_each_full_disk_is_told_once_and_all_parts_are_readable(disk):
     assert done.exit_code == 0
 
 
-def test_a_kill_costs_what_was_said_last():
+def test_a_kill_costs_only_the_last_seconds():
     for kill in run_campaign(kills=3, seed=1):
         assert kill.parts
         assert kill.drawn_lost_s < GOAL_LOST_S + PATIENCE_S

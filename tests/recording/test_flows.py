@@ -37,7 +37,7 @@ def test_a_lane_is_an_arrow_and_so_is_the_way_back():
     assert arrows("N", "N", ".", "S") == [(0, 0, 0, 2), (0, 3, 0, -1)]
 
 
-def test_of_cells_at_an_angle_the_arrows_are_so_too():
+def test_arrows_follow_the_angle_of_the_cells():
     geometry, pointed, share = of(["EEEN", "WWWW"])
     straight, askew = (
         flows_of(replace(geometry, origin=Pose2D(1.0, 2.0, yaw)), pointed, share)
@@ -54,7 +54,7 @@ def test_a_lane_is_cut_where_it_is_less_decided():
     assert flows_of(geometry, pointed, share).share.tolist() == np.float32([0.9, 0.4]).tolist()
 
 
-def test_a_cell_of_equal_directions_has_none():
+def test_a_cell_of_equal_directions_has_no_arrow():
     geometry, pointed, share = of(["EE"])
     share[0, 0] = 0.25
     assert len(flows_of(geometry, pointed, share).origins) == 1

@@ -111,7 +111,7 @@ def test_the_unit_has_what_the_recorder_needs():
 
 
 @given(st.integers(0, 1 << 31))
-def test_what_waits_fits_into_the_limit(limit):
+def test_queued_samples_fit_into_the_memory_limit(limit):
     capacity = afforded_bytes(limit)
     assert LEAST_QUEUE_BYTES <= capacity <= QUEUE_BYTES
     assert capacity == LEAST_QUEUE_BYTES or BASE_BYTES + COPIES * capacity <= limit

@@ -86,7 +86,7 @@ def noise(seed: int, size: int = 30_000) -> bytes:
     return np.random.default_rng(seed).bytes(size)
 
 
-def test_samples_come_back_over_parts(tmp_path):
+def test_samples_are_read_back_across_parts(tmp_path):
     desk = Desk(tmp_path, part_bytes=200_000)
     for number in range(40):
         desk.hear("map", noise(number), after_s=0.5)
@@ -100,7 +100,7 @@ def test_samples_come_back_over_parts(tmp_path):
     assert samples.missing == 0
 
 
-def test_a_part_alone_begins_with_the_map_in_force(tmp_path):
+def test_each_part_begins_with_the_map_in_force(tmp_path):
     # The layout alone takes more than half of it.
     desk = Desk(tmp_path, part_bytes=250_000)
     whole = desk.hear("map", noise(0))
@@ -124,7 +124,7 @@ def test_a_part_alone_begins_with_the_map_in_force(tmp_path):
     assert told.missing == len(desk.told) - len(begun) - len(samples[3:]) > 0
 
 
-def test_a_map_with_too_many_updates_is_not_told_again(tmp_path, monkeypatch):
+def test_a_map_with_too_many_updates_is_not_repeated(tmp_path, monkeypatch):
     monkeypatch.setattr(input_log, "IN_FORCE_BYTES", 1000)
     desk = Desk(tmp_path, part_bytes=50_000)
     desk.hear("map", noise(0))
@@ -152,7 +152,7 @@ def test_unwritten_samples_are_counted_and_the_rest_is_whole(tmp_path):
     assert samples.missing == len(lost) + 3
 
 
-def test_of_a_path_there_is_a_digest_and_of_a_status_what_is_new(tmp_path):
+def test_paths_are_kept_as_digests_and_statuses_on_change(tmp_path):
     desk = Desk(tmp_path)
     xy = np.array([(0.15, 0.15), (0.45, 0.15)])
     desk.hear("path", encode_path(xy, np.zeros(2), "map", 7), attachment=b'{"revision": 1}')
@@ -168,7 +168,7 @@ def test_of_a_path_there_is_a_digest_and_of_a_status_what_is_new(tmp_path):
     assert [one.sample for one in statuses] == [desk.told[at].sample for at in (1, 3, 5)]
 
 
-def test_of_rooms_there_are_changes_and_now_and_then_their_shares(tmp_path):
+def test_changes_of_rooms_are_kept_and_shares_now_and_then(tmp_path):
     desk = Desk(tmp_path)
 
     def hear(revision: int, swept: float, after_s: float = 1.0) -> None:

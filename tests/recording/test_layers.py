@@ -46,7 +46,7 @@ def test_a_coarser_map_shows_the_most_occupied_pixel_of_each():
     assert coarse.geometry == GridGeometry(3, 4, 0.2, Pose2D(1.0, 2.0))
 
 
-def test_as_long_as_there_is_room_all_is_drawn_at_once():
+def test_below_the_rate_everything_is_drawn_at_once():
     canvas = Canvas()
     for number in range(int(BURST_S)):
         canvas.draw(f"map {number}", RATE, at_s=0.0)
@@ -58,7 +58,7 @@ def test_as_long_as_there_is_room_all_is_drawn_at_once():
     assert canvas.drawn[-1] == ("path", 100)
 
 
-def test_what_waits_is_the_newest_and_is_drawn_when_it_can_be():
+def test_a_delayed_layer_draws_its_newest_content():
     canvas = Canvas()
     canvas.draw("huge", round(RATE * (BURST_S + 10)), at_s=0.0)
     canvas.draw("old", 10, at_s=1.0)

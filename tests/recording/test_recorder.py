@@ -107,7 +107,7 @@ def test_everything_on_the_bus_becomes_an_entity(recorded):
     assert 0.9 * FRAMES * FRAME_S < recorded.summary.duration_s < 300
 
 
-def test_what_the_mission_hears_is_there_byte_for_byte(recorded):
+def test_the_missions_inputs_are_recorded_byte_for_byte(recorded):
     samples = list(RecordedSamples([recorded.path]))
     counts = Counter(sample.topic for sample in samples)
     assert counts["pose"] == FRAMES
@@ -265,7 +265,7 @@ def test_the_card_says_how_it_ended_from_then_on_only(recorded):
     assert ["**done**" in text for text in said.values()] == [at >= done_ns - 1 for at in said]
 
 
-def test_a_malformed_sample_costs_that_sample(recorded):
+def test_a_malformed_sample_affects_no_other(recorded):
     assert recorded.report["malformed"] == 1
     assert recorded.report["lost"] == 0
     lines = read_column(recorded.path, entities.BUS_LOG, "TextLog:text").values
@@ -273,7 +273,7 @@ def test_a_malformed_sample_costs_that_sample(recorded):
     assert sum(Keys().of(topics.COVERAGE) in line for (line,) in lines) == 1
 
 
-def test_an_area_that_is_none_does_not_end_it(tmp_path):
+def test_an_invalid_area_does_not_end_the_recorder(tmp_path):
     polygons = ([], [[]], [[0], [1, 1]], [[0, 0], [1, 0, 5], [1, 1]])
     with (
         bus_on_free_port() as (bus, endpoint),

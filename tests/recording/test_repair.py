@@ -78,7 +78,7 @@ def test_a_part_cut_before_the_end_of_its_header_has_no_frames(tmp_path, content
 
 
 @pytest.mark.parametrize("content", [b"RX", b"hello", b"hello, this is a text of some length"])
-def test_what_is_no_recording_is_left_alone(tmp_path, content):
+def test_a_file_that_is_no_recording_is_left_alone(tmp_path, content):
     path = written(tmp_path, content)
     with path.open("rb") as recording:
         assert scan_recording(recording) is None

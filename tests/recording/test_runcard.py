@@ -46,7 +46,7 @@ def test_settings_of_any_type_make_a_card(config):
     RunDescription("r2", "now", "1.0", config).markdown()
 
 
-def test_what_is_asked_for_first_stands_in_a_line():
+def test_the_first_line_has_robot_version_and_seed():
     card = RunDescription("r2", "2026-01-01", "1.0", {"planner": {"seed": 7}}).markdown()
     assert card.startswith("**r2**, version 1.0, seed 7\n")
 
@@ -87,5 +87,5 @@ def outcome(*states, driven_s=90.0, first_ns=5_000_000_000, **members):
         (outcome(("degraded", "it stands"), ("covering", "")), "**under way**"),
     ],
 )  # fmt: skip
-def test_the_outcome_is_said_where_there_is_one(said, line):
+def test_the_outcome_is_shown_if_there_is_one(said, line):
     assert said == line

@@ -144,7 +144,7 @@ def test_no_part_is_written_below_the_floor(tmp_path):
     assert writer.close()
 
 
-def test_what_came_while_the_disk_was_full_stands_where_it_came(tmp_path, monkeypatch):
+def test_samples_received_on_a_full_disk_keep_their_times(tmp_path, monkeypatch):
     clock = Clock()
     writer = writer_in(tmp_path)
     with monkeypatch.context() as patch:
@@ -186,7 +186,7 @@ def test_a_deleted_part_is_reported_and_followed_by_another(tmp_path, caplog, le
     assert read_summary(part).rows["noise"] == 1
 
 
-def test_a_stalled_disk_is_told_and_taken_up_again(tmp_path):
+def test_a_stalled_disk_is_reported_and_used_again(tmp_path):
     # A pipe that nobody empties: to rerun's writer, a disk that hangs.
     pipe = tmp_path / f"{RUN}-part1.rrd"
     os.mkfifo(pipe)

@@ -81,7 +81,7 @@ def test_the_recording_holds_what_scenarios_need(samples, run, recording):
     assert all(a.at_ns <= b.at_ns for a, b in pairwise(samples))
 
 
-def test_as_it_was_it_ends_as_it_did(as_it_was, recording):
+def test_an_unchanged_recording_ends_as_recorded(as_it_was, recording):
     # By time alone: on a busy machine the daemon took other samples together, so that a pose came
     # after its map, and a path may lead over cells that the recorded robot had behind it. By cycles
     # a replay is the same throughout.
@@ -127,7 +127,7 @@ def test_poses_come_late(samples, config, as_it_was, late_s):
 
 
 @pytest.mark.parametrize("share", [0.2, 0.5])
-def test_for_a_while_nobody_knows_where_the_robot_is(samples, config, as_it_was, share):
+def test_a_gap_without_poses_is_survived(samples, config, as_it_was, share):
     """It reappears far from where it was last seen: what lies between is not covered."""
     poses = places(samples, "pose")
     begin = int(share * len(poses))
@@ -150,13 +150,13 @@ def test_plans_come_late(samples, config, late_s):
     assert_told(played(samples, slow))
 
 
-def test_nobody_says_that_it_may_go_on(samples, config):
+def test_without_resume_it_stays_paused(samples, config):
     story = played(scenarios.without(samples, places(samples, "command")[1:]), config)
     assert story.mission.state == "paused"
     assert not len(story.mission.route.path.ahead)
 
 
-def test_a_command_that_is_none_costs_itself(samples, config):
+def test_an_invalid_command_changes_nothing_else(samples, config):
     pause = places(samples, "command")[0]
     story = played(scenarios.changed(samples, pause, lambda _: b'{"command": "dance"}'), config)
     # Nothing to resume, then: that is refused, too, but not a fault of a sample.
@@ -164,7 +164,7 @@ def test_a_command_that_is_none_costs_itself(samples, config):
     assert_told(story)
 
 
-def test_a_map_that_is_none_costs_itself(samples, config):
+def test_an_invalid_map_changes_nothing_else(samples, config):
     last_map = places(samples, "map")[-1]
     story = played(scenarios.changed(samples, last_map, lambda payload: payload[:-5]), config)
     assert story.faults[0] == "malformed_message"

@@ -81,7 +81,7 @@ def first_uses(samples, topic):
 
 
 @pytest.mark.parametrize("which", ["half", "recording"])
-def test_every_decision_is_as_it_was(which, request):
+def test_each_decision_equals_the_recorded_one(which, request):
     recording = request.getfixturevalue(which)
     samples = list(RecordedSamples(recording.paths))
     replay, record, steps = played(samples)
@@ -103,7 +103,7 @@ def test_every_decision_is_as_it_was(which, request):
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 
-def test_cells_along_askew_walls_are_found_once_more(tmp_path):
+def test_cells_along_askew_walls_are_found_by_the_replay(tmp_path):
     """The angle follows from the maps and poses that a recording has."""
     recording = record_mission(tmp_path, line="thorough", yaw_deg=25.0)
     assert recording.status["map"]["lattice_deg"] == pytest.approx(25.0, abs=1.0)
@@ -120,7 +120,7 @@ def test_cells_along_askew_walls_are_found_once_more(tmp_path):
 KEEP_OUT = {"name": "crate", "polygon": [[2.4, 0.6], [2.9, 0.6], [2.9, 1.1], [2.4, 1.1]]}
 
 
-def test_keep_outs_rooms_and_what_was_not_to_be_forgotten_are_repeated(tmp_path):
+def test_keep_outs_rooms_and_refusals_are_repeated(tmp_path):
     # A room of an earlier run: the whole floor.
     labels, book = np.ones((54, 72), np.int32), RoomBook()
     for _ in range(HOLD_NEW):
@@ -153,7 +153,7 @@ def test_keep_outs_rooms_and_what_was_not_to_be_forgotten_are_repeated(tmp_path)
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 
-def test_what_blocked_the_follower_blocks_it_again(tmp_path):
+def test_a_reported_obstacle_blocks_the_replay_too(tmp_path):
     recording = record_mission(tmp_path, line="thorough", yaw_deg=25.0, blocked_s=(6.0, 12.0))
     samples = list(RecordedSamples(recording.paths))
     assert sum(sample.topic == "blocked" for sample in samples) == 2
@@ -164,7 +164,7 @@ def test_what_blocked_the_follower_blocks_it_again(tmp_path):
     assert any("the robot stands: obstacle ahead" in text for text in said)
 
 
-def test_what_is_said_on_the_bus_is_that_of_the_contract(samples):
+def test_the_turn_log_on_the_bus_matches_its_schema(samples):
     for place in places(samples, TURNS):
         check("turns.json", json.loads(samples[place].sample.payload))
 
@@ -208,7 +208,7 @@ def test_a_decision_that_is_another_is_found_at_its_turn(samples):
     assert replay.turns == turn.number - 1
 
 
-def test_other_words_for_a_reason_are_no_other_decision(samples):
+def test_a_reworded_reason_is_no_difference(samples):
     """Each release may word reasons anew; what they are the reasons of counts."""
 
     def reworded(payload):
@@ -229,7 +229,7 @@ def test_other_words_for_a_reason_are_no_other_decision(samples):
     assert all(step.as_recorded for step in steps if step.decision.path is not None)
 
 
-def test_a_gap_in_the_log_is_as_far_as_it_goes(samples):
+def test_a_gap_in_the_log_ends_the_comparison(samples):
     logs = places(samples, TURNS)
     replay, record, _ = played(without(samples, [logs[len(logs) // 2]]))
     assert "not in the recording" in record.gap
@@ -242,7 +242,7 @@ def test_without_its_beginning_there_is_no_log(samples):
     assert read_turns(without(samples, places(samples, TURNS))) is None
 
 
-def test_a_log_that_is_none_ends_it(samples):
+def test_an_invalid_log_ends_the_comparison(samples):
     logs = places(samples, TURNS)
     _, record, _ = played(changed(samples, logs[2], lambda payload: payload[:-9]))
     assert record.gap.startswith("turn log")

@@ -66,7 +66,7 @@ def test_the_longest_stand_neither_drives_nor_turns():
     assert longest_stand(data, spans_of([(50.0, "covering", "")], 60.0)) is None
 
 
-def test_states_said_again_go_on():
+def test_a_repeated_state_continues():
     spans = spans_of([(0, "a", "why"), (2, "a", ""), (3, "b", ""), (5, "a", "")], 9.0)
     assert [(s.name, s.begin_s, s.end_s, s.reason) for s in spans] == [
         ("a", 0, 3, "why"),
@@ -103,7 +103,7 @@ def test_a_curve_fills_its_picture():
     assert nearly == ["▇▇▇▇", "████"]
 
 
-def test_times_are_told_as_on_a_clock():
+def test_times_are_printed_as_on_a_clock():
     assert [clock(s) for s in (0, 59.96, 61.5, 3600, 7325.25)] == [
         "0:00.0",
         "1:00.0",
@@ -113,7 +113,7 @@ def test_times_are_told_as_on_a_clock():
     ]
 
 
-def test_counts_by_code_go_on_after_a_restart():
+def test_counts_by_code_add_up_over_restarts():
     plots = {
         "metrics/errors/wrong_frame": np.array([(0, 1), (1, 3), (2, 1), (3, 2)], np.float64),
         "metrics/latency/plan": np.array([(0, 9)], np.float64),

@@ -63,12 +63,12 @@ def test_a_lane_is_swept_as_wide_as_the_tool(yaw):
     assert figures.reachable_m2 == pytest.approx(reached(3.9, 2.9), rel=0.02)
 
 
-def test_a_jump_is_no_drive():
+def test_floor_under_a_jump_of_the_pose_does_not_count():
     jump = told([*LANE[:2], *LANE[4:]])
     assert jump.swept_m2 == pytest.approx(1.5 * TOOL_M + 2 * DISC_M2, rel=0.02)
 
 
-def test_what_was_driven_without_a_pose_is_not_known():
+def test_floor_driven_over_without_poses_does_not_count():
     at_s = [0, 1, 2, 9, 10, 11, 12]
     lost = told(LANE, at_s=at_s, lost_pose_s=3.0)
     assert lost.swept_m2 == pytest.approx(2.5 * TOOL_M + 2 * DISC_M2, rel=0.02)
@@ -82,7 +82,7 @@ def test_a_pose_astray_changes_nothing():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
-def test_a_keep_out_zone_is_as_good_as_a_wall(yaw):
+def test_a_keep_out_zone_counts_as_a_wall(yaw):
     zone = ((2.0, -1.0), (2.2, -1.0), (2.2, 9.0), (2.0, 9.0))
     beyond = ((3.0, 8.0), (4.0, 8.0), (4.0, 9.0))
     figures = told([(0.5, 1.5), (1.0, 1.5)], keep_out=(zone, beyond), yaw=yaw)
@@ -105,7 +105,7 @@ def test_floor_swept_before_is_not_guessed_at():
     assert told(LANE, statuses=[before]) is None
 
 
-def test_what_the_ledger_had_last_is_told_beside():
+def test_the_last_floor_of_the_ledger_is_reported():
     told = [Status(floor=FloorReport(2.0)), Status(floor=FloorReport(3.5)), Status()]
     samples = [StatusSample(float(at), status) for at, status in enumerate(told)]
     assert RunData(statuses=samples).ledger_floor.swept_m2 == 3.5
@@ -115,7 +115,7 @@ def test_what_the_ledger_had_last_is_told_beside():
     )
 
 
-def test_what_is_left_and_out_of_reach_is_told_with_its_reasons():
+def test_floor_left_and_out_of_reach_has_reasons():
     left = (FloorLeft(0.5, "beside the path"), FloorLeft(0.25, "on the path"))
     status = Status(floor=FloorReport(3.5, 4.25, left, (FloorLeft(1.5, "too narrow"),)))
     data = RunData(statuses=[StatusSample(0.0, status)])

@@ -87,7 +87,7 @@ def test_an_order_of_zones_is_judged_by_these():
 
 
 @pytest.mark.parametrize("ordered", ["command", "itself", None])
-def test_an_order_from_before_a_restart_is_still_the_one_who_gave_it(ordered):
+def test_an_order_keeps_its_origin_over_a_restart(ordered):
     (order,) = restarted(MissionReport(ordered))
     assert (order.ordered, order.order) == (ordered or "itself", None)
 
@@ -115,7 +115,7 @@ def test_a_mission_that_is_done_with_cells_left_says_how_many():
     ]
 
 
-def test_the_same_order_sent_twice_goes_on_unless_it_is_over():
+def test_an_equal_order_continues_unless_it_is_over():
     rows = ((0, "idle", 0, 60), (11, "covering", 5, 60), (50, "done", 60, 60))
     twice = [(10, "start", ALL), (20, "start", ALL)]
     assert [order.at_s for order in told(*rows, commands=twice)] == [10]
@@ -124,7 +124,7 @@ def test_the_same_order_sent_twice_goes_on_unless_it_is_over():
 
 
 @pytest.mark.parametrize("command", ["cancel", "reset"])
-def test_what_is_called_off_is_over(command):
+def test_a_cancelled_order_is_over(command):
     rows = ((0, "covering", 5, 60), (20.1, "idle", 0, 60), (30.1, "covering", 0, 60))
     commands = [(20, command, ALL), (30, "start", ALL), (90, command, ALL)]
     orders = told(*rows, commands=commands)

@@ -176,7 +176,7 @@ def test_complete_is_done_and_nothing_left_over(review, state, covered, zones, c
     assert told.complete is complete
 
 
-def test_what_was_covered_before_is_not_guessed_at(review):
+def test_floor_swept_before_the_recording_is_not_estimated(review):
     before = StatusSample(0.0, Status(ledger=LedgerReport(restored_cells=7)))
     data = replace(review.data, statuses=[before, *review.data.statuses])
     told = document(review_of(review.record, data, 0))
@@ -186,7 +186,7 @@ def test_what_was_covered_before_is_not_guessed_at(review):
     assert "7 cells were covered before: the recording does not show which" in caption
 
 
-def test_a_recorder_in_trouble_is_told(review):
+def test_troubles_of_the_recorder_are_reported(review):
     states = (Span("recording", 0, 2), Span("disk full", 2, 5, "less than 50 MB are free"))
     told = document(replace(review, recorder_states=states))
     assert {
@@ -207,7 +207,7 @@ def test_texts_of_a_recording_do_nothing_to_a_terminal(review, capsys):
     assert r"[/]\x1b[2J" in out
 
 
-def test_what_begins_like_a_formula_is_text_to_a_table(review, tmp_path):
+def test_a_text_like_a_formula_is_exported_as_text(review, tmp_path):
     names = ("=1+1", "+1+1", "-1+1", "@sum", "-1.5e-3", "a\nb", "ok")
     states = tuple(Span(name, 0, 1, name) for name in names)
     export(replace(review, states=states), tmp_path)
@@ -216,7 +216,7 @@ def test_what_begins_like_a_formula_is_text_to_a_table(review, tmp_path):
     assert told == ["'=1+1", "'+1+1", "'-1+1", "'@sum", "-1.5e-3", "a\\nb", "ok"]
 
 
-def test_a_terminal_of_few_characters_is_told_everything(parts, tmp_path):
+def test_a_terminal_with_few_characters_shows_everything(parts, tmp_path):
     """The curve is of ASCII there, and what a name has besides is escaped."""
     odd = shutil.copytree(parts[0].parent, tmp_path / "räum\u2192")
     words = [*PROGRAM, "review", "--long", *map(str, odd.glob("*.rrd"))]

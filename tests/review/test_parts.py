@@ -149,7 +149,7 @@ def test_parts_are_one_run(parts):
     assert told["complete"] is False
 
 
-def test_progress_is_told(parts):
+def test_progress_is_reported(parts):
     told = []
     read_review(parts, lambda *what: told.append(what))
     assert list(dict.fromkeys(what for what, _, _ in told)) == [
@@ -163,7 +163,7 @@ def test_progress_is_told(parts):
     assert len(reading) <= reading[0][1]
 
 
-def test_paths_without_a_plan_are_no_replans(parts):
+def test_paths_without_a_plan_do_not_count_as_replans(parts):
     told = document(read_review(parts))
     assert told["paths"] == 4
     assert told["first_plan_ms"] == 50.0
@@ -171,7 +171,7 @@ def test_paths_without_a_plan_are_no_replans(parts):
     assert (told["replan_ms_p50"], told["replan_ms_p99"], told["replan_ms_max"]) == (4.0, 8.0, 8.0)
 
 
-def test_troubles_and_faults_are_told(parts):
+def test_troubles_and_faults_are_reported(parts):
     review = read_review(parts)
     told = document(review)
     # On a slow computer the planner is heard late, too.
@@ -193,7 +193,7 @@ def test_troubles_and_faults_are_told(parts):
     assert told["faults"] == 3
 
 
-def test_a_part_alone_begins_with_what_was_in_force(parts):
+def test_each_part_begins_with_the_state_in_force(parts):
     review = read_review(parts[-1:])
     assert all(span.begin_s >= 0 for span in review.states)
     assert review.lattice is not None
@@ -202,7 +202,7 @@ def test_a_part_alone_begins_with_what_was_in_force(parts):
     assert told["samples_missing"] == 0
 
 
-def test_of_a_killed_recorder_all_is_told(tmp_path, parts):
+def test_a_killed_recorder_loses_no_figures(tmp_path, parts):
     files = run_told(tmp_path / "runs", faults={"wrong_frame": 2}, silent=1, killed=True)
     content = [file.read_bytes() for file in files]
     told, whole = document(read_review(files)), document(read_review(parts))
@@ -213,7 +213,7 @@ def test_of_a_killed_recorder_all_is_told(tmp_path, parts):
     assert told["faults_by_code"]["wrong_frame"] == 2
 
 
-def test_of_several_runs_the_newest_is_told(parts, other, capsys):
+def test_the_newest_of_several_runs_is_reviewed(parts, other, capsys):
     """As of ``review recordings/*.rrd`` in the guide."""
     with pytest.raises(DifferentRuns, match="parts of different runs"):
         read_review([parts[0], other[0]])
@@ -244,7 +244,7 @@ def test_two_runs_side_by_side(parts, other, tmp_path, capsys):
     assert "+3" in table
 
 
-def test_what_is_no_recording_is_named(tmp_path, capsys):
+def test_a_file_that_is_no_recording_is_named(tmp_path, capsys):
     assert main(["review", str(tmp_path / "none.rrd")]) == 1
     assert "No such file or directory" in capsys.readouterr().err
     (tmp_path / "text.rrd").write_text("hello")

@@ -128,7 +128,7 @@ def turned_s(review):
     return review.data.pose_s[next(i for i, yaw in enumerate(yaws) if yaw > 1.0)]
 
 
-def test_why_the_robot_turned_round(review):
+def test_a_turn_of_the_robot_is_explained(review):
     instant = scene_at(review, turned_s(review)).instant
     assert (instant.state, instant.x, instant.y) == ("covering", 1.35, Y)
     assert instant.turn.degrees == pytest.approx(180.0, abs=1.0)
@@ -141,7 +141,7 @@ def test_why_the_robot_turned_round(review):
     assert instant.path.changed.x_max == 2.0
 
 
-def test_what_of_the_map_changed_and_which_commands_came(review):
+def test_changes_of_the_map_and_commands_are_listed(review):
     instant = scene_at(review, turned_s(review)).instant
     # A band of 40 cm across the room, of which the box and two walls are no floor.
     assert instant.map.seen_m2 == pytest.approx(0.4 * 4.0, abs=0.05)
@@ -154,7 +154,7 @@ def test_what_of_the_map_changed_and_which_commands_came(review):
     assert "seen for the first time" in told["map"]
 
 
-def test_what_found_the_path_is_said(review):
+def test_the_search_that_found_the_path_is_named(review):
     instant = scene_at(review, review.data.paths[0].at_s).instant
     planned = dict(instant_rows(instant))["planned"]
     assert planned.startswith("1 at 0:0")
@@ -162,7 +162,7 @@ def test_what_found_the_path_is_said(review):
     assert planned.endswith(f": first plan; aco, 32 ants; {found}")
 
 
-def test_before_anything_came_nothing_is_told(review):
+def test_before_the_first_message_nothing_is_known(review):
     first = min(review.data.map_s[0], review.data.pose_s[0])
     instant = scene_at(review, max(first - 0.01, 0.0)).instant
     assert instant.path is instant.x is instant.command is None
@@ -199,7 +199,7 @@ def test_a_line_leads_on_from_its_nearest_point():
         ((0.9, 0.7), "not worth it", "the tool's edge passed 10 cm from it"),
     ],
 )
-def test_why_a_spot_is_not_swept(review, place, why, words):
+def test_the_reason_of_an_unswept_spot_is_found(review, place, why, words):
     (spot,) = explain(review, [place])
     assert spot.why == why
     assert words in spot.words
@@ -268,7 +268,7 @@ def test_by_how_much_it_was_missed(review):
     assert spot.seen_s == pytest.approx(review.data.map_s[0], abs=1e-3)
 
 
-def test_what_the_last_path_leads_over_is_still_to_come(review):
+def test_floor_on_the_last_path_is_still_to_come(review):
     """Of the path back the robot drove all but the last 15 cm."""
     (spot,) = explain(review, [(0.2, Y)])
     assert spot.why == "still to come"
@@ -312,7 +312,7 @@ def test_the_command_answers(parts, review, tmp_path, capsys, option):
 @pytest.mark.parametrize(
     ("text", "said"), [("9:59", "the recording is 0:0"), ("1:x", "MM:SS"), ("nan", "MM:SS")]
 )
-def test_a_time_that_is_none_is_named(parts, capsys, text, said):
+def test_an_invalid_time_is_named(parts, capsys, text, said):
     try:
         code = main(["review", *map(str, parts), "--at", text])
     except SystemExit as ended:

@@ -62,7 +62,7 @@ def test_floor_is_that_under_the_tool_of_the_simulated_robot(told, review, recor
     assert review.floor.figures.illegal_share == 0.0
 
 
-def test_the_cells_are_those_under_the_tool_of_the_simulated_robot(told, review, recording):
+def test_the_cells_are_those_under_the_simulated_tool(told, review, recording):
     window = review.lattice.window
     passed = {(row + window.row0, col + window.col0) for row, col in np.argwhere(review.visits)}
     # Poses come four times in a simulated second: the rim of the tool may pass a centre between
@@ -94,7 +94,7 @@ def test_shares_are_reached_when_they_were(told, review, recording):
     assert shares[-1] == 1.0
 
 
-def test_replans_are_those_heard(told, recording):
+def test_replans_match_the_recorded_paths(told, recording):
     notes = {note["revision"]: note for _, note in recording.notes}
     assert told["paths"] == len(notes) == recording.status["path"]["revision"]
     planned = [note for _, note in sorted(notes.items()) if note["planner"]]
@@ -134,7 +134,7 @@ def test_plans_are_those_of_the_status(told, recording):
     assert told["attempts_used"] == list(notes.values()).count("better further on")
 
 
-def test_what_it_took_is_told(told, recording):
+def test_memory_and_threads_are_reported(told, recording):
     most = max(status["rss_mb"] for _, status in recording.statuses)
     assert told["memory_mb_max"] == pytest.approx(most, rel=0.11)
     assert told["threads_max"] >= recording.status["threads"] > 1
@@ -144,13 +144,13 @@ def test_what_it_took_is_told(told, recording):
     assert 0.0 < told["recorder_processor_s"] < 60.0
 
 
-def test_what_a_process_used_begins_at_nothing_with_each_of_them():
+def test_processor_time_adds_up_over_restarts():
     assert _used([2.0, 5.0, 1.0, 4.0]) == 3.0 + 1.0 + 3.0
     assert _used([0.0, 0.0]) is None  # a daemon that does not tell it
     assert _used([]) is None
 
 
-def test_states_are_those_heard(told, review, recording):
+def test_states_match_the_recorded_statuses(told, review, recording):
     names = [name for name, _ in _groups(status["state"] for _, status in recording.statuses)]
     mine = [span.name for span in review.states]
     # The recorder joins later than the robot, and one that is busy takes the newest status alone.

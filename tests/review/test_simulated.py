@@ -26,7 +26,7 @@ from tests.support.rooms import map_bytes, room
 from tests.support.senders import Sender
 
 SCALE, SPEED_M_S = 20.0, 0.25
-# The robot drives for 10 s of its own, with poses each half second.
+# The robot drives for 10 s by its own clock, with a pose every half second [s].
 DRIVES_S, EVERY_S = 10.0, 0.5
 WORDS = "simulated at 20 times real time"
 ROBOT = {"tool_width_m": 0.3, "radius_m": 0.18, "speed_m_s": SPEED_M_S, "time_scale": SCALE}

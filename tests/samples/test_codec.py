@@ -57,7 +57,7 @@ arrivals = st.builds(
 
 
 @given(st.lists(st.one_of(st.none(), st.lists(arrivals, min_size=1, max_size=8)), max_size=5))
-def test_what_goes_in_comes_out(batches):
+def test_decoded_batches_equal_the_encoded_ones(batches):
     blobs = encoded(*batches)
     assert decoded(blobs) == [batch for batch in batches if batch is not None]
 
@@ -117,7 +117,7 @@ def test_a_restart_may_tell_again_what_is_in_force():
     assert SampleDecoder().samples(first) == [latched]
 
 
-def test_what_is_no_batch_is_said_to_be_none():
+def test_an_invalid_batch_is_refused():
     (blob,) = encoded([arrival(b"payload"), arrival(b"longer payload", "map")])
     for broken in (b"", blob[:10], blob[:-1], b"\x02" + blob[1:], blob[:17] + bytes(20)):
         with pytest.raises(MalformedMessage):

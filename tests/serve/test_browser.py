@@ -364,7 +364,7 @@ def test_a_reason_shows_its_floor_on_the_map_and_nothing_else(tmp_path):
 
 
 @needs_browser
-def test_of_an_older_daemon_the_page_says_why_it_shows_no_place(tmp_path):
+def test_with_an_older_daemon_the_page_explains_missing_places(tmp_path):
     endpoint = free_endpoint()
     left = [
         {"m2": 1.0, "reason": "too narrow for the robot, or too near to a wall or to furniture"}

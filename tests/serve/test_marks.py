@@ -42,7 +42,7 @@ def test_levels_hold_all_lower_ones():
     assert marks.FIELD_MARKS[1] == 1
 
 
-def test_what_is_free_is_as_the_daemon_says():
+def test_free_pixels_follow_the_daemons_thresholds():
     table = marks.map_marks(MapSettings(free_at_most=10, occupied_at_least=90))
     assert [table[value] for value in (0, 10, 11, 89, 90, 100, 101, 255)] == [
         1,

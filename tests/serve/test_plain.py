@@ -34,7 +34,7 @@ def told(of: Status) -> list[str]:
 
 
 @pytest.mark.parametrize("state", STATES)
-def test_each_state_is_said_in_an_owners_words(state):
+def test_each_state_has_plain_words(state):
     """Whatever the reasons and troubles are."""
     troubles = [{"code": code, "text": "pose 3 covered", "do": "check it"} for code in TROUBLES]
     for stage in ("covering", "retrying", "returning", "over", None):
@@ -118,7 +118,7 @@ def test_floor_left_is_listed_once_with_its_marks():
         (0.5, 0.2, plain.BEHIND_OR_NO_WAY),
     ],
 )
-def test_floor_behind_a_keep_out_is_said_to_be(behind_m2, obstacles_m2, said):
+def test_floor_behind_a_keep_out_has_that_reason(behind_m2, obstacles_m2, said):
     areas = [{"m2": behind_m2, "reason": plain.BEHIND}]
     areas += [{"m2": obstacles_m2, "reason": plain.OBSTACLES}]
     floor = {"swept_m2": 9.0, "left": [], "out_of_reach": [{"m2": 2.0, "reason": plain.CLOSED}]}
@@ -126,7 +126,7 @@ def test_floor_behind_a_keep_out_is_said_to_be(behind_m2, obstacles_m2, said):
     assert told_left(status(floor=floor, mission=mission)) == [(2.0, said, 2, [])]
 
 
-def test_a_robot_without_a_map_is_said_to_have_none():
+def test_a_robot_without_a_map_is_shown_so():
     assert "no map" in plain.does(status(state="idle", map=None))
     assert plain.does(status(state="idle")) == "Ready to sweep"
 

@@ -183,12 +183,12 @@ def test_a_recording_takes_no_commands(file, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--allow-commands",), "--allow-commands: a recording is only looked at"),
-        (("--robot", "two"), "--robot: a recording is only looked at, and has no bus"),
+        (("--allow-commands",), "--allow-commands: a page of a recording has no commands"),
+        (("--robot", "two"), "--robot: a page of a recording has no commands and no bus"),
         (("--listen", "0.0.0.0:8000"), "lets other computers in, without any access control"),
     ],
 )
-def test_what_does_not_fit_a_recording_is_refused(file, words, said):
+def test_options_of_a_live_page_are_refused_for_a_recording(file, words, said):
     ended = fasaco_edge("serve", file, *words)
     assert ended.code == 78
     assert said in ended.err

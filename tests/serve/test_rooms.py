@@ -36,7 +36,7 @@ def square(x: float, y: float, size: float = 3.0) -> tuple[tuple[float, float], 
 GRID = [square(3.1 * col, 3.1 * row) for row in range(4) for col in range(5)]
 
 
-def test_rooms_are_said_once_and_shares_as_they_are_swept():
+def test_rooms_are_sent_once_and_shares_on_change():
     view = ServedView(Keys())
     assert heard(view, "rooms", 1.0) == {"kind": "rooms", "rooms": []}
     rooms = [RoomReport(index + 1, outline=each) for index, each in enumerate(GRID)]

@@ -172,7 +172,7 @@ def test_it_stays_small(covering, page):
 
 
 @pytest.mark.parametrize("said", ["", "{", '{"kind":"command"}', '{"kind":"hello"}', "[" * 9999])
-def test_nonsense_ends_that_viewer_alone(page, said):
+def test_nonsense_ends_only_that_viewer(page, said):
     with looking(page) as other, looking(page) as looker:
         other.wait("welcome")
         looker.wait("welcome")
@@ -298,7 +298,7 @@ def test_tokens_say_who_may_look_and_who_may_command(covering, tmp_path):
                 assert set(looker.seen) == {"denied"}
 
 
-def test_it_listens_to_others_only_where_it_is_told_who_may(tmp_path):
+def test_other_addresses_need_valid_tokens(tmp_path):
     endpoint = free_endpoint()
     words = ("serve", "--connect", endpoint, "--listen")
     tokens = tmp_path / "tokens"
@@ -326,7 +326,7 @@ def test_it_listens_to_others_only_where_it_is_told_who_may(tmp_path):
         assert said in ended.err
 
 
-def test_a_server_that_hears_no_more_ends():
+def test_a_server_without_its_feed_ends():
     """Else a page would show for ever what was last."""
 
     class Deaf(Feed):
@@ -361,7 +361,7 @@ def test_fifty_viewers_that_come_and_go_leave_nothing(page):
     assert grown < 8.0
 
 
-def test_there_are_only_so_many_viewers(page):
+def test_the_number_of_viewers_is_limited(page):
     with ExitStack() as crowd:
         for _ in range(MOST_VIEWERS):
             crowd.enter_context(looking(page)).wait("welcome")
@@ -370,7 +370,7 @@ def test_there_are_only_so_many_viewers(page):
     until(lambda: can_look(page))
 
 
-def test_viewers_that_say_nothing_keep_nobody_out(page):
+def test_silent_viewers_do_not_keep_others_out(page):
     with ExitStack() as crowd:
         silent = [crowd.enter_context(opened(page)) for _ in range(MOST_STRANGERS + 3)]
         with looking(page) as looker:
@@ -401,7 +401,7 @@ def can_look(page: Served) -> bool:
         return False
 
 
-def test_a_viewer_that_hangs_is_dropped_and_holds_nobody_up(tmp_path):
+def test_a_hanging_viewer_is_dropped_and_blocks_no_other(tmp_path):
     random = np.random.default_rng(1)
     with (
         daemon_process(tmp_path) as daemon,
@@ -481,7 +481,7 @@ def test_it_outlives_the_daemon(tmp_path):
             looker.wait("state", lambda state: state["absent"] == "")
 
 
-def test_an_order_beyond_the_limits_fails_for_its_sender_alone(covering, tmp_path):
+def test_an_order_beyond_the_limits_fails_only_for_its_sender(covering, tmp_path):
     with (
         served(tmp_path, covering.endpoint, "--allow-commands") as page,
         looking(page) as looker,
@@ -510,7 +510,7 @@ class SilentBrowser:
             yield nothing
 
 
-def test_a_viewer_without_news_hears_that_the_server_is_there(monkeypatch):
+def test_a_viewer_without_news_gets_signs_of_life(monkeypatch):
     monkeypatch.setattr(viewer, "ALIVE_S", 0.01)
     browser: Any = SilentBrowser()
     source: Any = SimpleNamespace(newest=lambda: [("state", 1, message_text("state"))])

@@ -69,7 +69,7 @@ def test_an_order_that_has_ended_can_be_given_again(ended):
     assert heard(view, "state", 4.0)["again"] == {}
 
 
-def test_an_order_from_before_this_server_can_be_given_again_by_the_status_alone():
+def test_an_earlier_order_can_be_repeated_from_the_status():
     """Rooms are ordered by their numbers, and as often as they are set where nothing else was."""
     view = ServedView(Keys())
     rooms = [
@@ -129,7 +129,7 @@ def test_the_keep_outs_in_force_are_drawn_by_the_status_alone():
     assert heard(view, "areas", 2.0)["keep_out"] == []
 
 
-def test_what_has_not_changed_is_not_said_again():
+def test_unchanged_state_is_not_sent_again():
     view = ServedView(Keys())
     tell(view, "status", {"state": "idle"}, 1.0)
     assert heard(view, "state", 1.0)["state"] == "idle"
@@ -138,7 +138,7 @@ def test_what_has_not_changed_is_not_said_again():
     assert "state" not in view.news(2.0)
 
 
-def test_of_a_long_path_the_beginning_is_shown(monkeypatch):
+def test_a_long_path_is_cut_after_its_beginning(monkeypatch):
     monkeypatch.setattr(served_view, "MOST_POINTS", 10)
     view = ServedView(Keys())
     xy = np.stack([np.arange(25.0), np.zeros(25)], axis=-1)
@@ -151,7 +151,7 @@ def test_of_a_long_path_the_beginning_is_shown(monkeypatch):
     assert len(view.walk.xy) == 10
 
 
-def test_a_sample_that_cannot_be_read_is_told_and_costs_no_other():
+def test_an_unreadable_sample_is_reported_and_affects_no_other():
     view = ServedView(Keys())
     for topic in ("map", "floor", "path", "coverage"):
         view.take(topic, Sample("", b"nonsense"), 1.0)
@@ -162,7 +162,7 @@ def test_a_sample_that_cannot_be_read_is_told_and_costs_no_other():
     assert not {"map", "floor", "path"} & set(news)
 
 
-def test_an_unreadable_path_attachment_is_an_event_and_no_more():
+def test_an_unreadable_path_attachment_is_only_an_event():
     """The other topics of the same update are served as usual."""
     view = ServedView(Keys())
     xy = np.stack([np.arange(5.0), np.zeros(5)], axis=-1)
@@ -234,7 +234,7 @@ def test_a_paused_robot_keeps_its_path_and_its_time_to_go():
         ("", ("", None, None), "over", "", False),
     ],
 )
-def test_figures_of_a_part_of_the_order_are_said_to_be_of_that_part(zones, at, stage, part, more):
+def test_figures_name_the_room_or_pass_that_they_count(zones, at, stage, part, more):
     view, (zone, number, passes) = ServedView(Keys()), at
     mission = {"ordered": "command", "stage": stage, "zone": zone or None}
     mission |= {"pass": number, "passes": passes, "zones": [{"name": of} for of in zones.split()]}
@@ -243,7 +243,7 @@ def test_figures_of_a_part_of_the_order_are_said_to_be_of_that_part(zones, at, s
     assert (told["part"], told["more"]) == (part, more)
 
 
-def test_of_a_robot_that_is_gone_the_last_is_said_as_such():
+def test_a_gone_robot_is_shown_with_its_last_state():
     view = ServedView(Keys())
     view.take("token", Token("robot", here=True), 1.0)
     drives = walk_of(view, 4, 1.0, state="covering")

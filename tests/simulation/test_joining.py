@@ -34,7 +34,7 @@ def route(path, came, is_clear=clear):
     return None if found is None else np.round(found, 6).tolist()
 
 
-def test_what_is_driven_through_is_left_out():
+def test_waypoints_passed_on_the_way_are_left_out():
     path = centres((0, 0), (0, 1), (0, 2), (1, 2))
     x, y = at(0, 1)
     assert route(path, track(at(0, 0), (x + 0.13, y))) == points((0, 2), (1, 2))
@@ -82,7 +82,7 @@ def test_without_a_clear_way_it_returns_to_where_the_path_turned():
     assert route(path, came, along_the_lane_only) == points((0, 0), (2, 0))
 
 
-def test_where_no_way_is_clear_it_goes_back_where_it_came_from():
+def test_without_a_clear_way_it_drives_back_along_its_track():
     path = centres((0, 0), (0, 1))
     came = track(at(1, 0), at(1, 1), at(1, 2), at(2, 2))
 
@@ -93,7 +93,7 @@ def test_where_no_way_is_clear_it_goes_back_where_it_came_from():
     assert route(path, came, lambda _start, _end: False) is None
 
 
-def test_as_a_last_resort_waypoints_are_passed_over():
+def test_as_a_last_resort_waypoints_are_skipped():
     path = centres((0, 0), (0, 1), (0, 2), (0, 3), *[(0, col) for col in range(4, 20)])
 
     def no_way_to_the_first(_start, end):
@@ -116,7 +116,7 @@ def test_a_single_waypoint_is_driven_to():
     assert route(centres((3, 3)), track(at(0, 0), at(3, 3))) == []
 
 
-def test_one_that_does_not_go_back_drives_straight_or_not_at_all():
+def test_without_going_back_it_drives_straight_or_stands():
     path, came = centres((0, 0), (0, 3)), track(at(1, 0), at(0, 0), at(0, 1))
     found = joined(path, came, clear, goes_back=False)
     assert np.round(found, 6).tolist() == points((0, 3))

@@ -22,7 +22,7 @@ def placed_in(truth, snapshot):
     return whole
 
 
-def test_nothing_is_known_before_the_first_scan():
+def test_there_is_no_map_before_the_first_scan():
     assert Mapper(building(2, 2), SimulationConfig()).snapshot(0) is None
 
 
@@ -38,7 +38,7 @@ def test_one_scan_of_a_closed_room_shows_its_floor_and_walls(yaw):
         assert (face == 100).all()
 
 
-def test_nothing_beyond_walls_or_range_is_known():
+def test_pixels_beyond_walls_or_range_are_unknown():
     truth = building(12, 6, (3.0, 0.0, 3.1, 6.0))
     config = SimulationConfig(range_m=2.0)
     mapper = Mapper(truth, config)

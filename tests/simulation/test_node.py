@@ -130,7 +130,7 @@ def test_a_robot_in_another_process_maps_and_drives_until_ended(planner):
     assert np.count_nonzero(last.cells != -1) > np.count_nonzero(first.cells != -1)
 
 
-def test_bad_paths_cost_only_themselves(planner):
+def test_bad_paths_are_ignored(planner):
     world, path = new_world(), centres((2, 2), (2, 5))
     stages = [
         (lambda: world.stamp_ns > 0, planner.send_rubbish),
@@ -209,7 +209,7 @@ def test_it_runs_outside_the_main_thread_without_signal_handlers(planner):
     assert signal.getsignal(signal.SIGTERM) is before
 
 
-def test_what_cannot_run_says_so():
+def test_an_impossible_simulation_is_an_error():
     with pytest.raises(BadConfiguration, match="speed"):
         run_simulation(new_world(), Keys(), BusSettings(), speed=0.0)
     with pytest.raises(BusUnavailable):

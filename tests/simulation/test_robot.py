@@ -58,7 +58,7 @@ def test_a_goal_behind_is_turned_to_on_the_spot():
     assert all(state.speed == 0.0 for state in turning)
 
 
-def test_a_robot_under_way_comes_to_rest_where_foretold():
+def test_a_moving_robot_stops_at_the_predicted_point():
     state = DriveState(Pose2D(1.0, 2.0, 0.7), 0.25)
     foretold = stopping_point(state, CONFIG)
     while state.moving:
@@ -99,7 +99,7 @@ def test_an_impossible_value_is_named(change, named):
         SimulationConfig(**change)
 
 
-def test_a_base_with_a_turning_radius_drives_no_tighter_arc_and_backward():
+def test_a_base_with_a_turning_radius_keeps_it():
     config = SimulationConfig(turn_radius_m=0.4)
     for told_m_s in (0.25, -0.25):
         state = DriveState(Pose2D(0.0, 0.0))

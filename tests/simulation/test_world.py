@@ -160,7 +160,7 @@ def test_an_empty_path_halts():
     assert world.pose.x < 3.0
 
 
-def test_without_a_clear_way_it_waits_and_says_so():
+def test_without_a_clear_way_it_waits_with_that_activity():
     world = started(building(8, 4, (3.0, 0.0, 3.1, 4.0)), Pose2D(1.0, 1.0))
     world.follow(centres((2, 12), (2, 13)))
     ticks(world, 100)

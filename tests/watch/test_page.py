@@ -43,7 +43,7 @@ def test_two_pixels_make_a_character():
     )
 
 
-def test_what_is_alike_is_written_once():
+def test_equal_characters_share_one_escape_sequence():
     (line,) = GlyphSet(ColorSystem.TRUECOLOR).lines(np.full((2, 50), WALL, np.uint8))
     assert line.count("\x1b") == 2
     assert plain(line) == " " * 50
@@ -117,7 +117,7 @@ def test_the_time_to_go_is_by_the_clock(line_s, scale, said):
     assert f"to go     {said}{', ' if said else ''}30 steps" in page
 
 
-def test_a_time_to_go_is_the_least_wherever_it_stands_while_the_map_grows():
+def test_while_the_map_grows_the_time_to_go_is_a_minimum():
     view = mid_mission()
     tell(view, "status", status(coverage={"coverable": 60, "covered": 10}))
     page = page_of(view)
@@ -261,7 +261,7 @@ def test_texts_off_the_bus_do_not_control_the_terminal():
     assert "[red]gone[/red]" in "".join(lines)
 
 
-def test_a_page_that_did_not_change_is_not_drawn_anew():
+def test_an_unchanged_page_is_not_drawn_again():
     page, view = Page(console()), mid_mission()
     first, second = (page.lines(view, NOW, 80, 24) for _ in range(2))
     assert first == second

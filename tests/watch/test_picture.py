@@ -105,7 +105,7 @@ def test_the_robot_is_where_it_is_and_heads_where_it_heads(yaw):
 
 
 @pytest.mark.parametrize("place", [(-50.0, 3.0), (1e9, -1e9), (8.0, 0.0)])
-def test_what_is_out_of_the_picture_is_not_drawn(place):
+def test_points_outside_the_picture_are_not_drawn(place):
     kinds = np.zeros((8, 8), np.uint8)
     frame = Frame(0.0, 8.0, 1.0, 8, 4)
     picture.draw_robot(kinds, frame, Pose2D(*place), 0.2)

@@ -43,7 +43,7 @@ def test_a_path_that_passes_a_place_again_is_not_cut_there():
     assert walk.at == 5
 
 
-def test_progress_on_a_line_with_long_pieces_is_between_its_points():
+def test_progress_on_a_long_piece_is_between_its_points():
     """As of a way home, whose end is nearer to the robot than its next corner."""
     walk = PathProgress([(0.0, 0.0), (0.0, 5.0), (1.0, 5.0), (1.0, 2.0), (0.6, 2.0)])
     walk.passed(Pose2D(0.05, 1.5))
@@ -160,7 +160,7 @@ def test_without_poses_the_pose_of_the_status_is_used():
         ("command", b"\xff"),
     ],
 )
-def test_what_cannot_be_read_costs_only_itself(topic, payload):
+def test_an_unreadable_sample_changes_nothing_else(topic, payload):
     view = mid_mission()
     before = view.map, view.coverage, view.pose, view.status
     for _ in range(9):
@@ -180,13 +180,13 @@ def test_every_topic_subscribed_is_read(topic):
     view.take(topic.name, Sample("key", b"broken"), NOW)  # a KeyError where nothing reads it
 
 
-def test_members_nobody_knows_yet_are_passed_over():
+def test_unknown_members_are_ignored():
     view = RobotView("robot")
     tell(view, "status", status(weather={"rain": True}))
     assert view.status is not None
 
 
-def test_what_happened_is_told_once():
+def test_each_event_is_reported_once():
     view = mid_mission()
     tell(view, "status", status())
     assert texts(view) == [

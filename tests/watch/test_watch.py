@@ -178,7 +178,7 @@ def test_lines_where_there_is_no_terminal(covering):
     assert not any("\x1b" in line for line in said)
 
 
-def test_a_broken_pipe_is_no_traceback(covering):
+def test_a_broken_pipe_gives_no_traceback(covering):
     with piped("--connect", covering.endpoint, "--json") as process:
         assert process.stdout is not None
         assert process.stderr is not None
@@ -188,7 +188,7 @@ def test_a_broken_pipe_is_no_traceback(covering):
         assert process.stderr.read() == ""
 
 
-def test_json_goes_on_after_a_status_that_cannot_be_read(covering):
+def test_json_output_continues_after_an_unreadable_status(covering):
     with (
         Outsider(covering.endpoint) as outsider,
         piped("--connect", covering.endpoint, "--json") as process,

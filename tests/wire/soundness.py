@@ -13,9 +13,11 @@ from fasaco_edge.errors import MalformedMessage
 from tests.wire.decoders import DECODERS
 from tests.wire.encoders import ENCODERS
 
-# A path's poses are copied, checked, and taken apart into points and headings: 1.45 times
-# its bytes. Cells are not copied, but where one is refused: once. The rest is Python's own.
-PEAK_PER_BYTE, PEAK_AT_LEAST = 2, 8192
+# Largest peak of memory per byte of a payload. The poses of a path are copied, checked, and divided
+# into points and headings: 1.45 times its bytes. Cells are copied once, if one is refused.
+PEAK_PER_BYTE = 2
+# Memory that Python needs for itself [bytes].
+PEAK_AT_LEAST = 8192
 
 
 def is_read(schema: str, payload: bytes) -> bool:

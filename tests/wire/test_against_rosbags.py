@@ -38,7 +38,7 @@ def random_cells(shape: tuple[int, int]) -> np.ndarray:
 
 @each_frame
 @pytest.mark.parametrize("shape", SHAPES)
-def test_occupancy_grid(frame: str, shape: tuple[int, int]) -> None:
+def test_an_occupancy_grid_equals_that_of_rosbags(frame: str, shape: tuple[int, int]) -> None:
     geometry = GridGeometry(*shape, 0.05, Pose2D(-12.5, 3.25, 0.7))
     cells = random_cells(shape)
     theirs = oracle.to_bytes(
@@ -55,7 +55,7 @@ def test_occupancy_grid(frame: str, shape: tuple[int, int]) -> None:
 
 @each_frame
 @pytest.mark.parametrize("shape", SHAPES)
-def test_map_update(frame: str, shape: tuple[int, int]) -> None:
+def test_a_map_update_equals_that_of_rosbags(frame: str, shape: tuple[int, int]) -> None:
     cells = random_cells(shape)
     theirs = oracle.to_bytes(
         schemas.OCCUPANCY_GRID_UPDATE, oracle.update(frame, STAMP_NS, (9, 2), cells)
@@ -68,7 +68,7 @@ def test_map_update(frame: str, shape: tuple[int, int]) -> None:
 
 
 @each_frame
-def test_poses(frame: str) -> None:
+def test_poses_equal_those_of_rosbags(frame: str) -> None:
     stamped = StampedPose(STAMPED.pose, frame, STAMP_NS)
     where, child = oracle.pose(stamped.pose), f"{frame[:250]}/base"
     spread, twist = np.arange(36) / 7, np.arange(6) / 3
@@ -90,7 +90,7 @@ def test_poses(frame: str) -> None:
 
 @each_frame
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 57])
-def test_transforms(frame: str, count: int) -> None:
+def test_transforms_equal_those_of_rosbags(frame: str, count: int) -> None:
     rng = np.random.default_rng(count)
     expected = []
     for child in (*oracle.FRAMES, *map(str, range(count)))[:count]:
@@ -110,7 +110,7 @@ def test_transforms(frame: str, count: int) -> None:
 
 @each_frame
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 57])
-def test_path(frame: str, count: int) -> None:
+def test_a_path_equals_that_of_rosbags(frame: str, count: int) -> None:
     rng = np.random.default_rng(count)
     xy, yaw = rng.normal(scale=30.0, size=(count, 2)), rng.uniform(-3.0, 3.0, count)
     poses = [
@@ -127,7 +127,7 @@ def test_path(frame: str, count: int) -> None:
 
 @each_frame
 @pytest.mark.parametrize("shape", SHAPES)
-def test_pheromone(frame: str, shape: tuple[int, int]) -> None:
+def test_a_pheromone_grid_equals_that_of_rosbags(frame: str, shape: tuple[int, int]) -> None:
     rows, cols = shape
     trail = np.random.default_rng(rows).lognormal(sigma=2.0, size=shape).astype(np.float32)
     snapshot = ColonySnapshot(Window(-4, 6, rows - 4, cols + 6), 0.3, trail, 3, 8, 192, 4711)

@@ -63,7 +63,7 @@ def test_the_number_that_does_not_fit_is_named(values: tuple[float, ...], text: 
         CdrWriter("m").words(THREE, NAMES, *values)
 
 
-def test_what_is_no_number_at_all_is_not_dropped() -> None:
+def test_a_value_that_is_no_number_raises() -> None:
     with pytest.raises(struct.error):
         CdrWriter("m").words(THREE, NAMES, 0, 1.5, 0.0)
 

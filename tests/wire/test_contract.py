@@ -79,7 +79,7 @@ def test_the_readme_has_the_values_of_a_grid(key: str, values: list[int]) -> Non
         "a\0",
     ],
 )
-def test_names_that_are_no_chunk(name: str) -> None:
+def test_names_that_are_no_chunk_are_refused(name: str) -> None:
     for make in (lambda: Keys(robot=name), lambda: Keys().rpc(name)):
         with pytest.raises(BadConfiguration, match="got"):
             make()
@@ -129,7 +129,7 @@ def test_json_has_no_nan(value: float) -> None:
     ],
     ids=lambda payload: repr(payload[:14]),
 )
-def test_json_that_is_none_is_refused(payload: bytes) -> None:
+def test_invalid_json_is_refused(payload: bytes) -> None:
     with pytest.raises(MalformedMessage, match="JSON"):
         decode_json(payload)
 
@@ -153,14 +153,14 @@ def test_json_round_trip(message: dict[str, object]) -> None:
 
 @examples(200)
 @given(st.binary(max_size=60), st.integers(0, 59))
-def test_json_noise(noise: bytes, at: int) -> None:
+def test_noise_in_json_raises_only_malformed_message(noise: bytes, at: int) -> None:
     good = encode_json({"state": "planning", "steps": [1, 2, 3], "eta_s": 1.5})
     for payload in (noise, good[:at] + noise + good[at:], good[:at]):
         with contextlib.suppress(MalformedMessage):
             assert isinstance(decode_json(payload), dict)
 
 
-def test_error_reply() -> None:
+def test_an_error_reply_matches_its_schema() -> None:
     reply = decode_json(encode_error(NothingToCover("every reachable cell is covered")))
     assert reply == {
         "code": "nothing_to_cover",

@@ -101,7 +101,7 @@ def test_endings_of_others_are_read(move, with_message):
             read(payload[:cut])
 
 
-def test_what_was_done_before_is_done():
+def test_an_aborted_goal_with_success_is_done():
     assert DockEnding(SUCCEEDED, success=True).is_done
     # docking_server.cpp returns without a word, and its action server aborts the goal.
     assert DockEnding(ABORTED, success=True).is_done

@@ -76,7 +76,7 @@ def test_a_strict_reader_refuses_what_a_tolerant_one_leaves_out():
         ({"mission": {"zones": [{"name": "k", "pass": 2}, 7]}}, (ZoneReport("k", pass_number=2),)),
     ],
 )
-def test_what_does_not_fit_keeps_its_default(document, expected):
+def test_members_that_do_not_fit_keep_their_defaults(document, expected):
     status = tolerant(document, Status)
     assert expected in (status, status.errors.by_code, status.mission.zones)
 
@@ -153,14 +153,14 @@ def test_a_repair_that_costs_more_has_saved_nothing():
     assert (figures.saved_by_ants_s, figures.saved_by_local_search_s) == (0.5, 0.0)
 
 
-def test_savings_of_ants_are_told_by_their_velocity():
+def test_savings_of_ants_are_listed_by_velocity():
     saved = Saved.of(9_000_000, np.array([8, 3, 1]), np.array([1_500_000, 0, 500_000]))
     figures = PlanFigures.of(CoveragePath(np.zeros((1, 2), np.int32), "p", 1, saved=saved))
     assert (figures.saved_by_ants_s, figures.saved_by_local_search_s) == (2.0, 7.0)
     assert figures.saved_by_velocity_s == {"8": 1.5, "1": 0.5}
 
 
-def test_members_nobody_knows_may_be_nested_as_deep_as_json_may():
+def test_unknown_members_may_be_nested_to_the_limit_of_json():
     deep: dict = {}
     for _ in range(900):
         deep = {"a": deep}

@@ -65,7 +65,7 @@ def test_a_greedy_decoder_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "AssertionError in peak_bytes" in failures_of(POSE)
 
 
-def test_what_does_not_encode_again_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_message_that_cannot_be_encoded_again_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def encode(message: object) -> bytes:
         raise MalformedMessage("not today")
 

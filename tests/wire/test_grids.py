@@ -39,7 +39,7 @@ def test_a_map_and_its_updates():
             with_update(octets, encode_map_update(wrong))
 
 
-def test_a_field():
+def test_a_field_is_read_as_octets():
     trail = RANDOM.random((4, 5)).astype(np.float32)
     payload = encode_pheromone(
         ColonySnapshot(Window(1, 2, 5, 7), 0.3, trail, 0, 8, 16, 9), "map", 1
@@ -49,7 +49,7 @@ def test_a_field():
     assert bytes(octets.octets) == decoded.levels.tobytes()
 
 
-def test_what_is_cut_is_refused():
+def test_a_truncated_grid_is_refused():
     payload = encode_occupancy_grid(GRID)
     for length in range(0, len(payload), 3):
         with pytest.raises(FasacoError):

@@ -39,7 +39,7 @@ def snapshot(trail: np.ndarray, **changes: int) -> ColonySnapshot:
     return ColonySnapshot(Window(-2, 3, rows - 2, cols + 3), 0.3, trail, **counts)
 
 
-def test_coverage_values() -> None:
+def test_coverage_values_are_those_of_the_contract() -> None:
     states = np.array(
         [[lattice.UNKNOWN, lattice.BLOCKED, lattice.COVERABLE], [lattice.COVERABLE] * 3], np.uint8
     )
@@ -96,7 +96,7 @@ def test_levels_span_the_scale() -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
-def test_a_trail_that_is_none_is_not_sent(value: float) -> None:
+def test_an_invalid_trail_is_not_sent(value: float) -> None:
     trail = np.array([[1.0, value]], np.float32)
     with pytest.raises(MalformedMessage, match="trail must be finite and not negative"):
         encode_pheromone(snapshot(trail), "map", 1)
@@ -110,7 +110,7 @@ def test_counts_must_fit() -> None:
         encode_pheromone(ColonySnapshot(Window(0, 0, 2, 2), 0.3, trail, 0, 1, 1, 1), "map", 1)
 
 
-def test_directions_are_told_to_a_twenty_fourth():
+def test_directions_are_sent_to_a_twenty_fourth():
     pointed = np.array([[-1, 0, 1], [2, 3, 3]], np.int8)
     share = np.array([[0.0, 0.25, 1.0], [0.52, 0.7, 1.0]], np.float32)
     geometry = GridGeometry.of_cells(Window(-2, 4, 0, 7), 0.3)
@@ -123,7 +123,7 @@ def test_directions_are_told_to_a_twenty_fourth():
     np.testing.assert_allclose(told, share, atol=0.5 / 24)
 
 
-def test_values_that_stand_for_no_direction_are_none():
+def test_values_without_a_direction_decode_to_none():
     cells = np.array([[100, -1, 99, 0]], np.int8)
     pointed, share = directions_of(OccupancyGrid(GridGeometry(1, 4, 0.3, Pose2D(0.0, 0.0)), cells))
     assert pointed.tolist() == [[-1, -1, 3, 0]]

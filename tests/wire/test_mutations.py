@@ -94,7 +94,7 @@ def test_limits_on_size_are_the_callers_to_lower() -> None:
             DECODERS[schema](seeds[name], max_cells=14)  # type: ignore[call-arg]
 
 
-def test_a_path_has_so_many_poses_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_poses_of_a_path_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
     (seed,) = (vector.payload for vector in valid_vectors() if vector.name == "path")
     monkeypatch.setattr(path_points, "MAX_PATH_POSES", 4)
     decode_path(seed)
@@ -111,7 +111,7 @@ def test_a_pose_must_come_in_a_known_type() -> None:
         assert repr(schema) in str(caught.value)
 
 
-def test_a_tf_message_has_so_many_transforms_and_no_more() -> None:
+def test_the_number_of_transforms_of_a_message_is_limited() -> None:
     (seed,) = (v.payload for v in valid_vectors() if v.name == "tf_without_names")
     # Each after the first is 80 bytes: no padding before its floats.
     one = bytes(8) + struct.pack("<I", 1) + bytes(4) + struct.pack("<I", 1) + bytes(4) + seed[-56:]

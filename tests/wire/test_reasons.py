@@ -20,7 +20,7 @@ def literals(module: object) -> str:
     )
 
 
-def test_each_reason_is_one_that_a_mission_publishes() -> None:
+def test_each_reason_is_published_by_a_mission() -> None:
     assert set(WORDS) == {BETTER, "line polished"}
     assert "line polished" in literals(published_line)
     assert " m2 if walls are a pixel thinner than on the map" in literals(floor_left)

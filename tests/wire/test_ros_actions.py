@@ -125,7 +125,7 @@ def test_a_server_is_known_by_its_tokens():
     assert "%robot1%follow_path%_action%" in server_tokens(3, "/robot1/follow_path")
 
 
-def test_a_bridge_has_the_names_alone():
+def test_a_bridge_shows_only_names():
     keys = bridge_keys("/robot1/follow_path")
     assert keys == {call: f"robot1/follow_path/_action/{call}" for call in CALLS}
 
@@ -196,7 +196,7 @@ def test_answers_of_others_are_read():
         (decode_ending, b"\0\1\0\0\x04\0\0\0\xff\0\0\0a\0"),
     ],
 )
-def test_what_is_no_answer_is_refused(decode, payload):
+def test_an_invalid_answer_is_refused(decode, payload):
     with pytest.raises(MalformedMessage):
         decode(payload)
 

@@ -41,7 +41,7 @@ def test_a_request_is_a_byte_whatever_pads_it(payload: bytes) -> None:
 
 
 @pytest.mark.parametrize("payload", [b"", b"\0\1\0\0", b"\0\0\0\0\0", b"\0\1\0\0\0junk"])
-def test_what_is_no_request_is_refused(payload: bytes) -> None:
+def test_an_invalid_request_is_refused(payload: bytes) -> None:
     with pytest.raises(MalformedMessage, match="Trigger"):
         check_request(payload)
 

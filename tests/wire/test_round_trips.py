@@ -52,7 +52,7 @@ def same_angle(a: float, b: float) -> bool:
 
 @some
 @given(grids())
-def test_occupancy_grid(grid: OccupancyGrid) -> None:
+def test_a_decoded_occupancy_grid_equals_the_encoded_one(grid: OccupancyGrid) -> None:
     payload = encode_occupancy_grid(grid)
     again = decode_occupancy_grid(payload)
     assert (again.frame, again.stamp_ns) == (grid.frame, grid.stamp_ns)
@@ -65,7 +65,9 @@ def test_occupancy_grid(grid: OccupancyGrid) -> None:
 
 @some
 @given(grids(), st.integers(-(2**31), 2**31 - 1), st.integers(-(2**31), 2**31 - 1))
-def test_map_update(grid: OccupancyGrid, row: int, col: int) -> None:
+def test_a_decoded_map_update_equals_the_encoded_one(
+    grid: OccupancyGrid, row: int, col: int
+) -> None:
     rows, cols = grid.cells.shape
     window = Window(row, col, row + rows, col + cols)
     patch = MapPatch(window, grid.cells, grid.frame, grid.stamp_ns)
@@ -76,7 +78,7 @@ def test_map_update(grid: OccupancyGrid, row: int, col: int) -> None:
 
 @some
 @given(poses, frames, stamps)
-def test_poses(pose: Pose2D, frame: str, stamp_ns: int) -> None:
+def test_decoded_poses_equal_the_encoded_ones(pose: Pose2D, frame: str, stamp_ns: int) -> None:
     payload = encode_pose_stamped(StampedPose(pose, frame, stamp_ns))
     again = decode_pose(payload, schemas.POSE_STAMPED)
     assert (again.frame, again.stamp_ns) == (frame, stamp_ns)
@@ -86,7 +88,9 @@ def test_poses(pose: Pose2D, frame: str, stamp_ns: int) -> None:
 
 @some
 @given(st.lists(poses, max_size=8), frames, stamps)
-def test_path(walk: list[Pose2D], frame: str, stamp_ns: int) -> None:
+def test_a_decoded_path_equals_the_encoded_one(
+    walk: list[Pose2D], frame: str, stamp_ns: int
+) -> None:
     xy = np.array([[pose.x, pose.y] for pose in walk]).reshape(-1, 2)
     yaw = np.array([pose.yaw for pose in walk])
     path = decode_path(encode_path(xy, yaw, frame, stamp_ns))
@@ -157,7 +161,7 @@ def plain_grid(**changes: Any) -> OccupancyGrid:
         ({"cells": np.full((1, 1), 101, np.int8)}, "data at row 0, column 0"),
     ],
 )
-def test_what_would_be_refused_is_not_sent(changes: dict[str, Any], field: str) -> None:
+def test_a_grid_that_readers_would_refuse_is_not_sent(changes: dict[str, Any], field: str) -> None:
     with pytest.raises(MalformedMessage) as caught:
         encode_occupancy_grid(plain_grid(**changes))
     assert field in str(caught.value)

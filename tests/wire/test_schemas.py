@@ -95,6 +95,6 @@ def test_an_error_is_one():
         ("mission.json", {"command": "dance"}),
     ],
 )
-def test_what_is_wrong_is_refused(name, document):
+def test_a_wrong_document_is_refused(name, document):
     with pytest.raises(ValidationError):
         check(name, document)

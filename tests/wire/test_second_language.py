@@ -171,7 +171,7 @@ def test_a_live_path_is_read(client: Path, tmp_path: Path) -> None:
     assert said["state"]["robot"] == "robot"
 
 
-def test_a_bridge_to_nobody_says_so() -> None:
+def test_a_bridge_without_a_bus_is_an_error() -> None:
     words = [str(CLIENTS / "bridge.py"), "--connect", free_endpoint(), "path"]
     ended = subprocess.run([sys.executable, *words], capture_output=True, text=True, check=False)
     assert ended.returncode == 1

@@ -55,7 +55,7 @@ def test_links_lead_to_pages_and_headings():
             assert anchor in [title.lower().replace(" ", "-") for title in titles], page.name
 
 
-def test_what_the_readme_names_is_there():
+def test_files_named_in_the_readme_exist():
     readme = (PROTOCOL / "README.md").read_text()
     names = re.findall(r"^\| `([\w/.]+)` \|", readme, re.MULTILINE)
     assert {"keys.yaml", "errors.yaml", "examples/client.py"} <= set(names)

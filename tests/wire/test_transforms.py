@@ -68,7 +68,7 @@ def test_the_stamp_is_that_of_odometry(tree):
     assert told(still, link("map", "base_link", stamp_ns=7), is_static=True).stamp_ns == 7
 
 
-def test_what_tells_nothing_new_is_no_pose(tree):
+def test_transforms_without_news_give_no_pose(tree):
     told(tree, link("map", "odom"), link("odom", "base_link", stamp_ns=1))
     assert told(tree, link("map", "odom", stamp_ns=5)) is None
     assert told(tree, link("base_link", "wheel", yaw=1.0)) is None
@@ -95,7 +95,7 @@ def test_the_oldest_link_that_moves_is_known(tree):
     assert oldest(9.0, link("odom", "base_footprint", stamp_ns=0)) == ("odom", 8.0)
 
 
-def test_what_lies_beside_the_chain_may_be_anything(tree):
+def test_transforms_beside_the_chain_may_be_invalid(tree):
     wheel = Transform("base_link", "wheel", 1, (math.nan,) * 7)
     camera = Transform("base_link", "camera", 1, (0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 0.5))
     assert told(tree, wheel, link("map", "base_link", 1.0), camera).pose.x == 1.0
@@ -154,7 +154,7 @@ def test_a_loop_is_refused_and_forgotten(tree, links):
     assert told(tree, link("map", "odom"), link("odom", "base_link")) is not None
 
 
-def test_a_loop_beside_the_chain_is_nobodys_business(tree):
+def test_a_loop_beside_the_chain_is_ignored(tree):
     assert told(tree, link("a", "b"), link("b", "a"), link("map", "base_link")) is not None
 
 

@@ -115,7 +115,7 @@ def seconds(text: str) -> float:
 
 
 def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) -> None:
-    """Add the options of a robot and its bus, which ``robot_on_bus`` reads.
+    """Add the options for a robot and its bus, which ``robot_on_bus`` reads.
 
     ``config``: whether to add ``--config``, too; False for a command with its own.
     """
@@ -124,8 +124,8 @@ def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) ->
             "--config",
             type=Path,
             metavar="FILE",
-            help="the daemon's YAML configuration: robot, bus and credentials come from it, where "
-            "no option says otherwise",
+            help="the daemon's YAML configuration, for robot, bus and credentials; options here "
+            "take precedence",
         )
     parser.add_argument(
         "--robot", metavar="NAME", help=f"name of the robot (default: ${ROBOT}, else robot)"
@@ -136,7 +136,7 @@ def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) ->
         action="append",
         metavar="ENDPOINT",
         help="Zenoh endpoint to connect to; may be repeated "
-        f"(default: ${CONNECT}, several apart by commas, else {DEFAULT_ENDPOINT})",
+        f"(default: ${CONNECT}, with commas between several, else {DEFAULT_ENDPOINT})",
     )
     parser.add_argument(
         "--security",
@@ -162,7 +162,7 @@ class RobotOnBus(NamedTuple):
 
 
 def robot_on_bus(args: argparse.Namespace) -> RobotOnBus:
-    """Return the robot and bus by options, ``--config``, environment and defaults, in this order.
+    """Return robot and bus from options, ``--config``, environment or defaults, in this order.
 
     Raises:
         BadConfiguration: a name or an endpoint is invalid, or the configuration or the credentials
@@ -215,7 +215,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -
             input, or two outputs are the same.
     """
     # The functions of os.path do not raise for invalid names, as Path's methods do.
-    taken = {os.path.realpath(file): "it is read from" for file in inputs}
+    taken = {os.path.realpath(file): "it is an input" for file in inputs}
     for file in filter(None, outputs):
         target = os.path.realpath(file)
         if os.path.isdir(target):
@@ -230,7 +230,7 @@ def check_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -
         if target in taken:
             raise _unwritable(file, taken[target])
         if os.path.isfile(target) or not is_there:
-            taken[target] = "something else is written there, too"
+            taken[target] = "another option writes it, too"
 
 
 @contextmanager
@@ -259,5 +259,5 @@ def writing(file: Path) -> Iterator[Path]:
 
 def _unwritable(file: Path, why: str) -> BadConfiguration:
     return BadConfiguration(
-        f"cannot write {file}: {why}", hint="name a place that exists and can be written to"
+        f"cannot write {file}: {why}", hint="name a file or folder that can be written"
     )

@@ -23,7 +23,7 @@ def show_rooms(rooms: Rooms) -> None:
     for room in rooms.rooms:
         beside = ", ".join(map(str, room.neighbours)) or "-"
         swept = "-" if room.swept is None else percent(room.swept)
-        # It is also 0 in a room that the path does not enter.
+        # 0 also for a room that the path does not enter.
         to_go = duration(room.to_go_s) if room.to_go_s else "-"
         row = f"{room.area_m2:.1f}", swept, to_go, beside, _settings(room)
         table.add_row(str(room.id), room.name or "-", *row)

@@ -24,21 +24,19 @@ from fasaco_edge.host.files import make_own_folder
 EPILOG = """\
 summary.json and --json hold:
   map, complete    the building; whether every reachable cell was covered
-  reachable_cells, covered_cells
-                   as the daemon counts them, of several the one with the most left
-  reachable_m2, swept_m2
-                   floor, by the true building and the true tracks of all robots
-  swept_twice_m2   floor that two or more robots swept, driving through included, by the same
-                   count; `review` of the fleet counts cells, and driving through separately
-  driven_m         by all robots; robots: of each name, driven_m, drive_s (driving and
-                   turning), swept_m2
-  plans, paths, errors
-                   of all daemons: plans, published paths, refused messages
-  wall_s, makespan_s
-                   seconds of this computer; of the robots, from the first robot's start of
-                   work to the last one's end
-  recording, fleet_recording, picture
-                   the files
+  reachable_cells  counted by the daemon; with several daemons, by the one with most cells left
+  covered_cells    the same
+  reachable_m2     reachable floor of the true building
+  swept_m2         floor swept along the true tracks of all robots
+  swept_twice_m2   floor that two or more robots swept or drove through, by the same count;
+                   `review` of the fleet counts cells, and driving through separately
+  driven_m         distance driven by all robots
+  robots           name, driven_m, drive_s (driving and turning) and swept_m2 of each robot
+  plans, paths     plans and published paths of all daemons
+  errors           messages refused by all daemons
+  wall_s           duration by this computer's clock
+  makespan_s       the robots' time, from the first robot's start of work to the last robot's end
+  recording, fleet_recording, picture  the files
 """
 
 RUNS = Path("runs")
@@ -56,35 +54,37 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         choices=range(1, MOST_IN_DEMO + 1),
         default=1,
         metavar="N",
-        help=f"how many share the building as a fleet, 1 to {MOST_IN_DEMO}; they begin far from "
-        "one another, and stop before one another (default: %(default)s)",
+        help=f"number of robots that share the building as a fleet, 1 to {MOST_IN_DEMO}; they "
+        "start far from each other, and stop before each other (default: %(default)s)",
     )
     parser.add_argument(
         "--speed",
         type=float,
         metavar="X",
         help=f"simulated seconds per second (default: {SPEED:g}; {FLEET_SPEED:g} for several "
-        "robots, whose messages to each other come once a real second)",
+        "robots, which send messages to each other once a real second)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="the planner's seed")
     parser.add_argument(
         "--driver",
         choices=("ideal", "follow"),
         default="ideal",
-        help="what drives the robot: a driver without delay, or `fasaco-edge follow`, a process of "
-        "its own as on a real one (default: %(default)s)",
+        help="what drives the robot: an ideal driver without delay, or `fasaco-edge follow`, as on "
+        "a real robot (default: %(default)s)",
     )
     parser.add_argument(
         "--battery-min",
         type=float,
         default=0.0,
         metavar="MIN",
-        help="battery life of the robot [simulated min]; it charges where it started; 0: unlimited "
+        help="battery life of the robot [simulated min]; it charges at its start; 0: unlimited "
         "(default: %(default)g)",
     )
-    parser.add_argument("--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="[m]")
     parser.add_argument(
-        "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="[m]"
+        "--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="width of the tool [m]"
+    )
+    parser.add_argument(
+        "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="radius [m]"
     )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for the results (default: ./runs/<time>)"
@@ -94,7 +94,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the mission; return 0 if every reachable cell was covered, or the user quits."""
+    """Run the mission; return 0 if every reachable cell was covered or the user quit."""
     from fasaco_edge.cli.demo.mission import DemoMission
     from fasaco_edge.cli.demo.robots import demo_robots
     from fasaco_edge.cli.demo.summary import print_summary, summarise
@@ -132,11 +132,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 COMMAND = Command(
-    description="Start daemon, recorder and a simulated robot (or several of each) as processes "
-    "of their own that talk Zenoh over loopback; show the mission; exit when every reachable cell "
-    "is covered. Writes a recording (.rrd), a picture and the figures to the output folder. In a "
-    "terminal of at least 60 x 20 characters it shows the mission as `fasaco-edge watch` does: f "
-    "toggles the pheromone trail, q quits.",
+    description="Start a daemon, a recorder and a simulated robot, or several of each, as "
+    "processes that communicate by Zenoh over loopback; show the mission; exit when every "
+    "reachable cell is covered. Write a recording (.rrd), a picture and the figures to the output "
+    "folder. A terminal of at least 60 x 20 characters shows the mission as in `fasaco-edge "
+    "watch`: f toggles the pheromone trail, q quits.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -64,7 +64,7 @@ class RobotFigures:
 class Summary:
     """The figures of a demo; areas of floor are by the true building and tracks.
 
-    Cells are counted by the daemon, of several daemons by the one with the most cells left.
+    Cells are counted by the daemon; with several daemons, by the one with the most cells left.
     """
 
     map: str

@@ -1,4 +1,4 @@
-"""``fasaco-edge mission``: commands to one daemon or to all of a fleet, and their progress."""
+"""``fasaco-edge mission``: commands to one daemon or to those of a fleet, and their progress."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ from fasaco_edge.wire.documents.replies import Reply
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply as Answer
 
-NO_MAP = "there is no map yet: whether known floor lies in it is shown by `mission status` later"
+NO_MAP = "there is no map yet: `mission status` shows later whether known floor lies in the area"
 ROOMS_KEPT = (
     "rooms keep names, borders and settings, and keep-outs stay; in another building with the same "
     "map frame, stop the daemon, delete <robot>.rooms.json beside the ledger, and start it"
 )
-KEPT = "what is covered is kept: `mission start --keep-covered` goes on with the rest"
+KEPT = "what is covered is kept: `mission start --keep-covered` covers the rest"
 
 EPILOG = """\
 examples:
   fasaco-edge mission status
-  fasaco-edge mission start                         everything the robot can reach
+  fasaco-edge mission start                         all floor that the robot can reach
   fasaco-edge mission start --passes 2 --return-home
   fasaco-edge mission start --passes edge,auto,cross@0.15   a lap along walls, lanes, lanes across
   fasaco-edge mission start --zone "kitchen:0,0;4,0;4,3;0,3" --zone "hall:4,0;6,0;6,9;4,9"
@@ -49,60 +49,58 @@ examples:
   fasaco-edge mission start --until-min 40          home after 40 minutes
   fasaco-edge mission start --keep-out "1,1;2,1;2,2;1,2"
   fasaco-edge mission start --order evening.yaml
-  fasaco-edge mission start --fleet building_7      to each of its robots: they share the floor
+  fasaco-edge mission start --fleet building_7      for each of its robots: they share the floor
   fasaco-edge mission pause && fasaco-edge mission resume
-  fasaco-edge mission keep-out add --name vase "1,1;2,1;2,2;1,2"   in mid-mission, nothing is lost
+  fasaco-edge mission keep-out add --name vase "1,1;2,1;2,2;1,2"   during a mission; nothing is lost
 
 evening.yaml, or the same as JSON; all lengths in metres in the frame of the map:
-  zones:                      # one after the other; if none: everything reachable
+  zones:                # in this order; without any: all reachable floor
     - name: kitchen
       polygon: [[0, 0], [4, 0], [4, 3], [0, 3]]
       passes: 2
-    - name: hall              # without a polygon: mission.zones of the configuration has it,
-                              # or it is a room (`fasaco-edge rooms list`)
-  keep_out:                   # the robot must not touch these, nor mission.keep_out
+    - name: hall        # no polygon: a room, or one of mission.zones
+  keep_out:             # in addition to mission.keep_out
     - [[1, 1], [2, 1], [2, 2], [1, 2]]
-  passes: 1                   # of zones without passes, and of everything; or one item a pass:
-                              # [edge, auto, {lanes: cross, overlap: 0.3, speed_m_s: 0.15}]
-  return_home: true           # at the end: mission.home, mission.dock, or where the mission began
-  keep_covered: false         # true: skip what is already covered in the first pass
-  unknown: refuse             # wait: for a room of a zone's name, if there is none yet
-  until_min: 40               # minutes after which the robot is home
+  passes: 1             # for zones without passes; or a list:
+                        # [edge, auto, {lanes: cross, speed_m_s: 0.15}]
+  return_home: true     # to mission.home, mission.dock, or the start
+  keep_covered: false   # true: the first pass skips covered floor
+  unknown: refuse       # wait: until a room has the zone's name
+  until_min: 40         # time limit [min]; then the robot is home
 
 evening.geojson, as a drawing program writes it: each polygon is a zone with the properties name and
-passes; one with "keep_out": true is not touched. Coordinates are metres in the frame of the map.
+passes; with "keep_out": true it is a keep-out. Coordinates are metres in the frame of the map.
 
-Each pass covers all its floor, also what was covered before; only the pass `rest` leaves out what
-the pass `edge` has covered. An order, its progress, and whether it is paused survive a restart of
-the daemon. A daemon without an order covers everything by itself (mission.autostart of its
-configuration).
+Each pass covers all its floor again; only the pass `rest` leaves out what the pass `edge` covered.
+A restart of the daemon keeps the order, its progress, and whether it is paused. Without an order
+the daemon covers everything by itself (mission.autostart of its configuration).
 
-A new order and a reset forget the progress of an order that is not over: on a terminal they say how
-much that is, and ask first; elsewhere they are refused without --yes. `start --keep-covered` keeps
-the progress and covers the rest. A reset keeps keep-outs, and names, borders and settings of rooms.
-To forget rooms, as in another building with the same map frame, stop the daemon, and delete
+A new order and a reset forget the progress of an order that is not over. On a terminal they say how
+much that is, and ask first; elsewhere they need --yes. `start --keep-covered` keeps the progress
+and covers the rest. A reset keeps keep-outs, and names, borders and settings of rooms. To forget
+rooms, as in another building with the same map frame, stop the daemon, and delete
 <robot>.rooms.json beside the ledger.
 
-With --fleet all its robots get the same command, also those whose messages other robots received
-within the last ten minutes. Some robots may refuse or not answer while the others obey: then the
-exit code is 1, and a robot that has not answered may still be driving. Robots share a zone. Corners
-are in the frame of each robot's own map: with fleet.frame use zones and keep-outs of their
-configurations.
+With --fleet each robot of the fleet gets the command, also a robot from which the others received
+messages within the last ten minutes. If a robot refuses or does not answer, the others still obey,
+and the exit code is 1; a robot that has not answered may still drive. The robots share each zone.
+Corners are in the frame of each robot's own map: with fleet.frame use the zones and keep-outs of
+the configurations.
 
-exit codes: 0 done; 1 refused, or no answer, by one robot at least; 2 usage error; 78 invalid robot
+exit codes: 0 done; 1 refused, or no answer, by at least one robot; 2 usage error; 78 invalid robot
 name
 """
 
 COMMANDS = {
-    "start": "start an order in place of the current one; the same order continues",
+    "start": "start an order in place of the current one; an equal order continues",
     "pause": "stop the robot; what it passes over still counts as covered",
-    "resume": "continue what was paused: the order, or the way home or to charge",
-    "home": "drive home and stay there: an order goes on after resume",
+    "resume": "continue after a pause: the order, or the drive home or to the dock",
+    "home": "drive home and stay there; `resume` continues the order",
     "cancel": "stop and drop the order; what is covered is kept",
-    "stop": "the same as cancel; to go on later with the same order, pause it",
-    "replan": "plan in full now, starting from the current path",
+    "stop": "the same as cancel; to continue the order later, use pause",
+    "replan": "plan everything again now, starting from the current path",
     "reset": "stop and drop the order and what is covered; rooms keep their names",
-    "keep-out": "areas to keep out of, changed in mid-mission: add, remove, list",
+    "keep-out": "add, remove or list keep-outs, also during a mission",
     "status": "show state, progress, and what could not be reached",
 }
 
@@ -122,7 +120,7 @@ def _add_commands(parser: argparse.ArgumentParser) -> None:
             command.add_argument(
                 "--yes",
                 action="store_true",
-                help="forget what is covered without a question, as scripts have to say",
+                help="forget what is covered without asking; scripts need this",
             )
         _add_receiver(command)
 
@@ -133,7 +131,7 @@ def _add_receiver(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fleet",
         metavar="NAME",
-        help="not to one robot but to each of this fleet (`fleet.name` of their configuration)",
+        help="command each robot of this fleet (`fleet.name` of its configuration)",
     )
     add_question(parser)
 
@@ -150,30 +148,32 @@ def _add_order(parser: argparse.ArgumentParser) -> None:
         type=_zone,
         action="append",
         metavar="NAME[:X,Y;X,Y;...]",
-        help="area to cover, by its corners [m], or a zone of the daemon's configuration or a "
-        "room by its name; may be repeated, they are covered in this order",
+        help="area to cover: corners [m], or the name of a room or of a zone of the daemon's "
+        "configuration; may be repeated, and is covered in this order",
     )
     parser.add_argument(
         "--keep-out",
         type=polygon,
         action="append",
         metavar="X,Y;X,Y;...",
-        help="area the robot must not touch, beside those of the daemon's configuration; may be "
-        "repeated",
+        help="area that the robot must not touch, in addition to those of the daemon's "
+        "configuration; may be repeated",
     )
-    add_passes(parser, f"how often to cover, or for each pass {WORDS} (default: 1)")
+    add_passes(parser, f"number of passes, or {WORDS} (default: 1)")
     parser.add_argument(
-        "--return-home", action="store_true", help="at the end drive home, or to where it began"
+        "--return-home",
+        action="store_true",
+        help="drive home at the end, or to the start of the mission",
     )
     parser.add_argument(
-        "--keep-covered", action="store_true", help="skip what is already covered in the first pass"
+        "--keep-covered", action="store_true", help="skip covered floor in the first pass"
     )
     parser.add_argument(
         "--until-min",
         type=float,
         metavar="MIN",
-        help="turn back in time to be home after this many minutes; a robot in its dock, or on its "
-        "way there, ends in the dock, and a paused one stays; 0 for no limit (default: "
+        help="time limit [min], at which the robot is home again; a robot in its dock, or on its "
+        "way there, ends in the dock, a paused one stays where it is; 0 for no limit (default: "
         "mission.until_min of the daemon's configuration)",
     )
 
@@ -245,7 +245,10 @@ def _order(args: argparse.Namespace) -> dict[str, object]:
     if given:
         options_given = ("zone" if name == "zones" else name.replace("_", "-") for name in given)
         names = ", ".join(f"--{name}" for name in options_given)
-        raise OrderError(f"--order says it all, got {names} with it", hint="put them into the file")
+        raise OrderError(
+            f"--order must be the only option for the order, got {names}",
+            hint="put them into the file",
+        )
     return order_document(read_order_file(args.order))
 
 

@@ -18,21 +18,21 @@ examples:
   fasaco-edge mission keep-out list
   fasaco-edge mission keep-out remove vase
 
-The robot keeps out of the area from now on: a path into it is cut off at once and planned anew,
-and a robot that is in it stops. The order goes on, and what is covered is kept. The area holds
-under every order, also without one, until it is removed; a restart or a reset does not remove it.
-An area in which no known floor lies is taken, as the map may grow: the answer says so.
-Areas of an order (`mission start --keep-out`) end with it: they are listed, but have no name to be
-removed by. Those of the configuration (mission.keep_out) are changed there.
+A path into an added area is cut off at once and planned again; a robot inside the area stops. The
+order continues, and what is covered is kept. The area is valid for all orders until it is removed;
+a restart or a reset keeps it. If no known floor lies in it, the answer says so; it is added
+nevertheless, as the map may grow.
+Areas of an order (`mission start --keep-out`) end with the order; they are listed without a name,
+and cannot be removed. Areas of the configuration (mission.keep_out) are changed there.
 
-exit codes: 0 done; 1 refused, or no answer, by one robot at least; 2 usage error; 78 invalid robot
+exit codes: 0 done; 1 refused, or no answer, by at least one robot; 2 usage error; 78 invalid robot
 name
 """
 
 ACTIONS = {
-    "add": "keep out of an area from now on; the order goes on, what is covered is kept",
-    "remove": "let the robot drive there again",
-    "list": "show the areas that the robot keeps out of",
+    "add": "add a keep-out; the order continues, what is covered is kept",
+    "remove": "remove a keep-out that was added",
+    "list": "list the keep-outs",
 }
 
 
@@ -52,10 +52,10 @@ def add_actions(
                 help='corners [m] in the frame of the map: "X,Y;X,Y;X,Y" or X,Y X,Y X,Y',
             )
             action.add_argument(
-                "--name", required=True, metavar="NAME", help="its name, to remove it by"
+                "--name", required=True, metavar="NAME", help="name of the keep-out, for `remove`"
             )
         elif name == "remove":
-            action.add_argument("name", metavar="NAME", help="the name that it was added by")
+            action.add_argument("name", metavar="NAME", help="name of the keep-out")
         add_options(action)
         action.set_defaults(keep_out_action=name)
 

@@ -45,35 +45,38 @@ figures:
   revisits         steps + 1 - distinct cells
   recovered_cells  distinct cells visited twice or more
   n_r_paper        revisits including the way home, to compare with the paper's Table I
-  length_m, cost_s length of the walk, and seconds the robot drives and turns along its cells;
-                   turns take none if turn_s is 0; seconds of the line: see floor
-  lattice_deg      angle of the cells' rows to the x axis of the map frame; cells
-                   (row, col) of a line over the floor are counted along these rows
-  gap              cost_s / lower_bound_cost_s - 1, steps and turns together
-  floor            (YAML maps) measured on the map's pixels, with a tool as wide as --cell:
-                   reachable_m2, all that the tool touches wherever the robot's disc can
-                   be; the share of it that the line sweeps; seconds that the line takes,
-                   seconds_per_m2 swept; gap, to the time of driving that area once at the
-                   tool's width; patches larger than 4 dm2 not swept, the largest;
-                   illegal_share, the part of the line where the robot would touch what is
-                   not known to be free
-  curve            (--turn-radius) length_m, seconds and backward_m of the curve;
-                   reversals, from forward to backward or back; spot_turns, which do not
-                   fit and stay on the spot, of all bends judged on the curve's points
-  rooms            (--rooms) area_m2 of free floor, reachable_m2 of it, the share of that
-                   which the line sweeps, and how often it enters the room
+  length_m         length of the walk
+  cost_s           time to drive and turn along the cells of the walk [s]; turns take none if
+                   turn_s is 0. The time of the line is seconds of floor
+  lattice_deg      angle of the rows of cells to the x axis of the map frame; (row, col) of a
+                   cell count along these rows
+  gap              cost_s / lower_bound_cost_s - 1, for steps and turns together
+  floor            (YAML maps) by the map's pixels, with a tool as wide as --cell:
+                   reachable_m2, the floor that the tool touches from any position that the
+                   robot can reach; swept_share, the share of it that the line sweeps; seconds
+                   of the line, and seconds_per_m2 swept; gap, by which the seconds exceed the least
+                   time to sweep as much; patches_over_4_dm2 not swept, and the largest;
+                   illegal_share of the line, on which the robot would touch floor that is not
+                   known to be free
+  curve            (--turn-radius) length_m and seconds of the curve; backward_m, driven
+                   backward; reversals between forward and backward; spot_turns, bends too
+                   sharp for the arc, where the robot would turn on the spot
+  rooms            (--rooms) area_m2 of free floor; reachable_m2 of it; the share of that
+                   which the line sweeps; how often the line enters the room
 
-figures of several passes: sums, and for each pass its own
+Figures of several passes are sums; each pass has its own, too.
 
-colony-search searches until its budget ends, the walk is proven optimal, or nothing is
-gained for long: a complete walk within milliseconds, then better ones by local search.
-Perturbations lead it on; in every other one ants rebuild a part of the walk.
-A line over the floor is laid along each of two walks, if the budget allows. What is left of
-the budget goes to the better line: each stage of its search takes twice as long as the one
-before. A larger budget gives no worse line, by its seconds and the price of floor that it
-leaves.
+colony-search finds a complete walk within milliseconds, and improves it by local search and
+perturbations; in every other perturbation ants rebuild a part of the walk. It ends when its
+budget is used, the walk is proven optimal, or nothing has been gained for long.
+
+A line over the floor is laid along each of two walks, if the budget allows. The rest of the
+budget improves the better line: each stage of the search takes twice as long as the stage
+before. A larger budget never gives a worse line, by its seconds and the price of the floor
+that it leaves.
+
 --ants and --velocities apply to fasaco, --ants to aco, --velocities to colony-search; a planner
-of your own gets the seed. From Python the colony has more settings.
+of your own gets the seed. The Python interface has more settings of the colony.
 """
 
 ROBOT, SEARCH = RobotConfig(), Search()
@@ -91,7 +94,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--config",
         type=Path,
         metavar="FILE",
-        help="a daemon's configuration: plan for its robot, as it would; other options come first",
+        help="a daemon's configuration: plan as that daemon would; options here take precedence",
     )
     _add_problem(parser.add_argument_group("problem"))
     _add_line(parser.add_argument_group("line"))
@@ -104,26 +107,22 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         "--resolution",
         type=float,
         metavar="M",
-        help="edge of a pixel [m] of a PNG, PGM, BMP or JPEG without a YAML file: its lower left "
-        "corner is 0,0; as map_server has it, free is brighter than 80.4 %%, occupied darker "
-        "than 35 %%, unknown between",
+        help="edge of a pixel [m], for a PNG, PGM, BMP or JPEG without a YAML file. Its lower left "
+        "corner is 0,0; pixels brighter than 80.4 %% are free, those darker than 35 %% occupied, "
+        "the others unknown, as in map_server",
     )
-    group.add_argument(
-        "--unknown-free", action="store_true", help="take unknown pixels for free ones"
-    )
+    group.add_argument("--unknown-free", action="store_true", help="treat unknown pixels as free")
     start = group.add_mutually_exclusive_group()
     start.add_argument(
-        "--start", type=pair_of_ints, metavar="R,C", help="cell to start in; row 0 has smallest y"
+        "--start", type=pair_of_ints, metavar="R,C", help="start cell; row 0 has the smallest y"
     )
-    start.add_argument(
-        "--start-xy", type=pair_of_floats, metavar="X,Y", help="point to start at [m]"
-    )
+    start.add_argument("--start-xy", type=pair_of_floats, metavar="X,Y", help="start position [m]")
     group.add_argument(
         "--cell",
         type=float,
         metavar="M",
-        help="width of the tool [m]; cells are as wide, less the overlap of a line over the "
-        f"floor (default: {ROBOT.tool_width_m:g})",
+        help="width of the tool [m], and of a cell, which for a line over the floor is narrower "
+        f"by the overlap (default: {ROBOT.tool_width_m:g})",
     )
     group.add_argument(
         "--robot-radius",
@@ -135,8 +134,8 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         "--clearance",
         type=float,
         metavar="M",
-        help="distance that a line over the floor keeps from walls in addition to the radius, "
-        f"except where giving it up gains enough floor [m] (default: {ROBOT.clearance_m:g})",
+        help="distance that a line over the floor keeps from walls in addition to the radius "
+        f"[m], except where less gains enough floor (default: {ROBOT.clearance_m:g})",
     )
     group.add_argument(
         "--end",
@@ -147,8 +146,8 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     )
     add_passes(
         group,
-        f"several passes, each from where the one before ends: their number, or for each {WORDS}. "
-        "The budget is for each pass",
+        f"plan several passes, each from the end of the pass before: their number, or {WORDS}. "
+        "Each pass gets the whole --budget",
     )
     group.add_argument(
         "--speed-m-s",
@@ -160,22 +159,21 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
         "--turn-radius",
         type=float,
         metavar="M",
-        help="radius of the tightest arc that the robot drives: a line over the floor becomes a "
-        "curve of lanes and arcs; 0 for turns on the spot [m] (default: "
-        f"{ROBOT.turn_radius_m:g})",
+        help="radius of the robot's tightest arc [m]: a line over the floor becomes a curve of "
+        f"lanes and arcs; 0: the robot turns on the spot (default: {ROBOT.turn_radius_m:g})",
     )
     group.add_argument(
         "--forward-only",
         action="store_true",
-        help="a robot with a turning radius never drives backward (default: it may)",
+        help="never drive backward, as a robot with a turning radius otherwise may",
     )
     group.add_argument(
         "--turn-s",
         type=float,
         metavar="S",
         help="time of a quarter-turn on the spot [s]; 0 minimises steps, as the paper does "
-        f"(default: 0; {ROBOT.quarter_turn_s:g} for a line over the floor); --config may say "
-        "more of how the robot turns and accelerates",
+        f"(default: 0; {ROBOT.quarter_turn_s:g} for a line over the floor). A configuration can "
+        "give rates and accelerations instead",
     )
 
 
@@ -183,27 +181,25 @@ def _add_line(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--line",
         choices=(CELLS, "quick", THOROUGH),
-        help="cells: through the centres of the cells, as the paper's planners do; quick, "
-        "thorough: off the centres where walls require it, and optimised for the floor that it "
-        "sweeps, a square metre being worth 60 or 180 s; needs a YAML map (default: thorough; "
-        "cells for .npy grids, and planners other than colony-search)",
+        help="cells: through the centres of the cells, as in the paper; quick, thorough: a line "
+        "over the floor, which leaves the centres where walls require it, and is optimised for "
+        "the floor that it sweeps: a square metre is worth 60 or 180 s; needs a YAML map "
+        "(default: thorough; cells for .npy grids, and for planners other than colony-search)",
     )
     group.add_argument(
         "--overlap",
         type=float,
         metavar="SHARE",
-        help="overlap of neighbouring cells of a line over the floor, as a share of the tool's "
-        "width "
-        f"(default: {ROBOT.overlap:g})",
+        help="overlap of neighbouring cells, as a share of the tool's width, for a line over the "
+        f"floor (default: {ROBOT.overlap:g})",
     )
-
     group.add_argument(
         "--align",
         type=_alignment,
         metavar="walls|axes|DEG",
-        help="direction of the cells' rows of a line over the floor: along most of the "
-        "building's walls, the axes of the map frame, or an angle to these [degrees "
-        f"counter-clockwise] (default: {WALLS})",
+        help="direction of the rows of cells, for a line over the floor: along most of the "
+        "building's walls, along the axes of the map frame, or at an angle to these axes "
+        f"[degrees counter-clockwise] (default: {WALLS})",
     )
 
 
@@ -214,38 +210,38 @@ def _add_planner(group: argparse._ArgumentGroup) -> None:
         metavar="NAME",
         help="; ".join(f"{name}: {entry.about}" for name, entry in PLANNERS.items())
         + "; FILE.py:NAME or MODULE:NAME: a function or class of your own, in a file or an "
-        + "installed module, which is run with your rights, see fasaco_edge/researcher.md "
+        + "installed module; it runs with your rights, see fasaco_edge/researcher.md "
         + f"(default: {SEARCH.planner})",
     )
     group.add_argument(
-        "--ants", type=int, metavar="N", help=f"ants in all (default: {SEARCH.ants})"
+        "--ants", type=int, metavar="N", help=f"total number of ants (default: {SEARCH.ants})"
     )
     group.add_argument(
         "--velocities",
         metavar="V",
-        help="cohorts' velocities [cells/move]: 8:1 falling, 1:8 rising, 4 constant, 8,4,1 "
-        f"(default: {SEARCH.velocities})",
+        help="velocities of the cohorts [cells/move]: 8:1 falling, 1:8 rising, 4 for all, or a "
+        f"list such as 8,4,1 (default: {SEARCH.velocities})",
     )
     group.add_argument(
         "--seed",
         type=int,
         metavar="N",
-        help=f"seed of all draws: the same seed gives the same walk (default: {SEARCH.seed})",
+        help=f"seed of random numbers: the same seed gives the same walk (default: {SEARCH.seed})",
     )
     group.add_argument(
         "--budget",
         type=float,
         metavar="S",
-        help="time for the search of walks and of the line along one [s]; a first walk and line "
-        f"are always finished, a planner of your own is ended (default: {BUDGET_S:g}; "
-        f"{OWN_BUDGET_S:g} for a planner of your own; none by others than colony-search)",
+        help="time for the search of the walk and its line [s]; a first walk and line are always "
+        f"finished, a planner of your own is stopped (default: {BUDGET_S:g} for colony-search, "
+        f"{OWN_BUDGET_S:g} for a planner of your own, no limit for others)",
     )
     group.add_argument(
         "--swept",
         type=float,
         metavar="SHARE",
-        help="share of the reachable floor that the line is to sweep, in the least time; takes "
-        "longer than the default --budget (default: as much as pays)",
+        help="share of the reachable floor that the line has to sweep, in the least time; needs "
+        "more than the default --budget (default: all floor that is worth its time)",
     )
 
 
@@ -254,33 +250,33 @@ def _add_output(group: argparse._ArgumentGroup) -> None:
         "--path-out",
         type=Path,
         metavar="FILE.csv",
-        help="write the walk: header row,col",
+        help="write the walk as CSV, with the header row,col",
     )
     group.add_argument(
         "--xy-out",
         type=Path,
         metavar="FILE",
-        help="write the line to be driven as points in the map frame [m]: as GeoJSON if it is "
-        "called so (.geojson), else as CSV with the header x_m,y_m "
-        "(with --turn-radius: x_m,y_m,yaw_rad, the robot's heading [rad], which is opposite to its "
-        "way where it drives backward); needs a YAML map, as a .npy grid has no frame",
+        help="write the line as points in the map frame [m]: a FILE.geojson as GeoJSON, any other "
+        "as CSV with the header x_m,y_m, or with --turn-radius x_m,y_m,yaw_rad, the robot's "
+        "heading [rad], opposite to its motion where it drives backward; needs a YAML map, as a "
+        ".npy grid has no frame",
     )
     group.add_argument("--png", type=Path, metavar="FILE", help="write a picture of the walk")
     group.add_argument(
         "--rooms",
         action="store_true",
-        help="find the rooms of a YAML map: print them with what the line does in each, and draw "
-        "them in the picture",
+        help="find the rooms of a YAML map, print what the line does in each, and draw them in "
+        "the picture",
     )
     group.add_argument(
         "--pheromone-png",
         type=Path,
         metavar="FILE",
-        help="write a picture of the trail that the colony leaves: where it points to from each "
-        "cell, and how decided it is (colony-search, fasaco and aco)",
+        help="write a picture of the pheromone trail: its direction in each cell, and how "
+        "dominant that is (colony-search, fasaco and aco)",
     )
     group.add_argument(
-        "--long", action="store_true", help="print all figures, and not only those that matter"
+        "--long", action="store_true", help="print all figures, not only the main ones"
     )
     add_json(group, "all figures")
 

@@ -122,7 +122,7 @@ def print_plan(args: argparse.Namespace, planned: Plan | PassPlans) -> None:
     console, floor = terminal.out(), planned.floor
     figures.pop("passes", None)
     if args.long:
-        figures["floor"] = "not known of a coverage grid" if floor is None else floor_words(floor)
+        figures["floor"] = "not known for a coverage grid" if floor is None else floor_words(floor)
         if not isinstance(planned, PassPlans):
             figures["curve"] = planned.curve_words or None
         driven = {"driven line": line_words(planned.drive), "floor": figures.pop("floor")}

@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 Report what happened in a recorded mission, on one screen; with --long all figures, orders,
-commands, replans, floor left and why, and faults. With --at and --point it answers a
-question: what was at a time, why a spot was not swept. Of a fleet's recording it reports makespan,
-balance, floor swept again or only driven through, waiting and messages; such a recording takes
---json and --png only. Parts of one run are read together; of several runs the newest. Files are
-only read; of files that a crash cut short, the whole part is used.
+commands, replans, floor left and why, and faults. --at says what happened at a time, --point why a
+spot was not swept. The report on a fleet has makespan, balance, floor swept again or only driven
+through, waiting and messages; it takes --json and --png only. The parts of one run are read
+together; if there are several runs, the newest is read. A file that a crash cut short is read up
+to the damage; no file is changed.
 """
 
 
 EXAMPLES = """\
 examples:
   fasaco-edge review run00001-*.rrd                    one screen: swept, left over, troubles
-  fasaco-edge review night.rrd --at 1:00 --png at.png  why did the robot turn round there?
+  fasaco-edge review night.rrd --at 1:00 --png at.png  why did the robot turn here?
   fasaco-edge review night.rrd --point 2.55,0.24       why is this spot (x, y) [m] not swept?
   fasaco-edge review night.rrd --against last.rrd --png both.png
   fasaco-edge review night.rrd --export night --export-as parquet
@@ -51,7 +51,7 @@ examples:
 """
 
 OF_A_FLEET = (
-    "Of a fleet it holds: fleet, time_scale, duration_s, makespan_s, busy_balance, swept_balance, "
+    "For a fleet it has: fleet, time_scale, duration_s, makespan_s, busy_balance, swept_balance, "
     "swept_m2 (by cells), through_m2, again_m2, again_share, waited_s, divisions, and robots: each "
     "with name, state, busy_s, waited_s, waits, longest_wait_s, driven_m, swept_m2, through_m2, "
     "again_m2, messages_s, kb_s, peak_kb_s, plans, plan_ms_p50, plan_ms_p99."
@@ -81,7 +81,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE.rrd",
-        help="the parts of one run; of several runs of a robot it takes the newest",
+        help="the parts of one run; if a robot has several runs, the newest is read",
     )
     parser.add_argument(
         "--against",
@@ -91,44 +91,43 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="the parts of another run to compare with",
     )
-    parser.add_argument(
-        "--long", action="store_true", help="print all there is, and not only one screen of it"
-    )
+    parser.add_argument("--long", action="store_true", help="print everything, not only one screen")
     parser.add_argument(
         "--at",
         type=_time,
         metavar="MM:SS",
-        help="answer what was at this time since the recording began: robot, paths before and "
-        "after, what of the map changed, commands, trail; --png draws it",
+        help="show this time since the recording began: robot, paths before and after, changes of "
+        "the map, commands, trail; --png draws it",
     )
     parser.add_argument(
         "--point",
         type=pair_of_floats,
         action="append",
         metavar="X,Y",
-        help="answer why this spot [m] was not swept: never seen, too narrow, a keep-out zone, "
-        "poses missing, missed and by how much, not worth it; may be repeated; --png draws it",
+        help="say why this spot [m] was not swept: never seen, too narrow, in a keep-out zone, "
+        "poses missing, missed and by how much, or not worth its time; may be repeated; --png "
+        "draws it",
     )
     parser.add_argument("--json", action="store_true", help="print JSON, described below")
     parser.add_argument(
         "--png",
         type=Path,
         metavar="FILE",
-        help="write a picture of the run, with --against of both",
+        help="write a picture of the run, or of both runs with --against",
     )
     parser.add_argument(
         "--export",
         type=Path,
         metavar="DIR",
         help="write tables: trail, paths and their points, plans, commands, states, coverage, "
-        "floor swept, rooms, pheromone, plots; columns.csv says what they hold, in what units; "
-        "the map as .npz",
+        "floor swept, rooms, pheromone, plots; and the map as .npz; columns.csv describes all "
+        "columns, with units",
     )
     parser.add_argument(
         "--export-as",
         choices=("csv", "parquet"),
         default="csv",
-        help="what the tables are written as; Parquet keeps types and describes its columns itself "
+        help="format of the tables; Parquet files contain types and descriptions of the columns "
         "(default: %(default)s)",
     )
 
@@ -160,7 +159,7 @@ def run(args: argparse.Namespace) -> int:
     review = _read(args.recordings, "recording")
     if args.at is not None or args.point:
         return _answer(args, review)
-    other = _read(args.against, "the other one") if args.against else None
+    other = _read(args.against, "the other run") if args.against else None
     document = document_of(review)
     if args.json:
         both = (
@@ -256,13 +255,13 @@ def _epilog() -> str:
     """Return examples, and a description of the JSON document from its docstring."""
     lines = [
         EXAMPLES,
-        "the JSON document holds, with times in the robot's seconds since the recording began:",
+        "members of the JSON document; times are the robot's seconds since the recording began:",
     ]
     for line in explanations():
         lines += textwrap.wrap(line, 96, initial_indent="  ", subsequent_indent="      ")
     lines += textwrap.wrap(
-        "With --against it holds two of them, `recording` and `against`, and of all numbers that "
-        "both have the `difference`, the first less the second.",
+        "With --against it has two of them, `recording` and `against`, and the `difference` of all "
+        "numbers that both have, the first minus the second.",
         96,
     )
     lines += textwrap.wrap(OF_A_FLEET, 96)

@@ -54,7 +54,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
         console.print(terminal.summary(shown))
         left_out = len(found) - len(shown)
         more = f"{left_out} more row{'s' * (left_out != 1)}" if left_out else "more"
-        console.print(f"{more}: --long; a moment: --at MM:SS; a spot: --point X,Y; page: serve")
+        console.print(f"{more}: --long; a time: --at MM:SS; a spot: --point X,Y; a page: serve")
         return
     console.print(terminal.summary([*found, *rows.card_rows(document)]))
     console.print(terminal.figures(rows.figure_rows(document)))
@@ -77,7 +77,7 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
 def _fitting(
     console: Console, found: list[tuple[str, str]], above: Sequence[str]
 ) -> list[tuple[str, str]]:
-    """Return the first rows, without those for which the terminal has no space."""
+    """Return the first rows, as many as fit on the terminal."""
 
     def height(shown: RenderableType) -> int:
         return len(console.render_lines(shown))

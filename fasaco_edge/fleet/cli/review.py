@@ -65,8 +65,8 @@ def _print(figures: FleetFigures) -> None:
                 ),
                 (
                     "balance",
-                    f"least over most: {figures.busy_balance:.2f} of time at work, "
-                    f"{figures.swept_balance:.2f} of area swept",
+                    f"{figures.busy_balance:.2f} by time at work, {figures.swept_balance:.2f} by "
+                    "area swept (least / most)",
                 ),
                 (
                     "swept",
@@ -103,8 +103,8 @@ def _print(figures: FleetFigures) -> None:
         )
     console.print(table)
     console.print(
-        "swept [m2]; through, again: of these, what another had swept. kB/s: messages to the fleet "
-        "(most over 5 s). "
-        "plan ms: median, 99 %, by the recorder's clock.",
+        "swept [m2]; through, again: m2 that another robot had swept, driven through or swept "
+        "again. kB/s: messages to the fleet (in brackets the most over 5 s). plan ms: median and "
+        "99 %, by the recorder's clock.",
         style="dim",
     )

@@ -31,11 +31,12 @@ class FleetArrivals:
 
     def __init__(self, keys: Keys, fleet: str) -> None:
         self._keys, self._fleet = keys, fleet
-        # Time of the last message of each robot of this fleet, and of each other publisher, by key
-        # [s]; the oldest is first.
+        # Times of the last messages by key [s], the oldest first: of robots of this fleet, and of
+        # other publishers.
         self._received_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
-        # Time of the last message without a fleet's name that the loop got, to report its fault.
+        # Time of the last message without a readable fleet's name that the loop got [s]; it gets
+        # some, to report the fault.
         self._unreadable_at = float("-inf")
         self._has_refused = False
         self._faults = deque[FasacoError](maxlen=1)

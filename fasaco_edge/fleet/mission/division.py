@@ -20,17 +20,17 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.core.events import Part
 
-# Above this number of cells only every second, third ... is used. Largest product of rounds, robots
-# and cells of the lattice, which reduces the rounds, but not below one.
+# Of more cells than this only every second (third, ...) one is used.
+# Limit on the product of rounds, robots and cells: it lowers the rounds, to one at least.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
 # Number of searches for handicaps with the same seeds: after the first, each search uses the
 # robots' times per cell that the last one gave.
 EVENED = 3
-# Factor on the makespan of the old seeds, below 1 to favour them. Weight of moved cells: they cost
-# the share of cells that move to another robot with a part, times the robots' mean time, times
-# this.
+# Factor on the makespan of the old seeds, below 1 to favour them.
+# Weight of the cost of moved cells. The cost: the share of cells that move from one robot to
+# another, which had a part, too, times the robots' mean time.
 STABLE, CHANGED = 0.9, 1.0
 
 

@@ -72,7 +72,7 @@ class SharedGround:
         return self._with(area, doors=False)
 
     def with_doors(self, area: ReachableArea) -> ReachableArea:
-        """Return the area of ``joint`` with the ground beyond doors that only others show open.
+        """Return the area of ``joint`` with the ground beyond doors.
 
         A door is a cell that is blocked in the area and reachable for another robot. Ways lead
         through it, but it is not reachable itself.
@@ -139,7 +139,7 @@ class GroundQueue:
         """Return places and bits of a limited number of tiles."""
         if area is not self._area and area is not None:
             self._area, self._tiles = area, _tiles_of(area)
-            # Tiles without reachable cells any more are sent as empty.
+            # A tile that has lost its reachable cells is sent as empty.
             gone = [place for place in self._queue.sent if place not in self._tiles]
             self._tiles |= dict.fromkeys(gone, EMPTY)
         return tuple((place, self._tiles[place]) for place in self._queue.next(self._tiles, most))
@@ -178,7 +178,7 @@ def _joined(
         return area
     own = np.zeros_like(ground)
     own[inside] = lattice.coverable
-    # Between two cells of this robot's map, its own steps count.
+    # This robot's own map decides the steps between two of its coverable cells.
     free = ground | own | door
     steps = CoverageLattice.from_free(free).steps.copy()
     between = CoverageLattice.from_free(own).steps
@@ -194,8 +194,8 @@ def _joined(
         return ReachableArea(whole_lattice, reached)
     first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
     joined = ReachableArea.around(whole_lattice, first).reachable
-    # Own cells that only the ground of others connects must be reachable for another robot, too:
-    # a wall that this robot has not seen may separate them.
+    # Own cells that are reachable only over the ground of others count if another robot can reach
+    # them, too: a wall that this robot has not seen may separate them.
     return ReachableArea(whole_lattice, joined & (reached | known) & ~door)
 
 

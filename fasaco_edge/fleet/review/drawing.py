@@ -129,7 +129,7 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
             plot.end_mark(points[-1])
             plot.start_mark(points[0])
     lines = [
-        f"makespan {clock(figures.makespan_s)}; time at work, least over most: "
+        f"makespan {clock(figures.makespan_s)}; time at work (least / most): "
         f"{figures.busy_balance:.2f}; waited {figures.waited_s:.0f} s in all",
         f"{figures.swept_m2:.1f} m2 swept, {figures.again_share:.1%} of it swept again",
     ]

@@ -14,8 +14,8 @@ from fasaco_edge.mission.map.map_state import MapState
 
 # Tolerances to the dock's pose, and to the pose in front of the dock [m].
 DOCKED_M, NEAR_M = 0.1, 0.5
-# Largest difference between a docked robot's heading and the dock's [rad]: more than the tolerance
-# of contacts and the error of a localiser, about ten degrees; less than that of a passing robot.
+# Largest difference between the headings of a docked robot and the dock [rad]. Contacts and
+# localiser allow about ten degrees; a robot that passes the dock differs by more than this limit.
 DOCKED_RAD = math.radians(30.0)
 
 

@@ -1,7 +1,7 @@
 """Troubles: faults of robot and inputs, in any state of the mission.
 
-A state names the mission's activity, troubles name the faults at the same time. A mission that
-drives with a trouble is ``degraded``; a state at rest does not change.
+The state names the mission's activity, troubles name the faults at the same time. A trouble changes
+the state of a mission that drives to ``degraded``; it does not change a state at rest.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fasaco_edge.mission.map.map_state import MapState
 
 # Timeout of poses at rest, if longer than ``lost_pose_s``; timeout of the first map and pose [s].
 REST_S = 30.0
-# Time at a place that is impossible by the map, after which that is a trouble [s].
+# Time after which a place that is impossible on the map is a trouble [s].
 IMPOSSIBLE_S = 20.0
 
 # States of a robot that drives, or soon will.
@@ -55,7 +55,7 @@ class Rule:
     """A trouble, the states in which it counts, and how it is found.
 
     Attributes:
-        why: from the mission's parts, state and time [s], what is wrong; "" for nothing.
+        why: returns what is wrong, "" for nothing; takes the mission's parts, state and time [s].
     """
 
     code: str
@@ -200,7 +200,7 @@ RULES = (
         "no_dock",
         UNDER_WAY,
         lambda troubles, state, now: troubles.charging.why_no_dock(),
-        "set mission.dock for this map, or bring the robot back to the dock's",
+        "set mission.dock for this map, or bring the robot back to the map of the dock",
     ),
     Rule(
         "no_current",

@@ -44,8 +44,7 @@ from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertai
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
-# Share of blocked cells among the known covered cells that new furniture never reaches within one
-# map.
+# New furniture does not block this share of the known covered cells, or more, on one map.
 MANY_AT_ONCE = 0.2
 # Limit on the passed cells kept; the oldest are dropped.
 MOST_PASSED = 2_000
@@ -210,7 +209,7 @@ class MissionLedger:
         return None
 
     def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell whose floor is swept although the robot missed its point."""
+        """Count a visit to a cell: the robot missed its point, but its floor is swept."""
         self.current.visit(cell)
 
     def may_open_again(self, cell: Cell) -> bool:
@@ -257,11 +256,11 @@ class MissionLedger:
         return before.cells - self.current.snapshot().cells
 
     def forget(self, inside: Callable[[Window, float], NDArray[np.bool_]]) -> None:
-        """Forget some cells and their floor, except under the tool now.
+        """Forget some cells and their floor, except the floor now under the tool.
 
         Args:
-            inside: mask function: a window and the edge of its squares [m] to the squares whose
-                centre is inside, bool (rows, cols).
+            inside: for a window and the edge of its squares [m], returns which squares have their
+                centre inside, bool (rows, cols).
         """
 
         def cells_inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:

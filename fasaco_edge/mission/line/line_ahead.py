@@ -1,7 +1,7 @@
 """Line ahead: the line along the walk ahead, laid anew with each walk.
 
-A new walk is laid as a line over stands, except where the previous line leads along the same cells:
-there it stays as polished.
+A new walk is laid as a line over stands; where the previous line leads along the same cells, that
+line, already polished, is kept.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from fasaco_edge.planners.path import common_beginning
 
 
 class LineAhead(FollowedLine):
-    """Lays the line, and lays what a map blocks anew."""
+    """Lays the line along the walk, and replaces parts that a map blocks."""
 
     def lay(
         self,
@@ -54,9 +54,9 @@ class LineAhead(FollowedLine):
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
             is_cut: whether the walk ends where a map has cut off the previous one.
-            keeps: whether to keep parts of the line; False for a way, see ``way``, as a polished
-                line leads to the same cells by far longer ways.
-            beside: discs that such a way keeps clear of, as ``Route.beside``.
+            keeps: whether to keep parts of the line; False for a way to a place, as a polished line
+                leads over the same cells on a much longer way.
+            beside: discs that such a way keeps clear of, see ``Route.beside``.
         """
         self._see(pose)
         # A plan's cells are read-only: for that type numba would compile the kernels again.
@@ -77,7 +77,7 @@ class LineAhead(FollowedLine):
             line, beyond = line.part(0, count), Piece(line.part(count), count)
         pieces = kept_pieces(line, ahead, walk) if keeps and len(line) and len(walk) else []
         if pieces and pieces[0].begin == 0 and not self.is_followed:
-            # The robot is no longer behind its first point.
+            # The robot has passed the first point of the piece.
             rest = pieces[0].without_first()
             pieces[:1] = [rest] if len(rest.line) else []
         self._walk, self._until, self.cell = ahead if len(beyond.line) else walk, len(walk), 0
@@ -127,7 +127,7 @@ class LineAhead(FollowedLine):
         self._take([*joiner.joined(pieces), *([beyond] if len(beyond.line) else [])])
 
     def check(self, touched: Window) -> bool:
-        """Replace parts that a new map blocks by stands; return whether it blocks any.
+        """Lay parts that a new map blocks over stands again; return whether it blocks any.
 
         Args:
             touched: window of the raster that may have changed.

@@ -73,10 +73,10 @@ def comes_nearer(a: Points, b: Points, beside: Points, start: Points | None = No
 
 
 def corner_past(a: Points, b: Points, beside: Points) -> Points | None:
-    """Return the corner of a way from ``a`` to ``b`` that comes no nearer to any disc.
+    """Return the corner of a way from ``a`` to ``b`` that ``comes_nearer`` to no disc.
 
-    The first part leads across the direction to the nearest disc. None if such a way comes nearer,
-    too.
+    The first part leads at right angles to the direction of the nearest disc. None if such a way
+    comes nearer to a disc, too.
 
     Args:
         a, b, beside: as for ``comes_nearer``; at least one disc.

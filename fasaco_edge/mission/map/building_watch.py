@@ -7,14 +7,13 @@ moved as the robot's pose has moved. If they agree in neither way, the robot sta
 that keeps disagreeing for some seconds shows another building. If a mapper alternates between two
 buildings, the robot stands until one of them stays.
 
-Each map is compared with a reference some seconds old. The previous map would not do: maps sent in
-parts, and the first maps of a restarted mapper, differ from it in any building.
+Each map is compared with a reference some seconds old, not with the previous map: maps sent in
+parts, and the first maps of a restarted mapper, differ from that in any building.
 
 Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, and 0.35 for
-the first 2 m that a scanner sees in another building. The lowest kappa in one building is 0.59 and
-0.32 for maps shifted by 0.3 m and 0.6 m, and 0.67 and 0.34 if furniture moves on 10 % and 30 % of
-the coverable cells. Floors with equal walls count as one building, so each needs a frame of its
-own.
+the first 2 m that a scanner sees in another building. The lowest kappa in one building is 0.59 for
+maps shifted by 0.3 m, and 0.32 by 0.6 m; 0.67 if furniture moves on 10 % of the coverable cells,
+and 0.34 on 30 %. Floors with equal walls count as one building, so each needs a frame of its own.
 """
 
 from __future__ import annotations
@@ -40,9 +39,9 @@ BETTER = 0.1
 MOST_CELLS = 20_000
 # Longest time from a map to the pose that shows its motion, before the robot stops [s].
 GRACE_S = 0.5
-# Time for which maps must show another building before it is accepted, and the previous building
-# before the robot drives again [s]. PATIENCE_S doubles with each change of building within SOON_S,
-# up to LONGEST-fold.
+# Time for which maps must show another building before it is accepted; time for which they must
+# show the previous building before the robot drives again [s]. PATIENCE_S doubles with each change
+# of building within SOON_S, up to LONGEST-fold.
 PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
 # Age at which the reference is replaced [s], and least share of its cells that the new one knows.
 AGE_S, KNOWN_SHARE = 5.0, 0.5

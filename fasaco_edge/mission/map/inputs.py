@@ -179,8 +179,8 @@ class InputMonitor:
             robot's speed; 0 if unknown [m].
         on_line_m: longest possible drive along the line, also if the track between the two poses is
             unknown [m].
-        pose_at, map_at: time of the last pose, and of the last map or update; before the first one,
-            the time from which it is due; None before that time.
+        pose_at, map_at: time of the last pose, and of the last map or update. Before the first one
+            it is the time from which that is due, and None before that time.
         driven: selects the poses that count for swept floor.
     """
 

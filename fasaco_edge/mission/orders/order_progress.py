@@ -30,8 +30,8 @@ class PlacesNote:
         of: checksum of these places; "" while they belong to no map.
         frame: frame of that map.
         is_left: whether the map in that frame has shown another building since.
-        left_mask: checksum of the keep-out mask received as a message if the map in its frame has
-            shown another building since; else "".
+        left_mask: checksum of a keep-out mask received as a message, whose frame has shown another
+            building since; else "".
     """
 
     of: str = ""

@@ -22,8 +22,8 @@ class TookTooLongError(BaseException):
 def no_longer_than(most_s: float | None) -> Iterator[None]:
     """Interrupt the block after this time [s]; None for no limit.
 
-    There is no limit outside the main thread, as only that gets signals, nor if the program has its
-    own timer. A call into a compiled library is not interrupted before it returns.
+    There is no limit outside the main thread, which alone gets signals, and none if the program has
+    a timer of its own. A call into a compiled library is not interrupted before it returns.
 
     Raises:
         TookTooLongError: the time was over.

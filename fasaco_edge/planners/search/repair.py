@@ -32,7 +32,7 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_
 
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 8
-# Limit on the perturbations of a neighbourhood, which ends one where no move can be proposed.
+# Limit on the perturbations of a neighbourhood, for one in which no move can be proposed.
 MOST_PERTURBATIONS = 100
 # Proposals of a second repair, for the path ahead, as a share of those of the first.
 FEW = 0.2
@@ -49,7 +49,7 @@ BOUNDED_CELLS = 2_000
 def repaired(
     problem: CoverageProblem, name: str, config: ColonyConfig, stop: StoppingCriterion
 ) -> CoveragePath:
-    """Return a complete walk that keeps the valid parts of ``problem.before``, without its lead.
+    """Return a complete walk that keeps the valid parts of ``problem.before``.
 
     Args:
         problem: with a walk ``before``, see ``can_repair``.
@@ -87,7 +87,7 @@ def _steady(
     """Return a path that begins with ``held`` steps of the previous walk, if it is similarly good.
 
     A repair may change the path just ahead for a gain that a change farther ahead would give, too.
-    So the walk behind these steps is repaired alone, with few perturbations, as more do not keep
+    So only the walk after these steps is repaired, with few perturbations; more of them do not keep
     more steps. The result costs no more than the completed walk.
     """
     assert problem.before is not None
@@ -171,8 +171,8 @@ class _Repair:
     def _improve(self, region: WalkRegion, place: Neighbourhood) -> Iterator[None]:
         """Improve around the changes, then perturb; pause after each piece.
 
-        Moves at equal cost shift a walk about: at first they leave the cells just ahead of the
-        robot alone.
+        Moves at equal cost change a walk without a gain: at first no move may change the cells
+        just ahead of the robot.
         """
         for held in (HELD_CELLS, 0) if place.is_first else (0,):
             region.hold(held)

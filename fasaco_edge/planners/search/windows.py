@@ -44,9 +44,10 @@ DEAR_STEPS = 10
 WHOLE_STEPS = 2
 # Lattices with more cells take too much memory: about 75 bytes per cell.
 MOST_LATTICE = 250_000
-# Price of a second ring when solving a whole ground, in quarter-turns: any other continuation is
-# preferred. Windows that join rings: number per piece, number of pieces, beam.
+# Price of a second ring when solving a whole ground [quarter-turns]: so high that any other
+# continuation is preferred.
 RING_TURNS = 1000
+# Windows that join rings: number per piece, number of pieces, beam.
 JOINS_AT_ONCE, JOIN_PIECES, JOIN_BEAM = 8, 40, 20
 NO_SIDE = 1 << 60
 # Expansions counted for a window that expands no state, as it has no possible gain; no limit.
@@ -210,8 +211,8 @@ def _copy(source: Passages, target: Passages) -> None:
 def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return a walk over the same cells that takes no step three times, int32 (m,).
 
-    Of three passes over a step two have the same direction: the part between them, reversed, leads
-    from the start of the first pass to the end of the second without either.
+    Of three passes over a step, two have the same direction. The part of the walk between these
+    two is reversed: then it joins the start of the first to the end of the second without them.
     """
     while walk.size > 1:
         low, high = np.minimum(walk[:-1], walk[1:]), np.maximum(walk[:-1], walk[1:])

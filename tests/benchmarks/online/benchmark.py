@@ -21,7 +21,7 @@ from tests.benchmarks.online.robot import Pace
 from tests.benchmarks.online.runs import OnlinePlan, count, measure
 
 DEFAULT_MAPS = ("office", "flat", "walled_grid", "basement", "warehouse")
-# As the buildings are made; a mission over many more takes days.
+# Sizes of buildings [cells]; a mission over many more takes days.
 FEWEST_CELLS, MOST_CELLS = 1_000, 1_000_000
 # Options that figures say of themselves.
 CONDITIONS = (

@@ -160,8 +160,9 @@ def _median(values: Iterable[float]) -> float | None:
     return statistics.median(found) if found else None
 
 
-# Steps to those of the known building: median, worst, and worst of large buildings.
+# Goals for the steps, relative to those in the known building.
 STEPS_MEDIAN, STEPS_WORST = 1.015, 1.07
+# The worst of large buildings.
 WORST_LARGE = 1.03
 TIME = 1.05
 REPLAN_MS, REPLAN_TO_FULL = 10.0, 1 / 20

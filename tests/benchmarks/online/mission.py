@@ -147,7 +147,7 @@ def is_legal(walk: NDArray[np.int32], lattice: CoverageLattice) -> bool:
 # Takes the place of the daemon's planning thread.
 PlannerSeat = Callable[[PlanRequest], PlanReady]
 
-# A reference has so many proposals a cell, and so many in all at least.
+# Proposals of a reference per cell, and at least in all.
 REFERENCE_PER_CELL, REFERENCE_LEAST = 10_000, 5_000_000
 
 
@@ -186,8 +186,10 @@ def near_optimal(problem: CoverageProblem) -> CoveragePath:
 
 # A robot without a way to go looks again after so long [s].
 TICK_S = 0.1
-# One that stood for so long will not go on any more [s]; nor one that drove each cell so often.
-PATIENCE_S, MOST_VISITS = 60.0, 20
+# Standstill after which a mission is given up [s].
+PATIENCE_S = 60.0
+# Visits per cell after which a mission is given up.
+MOST_VISITS = 20
 # Plans that a mission may ask for before the robot goes on.
 PLANS_AT_ONCE = 5
 

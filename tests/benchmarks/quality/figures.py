@@ -169,10 +169,14 @@ MOST_STEPS = {0.02: 1.02, 0.1: 1.01, 1.0: 1.005, 10.0: 1.002}
 # The same of the worst seed, and the budget in which an optimum is to be found.
 WORST_SEED = {1.0: 1.01}
 OPTIMUM_BUDGET_S = 1.0
-# On the paper's grids, revisits of a closed walk.
-CLOSED_BUDGET_S, CLOSED_REVISITS = 1.0, {"paper_simulated": 46, "paper_basement": 55}
-# By budget: most time, as a multiple of the best planner's, in the median over grids.
-MISSION_TURN_S, MOST_TIME = 1.5, {0.1: 0.87, 1.0: 0.84}
+# Budget of closed walks on the paper's grids [s].
+CLOSED_BUDGET_S = 1.0
+# Most revisits of such a walk.
+CLOSED_REVISITS = {"paper_simulated": 46, "paper_basement": 55}
+# Time of a quarter-turn in missions [s].
+MISSION_TURN_S = 1.5
+# Most time by budget, relative to the best planner, in the median over grids.
+MOST_TIME = {0.1: 0.87, 1.0: 0.84}
 # On no grid is it to be more than the best planner's.
 NEVER_WORSE_BUDGET_S = 0.1
 

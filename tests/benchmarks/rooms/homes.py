@@ -22,7 +22,7 @@ from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, reveal_disc
 
 KINDS = ("home", "office")
 RESOLUTION_M = 0.05
-# Reach of the scanner, and how far from it the robot sees all around itself [m].
+# Range of the scanner, and radius around the robot that is always seen [m].
 REACH_M, HULL_M = 8.0, 0.25
 # Floor in front of a door that stays clear of furniture [m].
 CLEAR_M = 0.8

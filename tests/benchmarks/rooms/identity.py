@@ -27,9 +27,12 @@ from tests.benchmarks.harness import add_floors
 from tests.benchmarks.rooms.homes import KINDS, RESOLUTION_M, Home, growing, home
 from tests.support.poses import composed
 
-# Maps from each place; the share of pixels beside walls that are the opposite on a map; how far a
-# map lies aside [m]; of the maps, those before which a loop closes, and its motion [m, degrees].
-MAPS_EACH, FLICKER, ASIDE_M, CLOSES, CLOSURE_M, CLOSURE_DEG = 3, 0.1, 0.03, 0.05, 0.3, 2.0
+# Number of maps from each place.
+MAPS_EACH = 3
+# Share of pixels beside walls that a map shows inverted; shift of a map [m].
+FLICKER, ASIDE_M = 0.1, 0.03
+# Share of maps with a loop closure before them, and its motion [m, degrees].
+CLOSES, CLOSURE_M, CLOSURE_DEG = 0.05, 0.3, 2.0
 GOAL_IDS = 1.2
 HEADER = ("floor", "floors", "maps", "rooms", "numbers", "a room", "names moved", "names lost")
 

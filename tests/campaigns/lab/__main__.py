@@ -31,7 +31,7 @@ from tests.campaigns.lab.settings import LabSettings
 if TYPE_CHECKING:
     from tests.campaigns.lab.report import Judged
 
-# Buildings of the table: the project's own, and those of a folder of others, where it has them.
+# Buildings of the table: the project's own, and those of the folder given by --maps.
 OWN, OTHERS = ("office", "flat"), ("tb3_world", "aws_small_house")
 OPTIONS = {
     "seed": "of all noise",

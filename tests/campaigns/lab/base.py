@@ -39,14 +39,16 @@ with contextlib.redirect_stdout(io.StringIO()):
 # A base stands without a command for so long [s].
 PATIENCE_S = 0.5
 ACCELERATION_M_S2, TURN_ACCELERATION_RAD_S2 = 0.6, 4.0
-# By how much odometry's way and turn are too large; how fast it turns when driving straight
-# [rad/m]; and by how much each step of it scatters.
-WAY_GAIN, TURN_GAIN, BIAS_RAD_M, SCATTER = 1.012, 1.025, 0.006, 0.02
-# Of the true motion, by ir-sim: its scatter with the speed, and with the rate of turning.
+# Factors by which odometry's distance and turn are too large.
+WAY_GAIN, TURN_GAIN = 1.012, 1.025
+# Turn of the odometry on a straight drive [rad/m], and relative scatter of each step.
+BIAS_RAD_M, SCATTER = 0.006, 0.02
+# Noise of the true motion, in the form of ir-sim: from the speed, and from the turn rate.
 MOTION_NOISE = (0.02, 0.0, 0.0, 0.02)
-# Wheels slip: the first time after, and then on average every so long [s]; how long [s], and to
-# which share of their speed.
-FIRST_SLIP_S, SLIP_EVERY_S, SLIP_S, GRIP = 10.0, 25.0, (0.2, 0.6), (0.3, 0.8)
+# Time of the first slip of the wheels, and mean time between two slips [s].
+FIRST_SLIP_S, SLIP_EVERY_S = 10.0, 25.0
+# Ranges of a slip's duration [s], and of the share of the wheels' speed that is left.
+SLIP_S, GRIP = (0.2, 0.6), (0.3, 0.8)
 PERSON_RADIUS_M, PERSON_M_S = 0.2, 0.4
 
 

@@ -22,9 +22,9 @@ LEAST_SHARE = 0.9
 DEADLOCK_S = 60.0
 # Contacts closer together are one [s].
 APART_S = 1.0
-# Wheels that turn less stand, or turn on the spot [m/s, rad/s].
+# Slowest wheel speed and turn rate that count as motion [m/s, rad/s].
 STANDS_M_S, TURNS_RAD_S = 0.01, 0.05
-# True motion in a second that is none [m, rad].
+# Smallest true motion within a second that counts [m, rad].
 STILL_M, STILL_RAD = 0.01, math.radians(2.0)
 SECOND = round(1.0 / TICK_S)
 

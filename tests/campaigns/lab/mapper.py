@@ -26,16 +26,19 @@ from tests.support.poses import composed, inverse
 
 FRAME = "map"
 MAP_EVERY_S = 3.0
-# A scan is kept after so much way [m] or turn [rad].
+# A scan is added after driving this far [m] or turning this much [rad].
 TRAVEL_M, TURN_RAD = 0.3, 0.35
-# Matched to the last scans: within so much [m], and believed from this response on.
+# Match with the last scans: their number, search range [m], and least accepted response.
 NEAR_SCANS, NEAR_M, NEAR_RESPONSE = 15, 0.4, 0.25
-# Every so many scans a loop is looked for: among the nearest scans that are so old and so near [m];
-# within so much [m], believed from this response on, and carried out if it moves the robot by so
-# much [m, rad].
-LOOP_EVERY, LOOP_AGE, LOOP_SCANS, LOOP_NEAR_M = 3, 40, 15, 1.5
-LOOP_M, LOOP_RESPONSE, LOOP_LEAST_M, LOOP_LEAST_RAD = 0.8, 0.55, 0.03, 0.01
-# Karto's picture of its grid.
+# Number of scans between two searches for a loop.
+LOOP_EVERY = 3
+# Scans to close a loop with: least age [scans], number, and distance [m].
+LOOP_AGE, LOOP_SCANS, LOOP_NEAR_M = 40, 15, 1.5
+# Match of a loop: search range [m], and least accepted response.
+LOOP_M, LOOP_RESPONSE = 0.8, 0.55
+# Least motion of the robot for which a loop is closed [m, rad].
+LOOP_LEAST_M, LOOP_LEAST_RAD = 0.03, 0.01
+# Values of Karto's picture of its grid.
 DRAWN_FREE, DRAWN_OCCUPIED = 255, 0
 # Beams are used up to this range [m]; a beam without a return is longer.
 USED_RANGE_M, NO_RETURN_M = 7.5, 100.0

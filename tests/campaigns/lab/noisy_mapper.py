@@ -37,9 +37,11 @@ LEG_PX = 4
 MARGIN_M = 0.6
 # A wall begins this far behind its face [pixels], so that noisy rays still end in it.
 INTO_PX = 1e-3
-# Loops: after each this many scans, a loop is searched for, to a scan at least this old [scans] and
-# this near [m]; it is closed if it moves the robot by at least this much [m, rad].
-LOOP_EVERY, LOOP_AGE, LOOP_NEAR_M = 3, 40, 1.5
+# Number of scans between two searches for a loop.
+LOOP_EVERY = 3
+# Scans to close a loop with: least age [scans], and distance [m].
+LOOP_AGE, LOOP_NEAR_M = 40, 1.5
+# Least motion of the robot for which a loop is closed [m, rad].
 LOOP_LEAST_M, LOOP_LEAST_RAD = 0.03, 0.01
 
 

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from fasaco_edge.mission.core.path_exit import PublishedPath
 
-# So far ahead a change is one [m], if it moves the path by more than this [m].
+# Distance ahead within which changes count, and least shift of the path that is a change [m].
 AHEAD_M, MOVED_M = 2.0, 0.05
-# Points of a path that are looked at, this far apart [m]; and by how many of them its beginning may
-# be off.
-STEP_M, SLACK = 0.02, 10
+# Distance of the compared points of a path [m].
+STEP_M = 0.02
+# Number of these points by which the beginning of a path may be off.
+SLACK = 10
 # The robot has come at most so far along its path from one look to the next [m]: paths cross.
 REACH_M = 1.0
 LOOK_TICKS = 5

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     from tests.campaigns.lab.base import Base
     from tests.campaigns.lab.own import OwnBase
 
-# A turn, then a drive, then a stop: when each ends [s].
+# Ends of the turn, of the drive after it, and of the stop after that [s].
 TURNED_S, DRIVEN_S, HELPED_S = 4.0, 7.0, 8.0
 SPEED_M_S, TURN_RAD_S, TURN_GAIN = 0.13, 0.8, 2.0
-# Wheels that turn less stand [m/s, rad/s].
+# Slowest wheel speed and turn rate that count as motion [m/s, rad/s].
 STANDS_M_S, STANDS_RAD_S = 0.005, 0.02
 
 

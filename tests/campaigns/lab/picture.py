@@ -31,8 +31,10 @@ KEY = (
     (TRACK, "true track"),
     (CONTACT, "contact"),
 )
-# Of a contact, of start and end, and most of a picture [pixels].
-CONTACT_PX, MARK_PX, MOST_PX = 3, 8, 1400
+# Radii of the marks of a contact, and of start and end [pixels].
+CONTACT_PX, MARK_PX = 3, 8
+# Largest edge of a picture [pixels].
+MOST_PX = 1400
 
 
 def draw(run: LabRun, truth: Truth, figures: Figures, file: Path) -> None:

@@ -81,14 +81,14 @@ def test_a_refusal_is_shown_for_each(router, capsys):
     assert capsys.readouterr().out.count("refused: ") == 2
 
 
-def test_a_fleet_that_nobody_is_of(router, capsys):
+def test_an_unknown_fleet_is_an_error_that_lists_fleets(router, capsys):
     assert command(router, "pause", "--fleet", "garden") == 1
     error = capsys.readouterr().err
     assert "no robot of a fleet 'garden' answers" in error
     assert "3 robots answer, of these fleets: hall, yard" in error
 
 
-def test_what_is_no_status_holds_up_no_fleet(router, capsys):
+def test_an_invalid_status_does_not_block_a_fleet(router, capsys):
     stranger = open_client(router)
     noise = {"a junk": b"\xff\xfe", "a list": b"[1]", "long": b'"' + b"a" * 2**21 + b'"'}
     for number, payload in enumerate(noise.values()):
@@ -141,7 +141,7 @@ def test_robots_that_would_forget_are_named_and_need_consent(router, capsys):
     capsys.readouterr()
 
 
-def test_a_robot_that_is_frozen_is_told_and_holds_up_no_other(router, daemons, capsys):
+def test_a_frozen_robot_is_reported_and_blocks_no_other(router, daemons, capsys):
     with Outsider(router, "r2") as second, Outsider(router, "r1") as first:
         second.put("map", map_bytes(room(3.0, 3.0)))
         second.put("pose", pose_bytes(0.75, 0.75))

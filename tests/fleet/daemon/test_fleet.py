@@ -44,7 +44,7 @@ def seats(router, fleet):
         yield {name: stack.enter_context(Outsider(router, name)) for name in FLEET}
 
 
-def test_nobody_hears_another_robots_map(seats):
+def test_no_robot_receives_the_map_of_another(seats):
     for rows, name in enumerate(FLEET, start=3):
         seats[name].put("map", map_bytes(room(3.0, float(rows))))
         seats[name].put("pose", pose_bytes(0.75, 0.75))
@@ -56,7 +56,7 @@ def test_nobody_hears_another_robots_map(seats):
         assert heard[name]["revision"] == 1
 
 
-def test_nobody_hears_another_robots_path_or_obeys_its_commands(seats):
+def test_no_robot_receives_paths_or_commands_of_another(seats):
     first, *others = (seats[name] for name in FLEET)
     subscriptions = [other.listen("path", late=False) for other in others]
     first.put("map", map_bytes(pillared_room()))
@@ -70,7 +70,7 @@ def test_nobody_hears_another_robots_path_or_obeys_its_commands(seats):
 
 
 @pytest.mark.parametrize("key", ["fasaco/@v1/*/map", "fasaco/@v1/r$*/map"])
-def test_a_map_for_all_reaches_whom_it_matches(router, seats, key):
+def test_a_map_on_a_key_expression_reaches_matching_robots(router, seats, key):
     """Zenoh lets a key expression be published on; only access control forbids it."""
     before = {name: (seats[name].ask_status()["map"] or {"revision": 0}) for name in FLEET}
     session = open_client(router)

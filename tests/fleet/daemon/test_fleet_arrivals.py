@@ -46,11 +46,11 @@ def test_messages_of_the_own_fleet_arrive_on_a_crowded_bus(arrivals, stranger):
 
 
 @pytest.mark.parametrize("robot", ["me", "*", "r$*"])
-def test_nobody_speaks_for_this_robot_or_for_all(arrivals, robot):
+def test_messages_in_this_robots_name_are_dropped(arrivals, robot):
     assert not arrivals.is_due(from_robot(robot), 0.0)
 
 
-def test_nothing_of_other_fleets_comes_to_the_loop(arrivals):
+def test_messages_of_other_fleets_are_dropped(arrivals):
     assert not any(arrivals.is_due(from_robot("other", "yard"), float(at)) for at in range(9))
 
 
@@ -67,7 +67,7 @@ def test_an_unreadable_fleet_message_is_a_fault_with_a_limit(arrivals):
     assert arrivals.is_due(garbage("r2"), 20.0 + LEAST_SPACING_S)
 
 
-def test_one_robot_too_many_displaces_nobody_and_is_named_once(arrivals):
+def test_a_robot_too_many_is_reported_once(arrivals):
     for second in range(3):
         for number in range(MOST_OTHERS):
             assert arrivals.is_due(from_robot(f"r{number}"), float(second))

@@ -30,7 +30,7 @@ from tests.support.processes import free_endpoint
 MAX_PIXELS = 1_000_000
 
 
-def test_what_a_fleet_says_too_long_is_dropped_on_arrival():
+def test_an_oversized_fleet_message_is_dropped_on_arrival():
     config = msgspec.convert({"robot": {"name": "r1"}, "fleet": {"name": "hall"}}, DaemonConfig)
     keys, mailbox = config.keys(), make_mailbox(MAX_PIXELS)
     with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
@@ -46,7 +46,7 @@ def test_what_a_fleet_says_too_long_is_dropped_on_arrival():
         ]
 
 
-def test_what_a_fleet_says_before_the_mission_is_not_heard():
+def test_fleet_messages_wait_for_the_mission():
     """A replay hears nothing of it: with it, cells at the edges of tiles would be others."""
     fleet = {"name": "hall", "frame": "house"}
     config = msgspec.convert({"robot": {"name": "r1"}, "fleet": fleet}, DaemonConfig)

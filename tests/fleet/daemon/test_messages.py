@@ -59,7 +59,7 @@ def heard(payload, robot="r2"):
     return receiver.event(Sample(f"fasaco/@v1/{robot}/fleet", payload))
 
 
-def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
+def test_a_fleet_message_is_read_back_and_matches_its_schema():
     payload = encode_json(MEMBER)
     assert decode_member(payload, "hall") == MEMBER
     check("fleet.json", json.loads(payload))
@@ -97,7 +97,7 @@ def test_it_comes_back_as_it_was_and_is_that_of_the_schema():
     ],
     ids=str,
 )
-def test_what_is_beyond_a_limit_is_refused_and_the_robot_named(members):
+def test_a_value_beyond_a_limit_is_refused_with_the_robots_name(members):
     with pytest.raises(MalformedMessage, match=r"^r2: fleet: "):
         heard(said(**members))
 
@@ -112,7 +112,7 @@ def test_a_division_has_a_part_for_this_robot_and_each_known_one():
     assert MAX_FLEET_PARTS == 1 + MOST_ROBOTS
 
 
-def test_what_is_too_long_is_not_looked_at():
+def test_an_oversized_message_is_refused_unread():
     with pytest.raises(MalformedMessage, match="at most"):
         decode_member(b" " * (MAX_JSON_BYTES + 1), "hall")
 

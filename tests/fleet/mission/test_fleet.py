@@ -69,7 +69,7 @@ def test_lost_and_repeated_messages_leave_no_cell_out(seed):
 
 
 @pytest.mark.parametrize("at", [5, 40, 70])
-def test_what_a_robot_that_dies_had_to_do_is_taken_over(at):
+def test_the_part_of_a_lost_robot_is_taken_over(at):
     fleet = FleetDrive(HALL, TWO)
     fleet.run(at)
     del fleet.robots["r2"]
@@ -80,7 +80,7 @@ def test_what_a_robot_that_dies_had_to_do_is_taken_over(at):
     assert fleet.left_out() == set()
 
 
-def test_a_robot_that_stands_is_not_waited_for_and_may_come_back():
+def test_a_standing_robot_loses_its_part_until_it_moves():
     fleet = FleetDrive(HALL, TWO)
     fleet.run(20)
     fleet.robots["r2"].hangs = True
@@ -173,7 +173,7 @@ def test_a_robot_that_does_not_fit_is_named_and_left_out(changes, why):
     assert ours.mission.covered.shared.cells_of("r2") == 0
 
 
-def test_what_others_swept_outlives_a_restart():
+def test_cells_swept_by_others_survive_a_restart():
     fleet = FleetDrive(HALL, TWO)
     fleet.run(30)
     ours = fleet.robots["r1"].mission
@@ -198,7 +198,7 @@ def test_what_others_swept_outlives_a_restart():
         b"\x00",
     ],
 )
-def test_what_cannot_be_read_of_what_was_kept_is_heard_anew(kept):
+def test_unreadable_progress_of_others_is_received_again(kept):
     shared = SharedProgress()
     shared.resume(kept)
     shared.begin(9)
@@ -340,7 +340,7 @@ def test_disregarded_cells_are_dropped_with_the_cells_or_if_many():
     assert shared.cells_of("r2") == 100 * 8 * TILE_BYTES
 
 
-def test_what_this_robot_has_swept_itself_is_not_taken_from_it():
+def test_cells_that_this_robot_swept_stay_its_own():
     fleet = FleetDrive(HALL, TWO)
     fleet.run(50)
     ours, other = fleet.robots.values()
@@ -369,7 +369,7 @@ def test_cells_of_this_robot_are_taken_again_after_a_forget():
             ours.plan()
 
 
-def test_what_many_robots_say_in_a_moment_holds_nobody_up():
+def test_a_burst_of_fleet_messages_does_not_delay_the_loop():
     fleet = FleetDrive(["." * 300] * 300, {"r1": (0, 0), "r2": (299, 299)})
     ours, other = fleet.robots.values()
     report = other.report()
@@ -429,7 +429,7 @@ def test_a_robot_without_a_part_does_not_divide_again_and_again():
 
 
 @pytest.mark.parametrize("begun", [0, 4])
-def test_a_number_that_no_count_leads_to_is_nobodys_division(begun):
+def test_a_division_with_an_impossible_number_is_ignored(begun):
     fleet = FleetDrive(HALL, TWO)
     fleet.run(begun)
     ours, other = fleet.robots.values()
@@ -505,7 +505,7 @@ def test_robots_that_meet_in_a_corridor_pass_at_a_niche():
     assert least >= 2 * CONFIG.footprint.robot_radius_m
 
 
-def test_robots_that_hear_each_other_keep_their_zones_in_order():
+def test_robots_of_a_fleet_keep_their_zones_in_order():
     """One with more time or charge than another would sweep its zones in another order."""
     robot, other = FleetRobot("r1", (0, 0), HALL), FleetRobot("r2", (0, 23), HALL)
     zones = [

@@ -64,7 +64,7 @@ def test_a_robot_without_a_part_stands_while_another_sweeps():
     assert ours.mission.state == "done"
 
 
-def test_what_another_leaves_is_swept_by_a_robot_without_a_part():
+def test_a_robot_without_a_part_sweeps_what_another_leaves():
     shared = Shared()
     shared.run(40)
     assert not shared.ours.walk
@@ -105,7 +105,7 @@ def test_robots_do_not_stand_for_one_another():
     assert remainder.others_go_on
 
 
-def test_others_that_find_as_many_cells_as_they_sweep_go_on():
+def test_robots_that_explore_still_make_progress():
     # One was done with 160 cells left, and out of the fleet, for the last 390 s of 950.
     remainder = Remainder()
     for second in range(3 * int(STUCK_S)):
@@ -251,7 +251,7 @@ def test_robots_share_by_one_division_if_one_sees_no_way():
     assert len(first.mission.company.parts) == 2
 
 
-def test_a_robot_plans_anew_once_others_have_swept_what_came_first():
+def test_a_robot_replans_once_others_swept_its_first_floor():
     east = range(22, 24)
     cells = np.full((12, 24), -1, np.int8)
     cells[:, east] = 90

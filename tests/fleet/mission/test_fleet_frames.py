@@ -73,7 +73,7 @@ def test_a_cell_askew_has_the_value_of_the_cell_below_its_centre():
             assert ((row, col) in found) == (below in cells)
 
 
-def test_tiles_are_made_of_all_that_was_told_and_repeated_alike():
+def test_repeated_tiles_of_another_frame_give_the_same_cells():
     resampled = ResampledTiles(AT, CELL)
     every = bits_of({(row, col) for row in range(TILE) for col in range(TILE)})
     resampled.tiles([((0, 0), every)])
@@ -95,7 +95,7 @@ def test_a_new_epoch_ends_what_was_swept_before():
     assert not before & after
 
 
-def test_as_many_robots_as_are_heard_keep_their_ground():
+def test_each_known_robot_keeps_its_ground():
     """With one more than there was room for, each lost what it had told before, in turn."""
     frames, every = FleetFrames(Pose2D(10 * CELL, 0.0), 0.0, CELL), bits_of({(0, 0), (0, 63)})
     names = [f"r{number}" for number in range(MOST_OTHERS)]

@@ -124,7 +124,7 @@ def test_a_robot_too_wide_for_a_door_keeps_to_its_part():
     assert len(cells) - len(set(cells)) < 40
 
 
-def test_ground_that_is_lost_again_is_told():
+def test_lost_ground_is_sent_as_lost():
     own, telling, ground = area_of("...."), GroundQueue(), SharedGround()
     larger, smaller = area_of("." * 9), area_of("." * 6)
     for told in (larger, smaller):
@@ -177,7 +177,7 @@ def test_ground_sent_in_a_frame_since_left_does_not_count():
     assert cells_of(ground.joint(own)) == cells_of(own)
 
 
-def test_tiles_are_told_a_few_at_a_time_and_changed_ones_first():
+def test_tiles_are_sent_a_few_at_a_time_changed_ones_first():
     area = ReachableArea.around(CoverageLattice.from_free(np.ones((64, 64 * 5), np.bool_)), (0, 0))
     telling = GroundQueue()
     assert telling.next(None, 3) == ()
@@ -263,7 +263,7 @@ def test_all_robots_take_over_one_division():
     assert len(layers[0].parts) == 3
 
 
-def test_where_a_cell_takes_longer_a_part_has_fewer_cells():
+def test_a_part_of_slow_cells_has_fewer_cells():
     # Dead ends on the left, each driven twice, and a hall on the right, along one corridor.
     free = np.zeros((8, 60), np.bool_)
     free[0], free[:, :40:2], free[:4, 40:] = True, True, True

@@ -43,7 +43,7 @@ def drive():
     return drive
 
 
-def test_a_robot_on_its_way_home_waits_and_goes_on(drive):
+def test_a_robot_on_its_way_home_waits_and_continues(drive):
     # It drove on, whoever was in the way: on an errand it neither waited nor made way.
     over = member(drive.walk[1], waits_for="r3")
     drive.tell(pose_at(2, 4), over, after=1.0)
@@ -59,7 +59,7 @@ def test_a_robot_on_its_way_home_waits_and_goes_on(drive):
     assert drive.cell == (2, 20)
 
 
-def test_a_robot_held_up_on_its_way_home_for_a_minute_says_so():
+def test_a_robot_delayed_for_a_minute_on_its_way_home_reports_it():
     config = with_policy(CONFIG, home=at(0, 20))
     drive = Drive((0, 4), config=config, kind=FleetKind("r1"))
     drive.tell(MapReceived(building("." * 24)), pose_at(0, 4))
@@ -112,7 +112,7 @@ def test_a_way_home_leads_round_a_robot_that_stands_in_it(drive):
     assert drive.cell == (2, 20)
 
 
-def test_a_robot_that_is_sent_home_while_it_waits_looks_anew(drive):
+def test_a_waiting_robot_sent_home_checks_its_way_again(drive):
     drive.command("resume")
     while drive.request is not None:
         drive.plan()

@@ -84,7 +84,7 @@ def test_no_cells_stay_closed_for_a_robot_on_another_map(area, members):
     assert members.closed(area, RADIUS_M) is None
 
 
-def test_where_a_silent_robot_is_only_the_map_shows(area, members):
+def test_cells_closed_for_a_silent_robot_are_opened(area, members):
     members.receive(member(1.125, 1.125), 0.0)
     members.avoid("r2")
     assert members.forget_silent(OLD_S - 0.1) == ""
@@ -165,7 +165,7 @@ def test_a_plan_avoids_robots_that_stand_in_the_way_repeatedly(names):
     assert any(map(drive.mission.company.others.is_avoided, names))
 
 
-def test_whether_another_is_near_is_told_at_rest_too():
+def test_a_near_robot_is_known_also_at_rest():
     drive = planned()
     drive.command("pause")
     for x, near in ((3.0, True), (20.0, False)):
@@ -173,7 +173,7 @@ def test_whether_another_is_near_is_told_at_rest_too():
         assert drive.mission.giving_way.is_near == near
 
 
-def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
+def test_a_jammed_robot_is_planned_around():
     # Nobody moved again: the first by name goes first, and could not.
     drive = planned()
     row, col = drive.walk[1]
@@ -188,7 +188,7 @@ def test_one_that_is_waited_for_but_is_jammed_is_planned_around():
     assert len(drive.mission.route.path.ahead) > 1
 
 
-def test_a_robot_that_cannot_get_to_its_refuge_plans_around_the_other():
+def test_a_robot_without_a_way_to_its_refuge_replans():
     # It stood for ever beside one that was done: the refuge was the cell that it stood in, and the
     # way to the middle of it, of one point, was no way to drive.
     drive = planned()
@@ -221,7 +221,7 @@ def test_a_waiting_robot_is_done_when_others_sweep_the_rest():
     assert not len(path_ahead(drive.mission))
 
 
-def test_one_that_makes_way_drives_to_the_middle_of_its_refuge():
+def test_a_yielding_robot_drives_to_the_middle_of_its_refuge():
     drive = planned()
     x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
     drive.tell(pose_at(2, 4), replace(member(x, y), waits_for="r3"), after=1.0)

@@ -36,14 +36,14 @@ EAST = [(0.0, 0.0), (2.0, 0.0)]
 NORTH = [(1.0, -1.0), (1.0, 1.0)]
 
 
-def test_of_two_that_would_meet_one_waits():
+def test_one_of_two_robots_that_would_meet_waits():
     first = seen("r1", EAST, heard("r2", *NORTH))
     second = seen("r2", NORTH, heard("r1", *EAST))
     assert first is None
     assert second.reason == "waits for r1"
 
 
-def test_the_nearer_one_goes_first_whatever_its_name():
+def test_the_nearer_robot_goes_first_whatever_its_name():
     near = [(0.7, 0.0), (2.0, 0.0)]
     assert seen("r9", near, heard("r2", *NORTH)) is None
     assert seen("r2", NORTH, heard("r9", *near)).robot == "r9"
@@ -70,13 +70,13 @@ def test_the_other_one_drives_at_its_own_pace():
     assert seen("r2", line, other, "r1", pace_s_m=40.0) is None
 
 
-def test_who_waits_goes_on_waiting_until_there_is_more_time():
+def test_a_waiting_robot_waits_until_there_is_a_larger_gap():
     line, other = [(0.5, 0.0), (2.5, 0.0)], heard("r1", (1.0, -1.6), (1.0, 1.2))
     assert seen("r2", line, other) is None
     assert seen("r2", line, other, "r1").reason == "waits for r1"
 
 
-def test_of_two_robots_face_to_face_only_the_second_waits():
+def test_only_one_of_two_robots_face_to_face_waits():
     # Face to face, each waits for the other: the first by name is blocked, and plans around.
     there = [(0.6, 0.0), (0.6, 2.0)]
     held = seen("r2", EAST, heard("r1", *there, waits_for="r2"), "r1")
@@ -97,7 +97,7 @@ def test_one_on_the_path_of_a_robot_that_waits_for_a_third_stays():
     assert held is None
 
 
-def test_one_that_waits_on_the_others_path_makes_way():
+def test_a_robot_that_waits_on_the_others_path_makes_way():
     other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r2")
     held = seen("r2", EAST, other, waits_for="r1")
     assert held.is_on_path
@@ -107,11 +107,11 @@ def test_one_that_waits_on_the_others_path_makes_way():
     assert not first.is_on_path
 
 
-def test_one_that_has_nothing_to_do_makes_way_whatever_its_name():
+def test_a_robot_without_work_makes_way_whatever_its_name():
     assert seen("r1", [(1.0, 0.0)], heard("r2", *EAST)).is_on_path
 
 
-def test_one_that_stands_in_the_way_is_named():
+def test_a_robot_that_stands_in_the_way_is_named():
     held = seen("r1", EAST, heard("r2", (0.8, 0.0)))
     assert held.is_blocked
     assert held.reason == "r2 stands in the way"
@@ -202,7 +202,7 @@ def test_a_way_out_of_a_doorway_may_begin_beside_the_own_cell():
     assert tuple(way[0].tolist()) == (1, 4)
 
 
-def test_cells_far_from_one_robot_are_no_way_through_another():
+def test_no_refuge_lies_beyond_another_robot():
     # A corridor: r1 stands in it, and r2 comes from the other side.
     free = np.zeros((3, 24), np.bool_)
     free[1] = True

@@ -32,7 +32,7 @@ class Box(FleetInbox):
         ]
 
 
-def test_a_flooding_robot_keeps_its_newest_and_costs_others_none():
+def test_a_flooding_robot_displaces_only_its_own_samples():
     box = Box()
     box.put("r2", "fleet", b"quiet")
     for number in range(10_000):
@@ -56,7 +56,7 @@ def test_a_flooding_robot_keeps_its_newest_and_costs_others_none():
 
 
 @pytest.mark.parametrize("size", [CAPACITY // 4 + 1, CAPACITY])
-def test_what_is_larger_than_a_share_is_left_out(size):
+def test_a_sample_larger_than_its_share_is_dropped(size):
     box = Box()
     box.put("r1", "map", bytes(size))
     box.put("r1", "fleet", b"small")

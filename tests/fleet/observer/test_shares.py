@@ -33,7 +33,7 @@ def test_each_has_the_part_that_it_is_nearer_to(halved):
     assert abs(cells["a"] - cells["b"]) <= 20
 
 
-def test_one_left_alone_has_all_that_is_left(halved):
+def test_the_last_robot_has_all_remaining_cells(halved):
     swept = [(0, col) for col in range(30)]
     now = SECOND + GONE_NS + 1
     halved.receive("b", member(cells=swept, division=8, by="b"), now)
@@ -45,7 +45,7 @@ def test_a_new_robot_without_a_division_changes_nothing(halved):
     assert (+survey_of(halved, SECOND).left).keys() == {"a", "b"}
 
 
-def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
+def test_a_division_of_a_gone_robot_is_not_valid(halved):
     halved.receive("c", member(division=9, by="c", parts=(FleetPart("c", 0, 0, 0.0, 1.2),)), SECOND)
     now = SECOND + GONE_NS
     for name in ("a", "b"):
@@ -56,7 +56,7 @@ def test_what_a_robot_that_is_gone_told_is_not_in_force(halved):
     assert (+survey_of(halved, now + GONE_NS + 1).left) == {"c": HALL}
 
 
-def test_cells_beyond_the_steps_that_are_looked_for_are_nobodys(halved):
+def test_cells_beyond_the_search_limit_have_no_owner(halved):
     telling = halved.dividing(SECOND)
     window = Window(0, 0, 20, 30)
     known = np.ones((20, 30), np.bool_)

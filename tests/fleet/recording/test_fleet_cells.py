@@ -50,7 +50,7 @@ def test_distances_are_those_of_a_search_step_by_step(ground, start):
 
 
 @given(st.sets(st.tuples(st.integers(-200, 200), st.integers(-200, 200)), max_size=40))
-def test_cells_come_back_out_of_their_tiles(cells):
+def test_cells_are_decoded_from_their_tiles(cells):
     assert {tuple(cell) for cell in cells_of(tiles(cells)).tolist()} == cells
 
 
@@ -87,7 +87,7 @@ def test_swept_cells_only_grow_and_of_ground_the_newest_counts():
 ROBOT = NotedRobot("r1", 0.2, 0.3, 0.0, 0.0, 0.0, 0.0)
 
 
-def test_notes_come_back_and_what_is_none_is_refused():
+def test_notes_are_read_back_and_invalid_ones_refused():
     batch = NoteBatch(NOTES_VERSION, 7, "house", [ROBOT], [])
     blob = encode_notes(batch)
     assert decode_notes(blob) == batch

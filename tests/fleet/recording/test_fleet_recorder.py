@@ -129,7 +129,7 @@ def test_robots_present_at_first_have_colours_by_name(studio):
     assert [member.name for member in studio.recorder._members] == ["r1", "r2", "r3", "a-late-one"]
 
 
-def test_one_that_floods_lies_or_sends_rubbish_harms_no_other(studio):
+def test_a_faulty_robot_does_not_harm_the_others(studio):
     bad, good = Teller(studio.bus, "bad"), Teller(studio.bus, "good")
     bad.tell()
     good.tell(cells=[(0, 0)])
@@ -228,7 +228,7 @@ def test_maps_of_many_robots_leave_room_in_a_part(studio, monkeypatch):
         assert len(data) <= 4 * 1_000
 
 
-def test_what_is_left_out_of_a_robots_recording_is_told_once(studio, monkeypatch):
+def test_samples_left_out_are_reported_once(studio, monkeypatch):
     wide, large = Teller(studio.bus, "wide"), Teller(studio.bus, "large")
     wide.tell(cells=[(0, 0)])
     large.tell(cells=[(1, 0)])
@@ -244,7 +244,7 @@ def test_what_is_left_out_of_a_robots_recording_is_told_once(studio, monkeypatch
         assert log_of(part).count(line) == 1
 
 
-def test_a_frame_that_changes_is_told_and_begins_anew(studio):
+def test_a_change_of_frame_is_reported_and_starts_from_zero(studio):
     robot = Teller(studio.bus, "r1")
     robot.tell(cells=[(0, 0)])
     studio.until(lambda: studio.joined("r1"))
@@ -300,7 +300,7 @@ def test_the_review_of_a_fleet_is_printed_and_drawn(studio, tmp_path):
 
 
 def test_each_figure_of_a_fleet_is_in_the_help():
-    told = review.COMMAND.epilog.partition("Of a fleet it holds:")[2]
+    told = review.COMMAND.epilog.partition("For a fleet it has:")[2]
     figures = (*FleetFigures.__struct_fields__, *FleetRobotFigures.__struct_fields__)
     others = {"by", "cells", "and", "each", "with"}
     assert [word for word in re.findall(r"\w+", told) if word not in others] == list(figures)
@@ -323,7 +323,7 @@ def test_the_layout_shows_all_robots_and_no_view_complains(studio):
     )
 
 
-def test_what_is_no_fleets_recording_is_named(tmp_path):
+def test_a_recording_without_a_fleet_is_named(tmp_path):
     file = tmp_path / "none.rrd"
     file.write_bytes(b"RRF2" + bytes(8))
     with pytest.raises(UnreadableRecording, match="no notes of a fleet"):

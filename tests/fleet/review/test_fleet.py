@@ -82,7 +82,7 @@ def test_lanes_over_swept_floor_are_sweeping_again(monkeypatch):
     assert figures.robots[0].again_m2 == 0.0
 
 
-def test_after_a_month_floor_that_nobody_swept_before_is_new(monkeypatch):
+def test_unswept_floor_is_new_even_after_a_month(monkeypatch):
     lanes = [*lane(4, 0, 11), *lane(5, 11, 0), *lane(6, 0, 11)]
     figures = reviewed(monkeypatch, SWEPT, lanes, begin_s=30 * 24 * 3600)
     assert figures.again_m2 == figures.through_m2 == 0.0

@@ -47,7 +47,7 @@ def test_swept_cells_of_all_others_count_and_those_along_walls():
     assert cells(found) == {(1, 1), (0, 3), (-1, 2), (-1, 3)}
 
 
-def test_what_was_forgotten_does_not_count():
+def test_cells_of_an_earlier_epoch_do_not_count():
     again = member(cells=[(1, 2)], epoch=2)
     found = swept_by_others(turns(("r2", member(cells=[(1, 1)])), ("r2", again)), HOUSE, GEOMETRY)
     assert cells(found) == {(1, 2)}

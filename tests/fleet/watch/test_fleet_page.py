@@ -51,7 +51,7 @@ def test_it_says_who_does_what():
         assert said in page, page
 
 
-def test_who_is_gone_is_told_and_so_is_who_is_not_heard():
+def test_gone_robots_are_shown():
     view = two_in_a_hall()
     others = [{"name": "b", "away": "gone"}, {"name": "c", "away": "gone", "heard_s": 20.0}]
     later = NOW + 1e-9 * GONE_NS + 7.0
@@ -64,7 +64,7 @@ def test_who_is_gone_is_told_and_so_is_who_is_not_heard():
     assert "all robots are gone" in page_of(view, now=later + 60.0)
 
 
-def test_what_others_leave_out_is_told():
+def test_robots_that_others_ignore_are_shown():
     view = two_in_a_hall()
     others = [{"name": "a", "away": "stands"}]
     tell(view, "b", "status", status(fleet={"name": "house", "members": others}))
@@ -74,7 +74,7 @@ def test_what_others_leave_out_is_told():
     assert "(not received by others)" in page_of(view)
 
 
-def test_done_is_done():
+def test_robots_that_are_done_are_not_at_work():
     view = two_in_a_hall()
     for name in ("a", "b"):
         say(view, name, NOW + 1, state="done")

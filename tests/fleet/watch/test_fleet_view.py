@@ -77,7 +77,7 @@ def test_the_same_as_json():
     }  # fmt: skip
 
 
-def test_what_changes_is_told_once():
+def test_each_change_is_one_event():
     view = two_in_a_hall()
     for seconds in range(1, 4):
         now = NOW + seconds
@@ -87,7 +87,7 @@ def test_what_changes_is_told_once():
     assert texts(view)[3:] == ["division 8 by a, 2 parts", "a: blocked", "b: done"]
 
 
-def test_a_robot_that_is_silent_is_gone_and_may_come_back():
+def test_a_silent_robot_is_gone_until_its_next_message():
     view = two_in_a_hall()
     later = NOW + GONE_S
     say(view, "a", later)
@@ -145,7 +145,7 @@ def test_a_second_daemon_of_a_name_tells_nothing():
     assert view.robots(NOW)[0].revision is None
 
 
-def test_other_fleets_are_named_until_one_of_this_is_heard():
+def test_other_fleets_are_named_while_this_one_is_absent():
     view = FleetView("house")
     for number in range(2 * MOST_FLEETS):
         say(view, f"r{number}", fleet=f"yard{number:03}\x1b[2J")
@@ -184,7 +184,7 @@ def test_a_robot_that_jumps_on_and_off_does_not_fill_the_log():
         ("status", b"[]"), ("status", b"\xff"), ("fleet", b" " * 2_000_000),
     ],
 )  # fmt: skip
-def test_what_cannot_be_read_costs_only_itself(topic, payload):
+def test_an_unreadable_sample_changes_nothing_else(topic, payload):
     view = two_in_a_hall()
     before = view.document(NOW)
     for _ in range(9):
@@ -197,7 +197,7 @@ def test_what_cannot_be_read_costs_only_itself(topic, payload):
     assert told[-1].endswith("(8 so far)")
 
 
-def test_names_that_nobody_knows_fill_nothing():
+def test_unknown_names_take_no_memory():
     view = two_in_a_hall()
     for number in range(2000):
         tell(view, f"r{number}", "fleet", b"no message")
@@ -219,7 +219,7 @@ def test_texts_of_robots_are_short_and_do_nothing():
         assert len(text) <= 2 * LONGEST
 
 
-def test_a_maze_as_large_as_can_be_told_takes_a_moment_only():
+def test_the_largest_maze_takes_a_moment_only():
     """A serpentine: a step further for each of a million cells."""
     view = FleetView("house")
     edge = 22
