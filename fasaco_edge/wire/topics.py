@@ -183,7 +183,6 @@ DIRECTIONS = Topic(
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
     qos=Qos("background", cache=1, why="as the pheromone"),
-    queues=Queues(recorder=NEWEST),
     limits=("max_grid_cells",),
 )
 ROOMS = Topic(

@@ -28,7 +28,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.maps import CoverageValue, direction_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.maps import CoverageValue, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
@@ -66,7 +66,6 @@ class Mission:
         self._coverage = Sender(bus, topics.COVERAGE)
         self._floor = Sender(bus, topics.FLOOR)
         self._pheromone = Sender(bus, topics.PHEROMONE)
-        self._directions = Sender(bus, topics.DIRECTIONS)
         self._status = Sender(bus, topics.STATUS)
         self._rooms = Sender(bus, topics.ROOMS)
         self.walk = _walk()
@@ -148,19 +147,6 @@ class Mission:
         self.best_steps = round(len(self.walk) * 1.1 - 40 * done)
         note = {"revision": self.revision, "cells": 12, "branching": 2.0 - done}
         self._pheromone.put(self._field(done), json.dumps(note).encode())
-
-        # It points along the walk, up and down its columns, and is sure of that.
-        pointed = np.full((self.visits.shape[0], self.seen_cells), -1, np.int8)
-        (rows, cols), moves = cells(self.walk[:-1]), np.diff(self.walk, axis=0)
-        ways = np.select(
-            [moves[:, 0] > 0.01, moves[:, 1] > 0.01, moves[:, 0] < -0.01], [0, 1, 2], 3
-        )
-        seen = cols < self.seen_cells
-        pointed[rows[seen], cols[seen]] = ways[seen]
-        share = np.where(pointed < 0, 0, 0.75).astype(np.float32)
-        geometry = GridGeometry.of_cells(self._window(pointed), CELL_M)
-        grid = OccupancyGrid(geometry, direction_values(pointed, share))
-        self._directions.put(encode_occupancy_grid(grid))
 
     def _window(self, shown: NDArray[np.generic]) -> Window:
         col, row = (round(at / CELL_M) for at in ORIGIN)

@@ -56,7 +56,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         # The parent entity may lie too far away for float32.
         origin=f"/{entities.WORLD}",
         name="Map, swept floor, track and path",
-        contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
+        contents=["/world/**", f"- /{entities.PHEROMONE}/**"],
         eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
@@ -121,11 +121,6 @@ def _details() -> list[rrb.TimeSeriesView]:
             "Time above the least possible, as a share of it", "metrics/plan", right, MOST_GAP, gaps
         ),
         plot_view("Driving time saved by search, summed over all plans [s]", entities.SAVED, left),
-        plot_view(
-            "Branching factor of the pheromone: 1 if each cell has one way, 4 if none is preferred",
-            entities.BRANCHING,
-            rrb.PlotLegend(visible=False),
-        ),
         plot_view("Memory [MB]", entities.MEMORY, left),
         plot_view(
             "Processor [% of a core], battery [%]", "metrics/resources", right, contents=used

@@ -32,7 +32,6 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (f"{entities.LATENCY}/ingest", "map in", (56, 152, 222)),
     (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
-    (entities.BRANCHING, "branching", (244, 114, 182)),
     (entities.GAP, "gap of the walk", (250, 204, 21)),
     (entities.LINE_GAP, "gap of the line", (52, 211, 153)),
     (entities.SAVED_BY_ANTS, "ants", (244, 114, 182)),

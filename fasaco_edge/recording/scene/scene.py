@@ -24,7 +24,6 @@ from fasaco_edge.recording.scene.curves import (
     StatusFigures,
 )
 from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
-from fasaco_edge.recording.scene.flows import flows_of
 from fasaco_edge.recording.scene.layers import (
     Anchor,
     Layers,
@@ -39,7 +38,6 @@ from fasaco_edge.wire.documents.replies import TROUBLES
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import ErrorCounts, Recorder, Status
-from fasaco_edge.wire.messages.maps import directions_of
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 from fasaco_edge.wire.reasons import plain
@@ -155,11 +153,10 @@ class Scene:
         self._draw(entities.FLOOR, size, lambda: draw.floor_archetype(grid), drawn)
 
     def add_pheromone(self, message: PheromoneMessage, about: TrailAttachment) -> None:
-        """Draw the living trail; plot its branching factor."""
+        """Draw the living trail."""
         if self._comes_again(entities.PHEROMONE, (message.geometry, about), message.levels):
             return
         message = self._anchored(message.geometry.origin).grid(message)
-        self._curves.draw(entities.BRANCHING, about.branching)
 
         def draw_pheromone() -> rr.GridMap:
             label = draw.trail_label(message, about)
@@ -171,15 +168,6 @@ class Scene:
         # These limits are needed to convert levels to pheromone.
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
-
-    def add_directions(self, grid: OccupancyGrid) -> None:
-        """Draw the directions of the living trail."""
-        if self._comes_again(entities.DIRECTIONS, grid.geometry, grid.cells):
-            return
-        grid = self._anchored(grid.geometry.origin).grid(grid)
-        flows = flows_of(grid.geometry, *directions_of(grid))
-        size = flows.size_bytes
-        self._draw(entities.DIRECTIONS, size, lambda: draw.arrows_archetype(flows), size)
 
     def add_status(self, status: Status) -> None:
         """Plot the planner's figures, show its states, log its errors."""

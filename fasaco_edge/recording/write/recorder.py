@@ -72,12 +72,7 @@ class Recorder:
         if capacity < QUEUE_BYTES:
             self.note(f"memory is limited: samples above {capacity / 1e6:.1f} MB are not recorded")
         scene = self._scene
-        grids = {
-            "map": scene.add_map,
-            "coverage": scene.add_coverage,
-            "floor": scene.add_floor,
-            "directions": scene.add_directions,
-        }
+        grids = {"map": scene.add_map, "coverage": scene.add_coverage, "floor": scene.add_floor}
         self._drawers: dict[str, Callable[[Sample], None]] = {
             **{topic: partial(_draw_grid, draw) for topic, draw in grids.items()},
             "map_update": lambda sample: scene.add_map_update(decode_map_update(sample.payload)),
