@@ -157,15 +157,6 @@ class Replans:
         return dict(Counter(kind_of(path.about.reason) for path in self.later).most_common())
 
     @property
-    def spread_by_reason(self) -> dict[str, tuple[float | None, float | None]]:
-        """Median and longest duration [ms] for each kind of reason, the most frequent first."""
-        took: dict[str, list[float]] = {kind: [] for kind in self.by_reason}
-        for path in self.later:
-            if path.plan_ms is not None:
-                took[kind_of(path.about.reason)].append(path.plan_ms)
-        return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
-
-    @property
     def slowest_first(self) -> list[PathSample]:
         """Replans with a known duration, the slowest first."""
         timed = [path for path in self.later if path.plan_ms is not None]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
 from pathlib import Path
 from typing import TypeVar
 
@@ -23,10 +22,16 @@ from fasaco_edge.recording.read.run import (
     RecordedSamples,
     RunRecord,
     TimedText,
-    count_frames,
     read_run_record,
 )
-from fasaco_edge.review.drive import MILESTONES, swept_floor, visits_of
+from fasaco_edge.review.floor import (
+    MILESTONES,
+    RoomChapter,
+    labels_of,
+    room_chapters,
+    swept_floor,
+    visits_of,
+)
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
@@ -40,7 +45,6 @@ from fasaco_edge.review.moments import (
     troubles_at_rest,
 )
 from fasaco_edge.review.orders import OVER, OrderChapter, cells_of, chapters, ordered_zones
-from fasaco_edge.review.rooms import RoomChapter, labels_of, room_chapters
 from fasaco_edge.review.run_data import RunData, gather
 from fasaco_edge.wire.documents.settings import FleetSettings, known_settings
 from fasaco_edge.wire.topics import TURNS
@@ -73,8 +77,7 @@ def read_review(
         UnreadableRecording: a file is missing, no recording, or without samples.
         DifferentRuns: the parts are not of one run.
     """
-    total, numbers = count_frames(paths), count(1)
-    record = read_run_record(paths, lambda: progress("reading", next(numbers), total))
+    record = read_run_record(paths, lambda *amounts: progress("reading", *amounts))
     samples = RecordedSamples((), record.batches)
     # The number of the last batch's first sample approximates the number of samples.
     about = max(batch.place.first for batch in record.batches) + 1

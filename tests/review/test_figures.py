@@ -37,7 +37,7 @@ def shares(drawn, counted):
         )
         for at_s, covered, cells in counted
     ]
-    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
+    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, {}, np.zeros(2), ())
     return review_of(record, RunData(statuses=statuses), 0)
 
 
@@ -118,5 +118,5 @@ def test_counts_by_code_go_on_after_a_restart():
         "metrics/errors/wrong_frame": np.array([(0, 1), (1, 3), (2, 1), (3, 2)], np.float64),
         "metrics/latency/plan": np.array([(0, 9)], np.float64),
     }
-    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
+    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, {}, np.zeros(2), ())
     assert faults_of(RunData(), record).by_code == {"wrong_frame": 5}

@@ -158,7 +158,7 @@ def test_progress_is_told(parts):
         "following the robot",
     ]
     reading = [(done, total) for what, done, total in told if what == "reading"]
-    assert [done for done, _ in reading] == list(range(1, len(reading) + 1))
+    assert [done for done, _ in reading] == sorted({done for done, _ in reading})
     # Frames that only tell how to show it, many in so small a file, are stepped over.
     assert len(reading) <= reading[0][1]
 

@@ -18,15 +18,14 @@ from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.instant import scene_at
-from fasaco_edge.review.output.answer_rows import instant_rows
+from fasaco_edge.review.floor import swept_floor
+from fasaco_edge.review.instant import direction, heading_from, scene_at
+from fasaco_edge.review.output.answers import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, spots_left
-from fasaco_edge.review.turn import direction, heading_from
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import FloorReport
@@ -87,8 +86,7 @@ def parts(tmp_path_factory):
             status("idle", "waits for an order")
             tell("command", encode_json({"command": "start", "order": ORDER}))
             status("covering", "path 1")
-            saved = {"saved_by_velocity_s": {"6": 14.0}, "saved_by_local_search_s": 2.0}
-            path(1, "first plan", [0.45, 2.0], ants=32, **saved)
+            path(1, "first plan", [0.45, 2.0])
             for x in np.arange(0.45, 1.4, 0.15):
                 tell("pose", pose_bytes(float(x), Y))
             tell("map", map_bytes(ground()))
@@ -152,14 +150,6 @@ def test_what_of_the_map_changed_and_which_commands_came(review):
     told = dict(instant_rows(instant))
     assert told["order"].startswith("zone a, keep out of")
     assert "seen for the first time" in told["map"]
-
-
-def test_what_found_the_path_is_said(review):
-    instant = scene_at(review, review.data.paths[0].at_s).instant
-    planned = dict(instant_rows(instant))["planned"]
-    assert planned.startswith("1 at 0:0")
-    found = "ants of velocity 6 saved 14.0 s, local search saved 2.0 s"
-    assert planned.endswith(f": first plan; aco, 32 ants; {found}")
 
 
 def test_before_anything_came_nothing_is_told(review):

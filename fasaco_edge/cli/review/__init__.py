@@ -46,7 +46,7 @@ examples:
   fasaco-edge review night.rrd --at 1:00 --png at.png  why did the robot turn round there?
   fasaco-edge review night.rrd --point 2.55,0.24       why is this spot (x, y) [m] not swept?
   fasaco-edge review night.rrd --against last.rrd --png both.png
-  fasaco-edge review night.rrd --export night --export-as parquet
+  fasaco-edge review night.rrd --export night
   fasaco-edge serve night.rrd                          the mission in a browser, at any time
 """
 
@@ -99,7 +99,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=_time,
         metavar="MM:SS",
         help="answer what was at this time since the recording began: robot, paths before and "
-        "after, what of the map changed, commands, trail; --png draws it",
+        "after, what of the map changed, commands; --png draws it",
     )
     parser.add_argument(
         "--point",
@@ -120,16 +120,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--export",
         type=Path,
         metavar="DIR",
-        help="write tables: trail, paths and their points, plans, commands, states, coverage, "
-        "floor swept, rooms, pheromone, plots; columns.csv says what they hold, in what units; "
-        "the map as .npz",
-    )
-    parser.add_argument(
-        "--export-as",
-        choices=("csv", "parquet"),
-        default="csv",
-        help="what the tables are written as; Parquet keeps types and describes its columns itself "
-        "(default: %(default)s)",
+        help="write tables as CSV: trail, paths and their points, states, coverage, pheromone, "
+        "plots; columns.csv has the meaning and unit of each column; map and swept floor as .npz",
     )
 
 
@@ -175,7 +167,7 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.review.output.export import export
 
         with naming(args.export):
-            written = export(review, args.export, args.export_as)
+            written = export(review, args.export)
         width = max(len(str(file)) for file, _ in written)
         for file, what in written:
             terminal.err().print(f"{file!s:{width}}  {what}", soft_wrap=True, highlight=False)
@@ -192,7 +184,7 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
 
     from fasaco_edge.recording.read.robot_clock import clock
     from fasaco_edge.review.instant import scene_at
-    from fasaco_edge.review.output import answer_rows
+    from fasaco_edge.review.output import answers
     from fasaco_edge.review.output.pictures import draw_scene, draw_spots
     from fasaco_edge.review.spot import explain
 
@@ -205,17 +197,17 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
     scene = None if args.at is None else scene_at(review, args.at)
     spots = explain(review, args.point or ())
     if args.json:
-        answers = {"at": scene.instant if scene else None, "points": spots}
-        found = answers | {"time_scale": clock_of_robot.scale}
+        found: dict[str, object] = {"at": scene.instant if scene else None, "points": spots}
+        found["time_scale"] = clock_of_robot.scale
         print_json(msgspec.to_builtins(found))
     else:
         if clock_of_robot.words:
             console.print(f"{clock_of_robot.words}: times are the robot's")
         if scene is not None:
             console.print(f"at {clock(args.at)}", style="bold")
-            console.print(terminal.figures(answer_rows.instant_rows(scene.instant)))
+            console.print(terminal.figures(answers.instant_rows(scene.instant)))
         for spot in spots:
-            console.print(terminal.figures(answer_rows.spot_rows(spot)))
+            console.print(terminal.figures(answers.spot_rows(spot)))
     if args.png:
         picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
         _save(picture, review, args.png)

@@ -21,7 +21,7 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
-from fasaco_edge.review.output.verdicts import verdicts
+from fasaco_edge.review.output.answers import verdicts
 from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import one_line
 
