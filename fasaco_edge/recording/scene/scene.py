@@ -30,7 +30,7 @@ from fasaco_edge.recording.scene.layers import (
     is_far_from,
     size_in_file,
 )
-from fasaco_edge.recording.scene.runcard import UNDER_WAY, Outcome, RunDescription
+from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
@@ -176,10 +176,6 @@ class Scene:
         self._add_configuration(status)
         self._add_restored(status.ledger.restored_cells)
         self._areas.add_report(status.mission)
-        if status.state not in UNDER_WAY:
-            # A later time puts the plans first: a viewer sorts lines of the same time by entity.
-            self._paths.finish()
-            self._writer.at(self._writer.wall_ns + 1)
         self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
         self._add_troubles(status)
         self._add_errors(status.errors)
@@ -210,12 +206,10 @@ class Scene:
         """Make the drawings that are due; call it often."""
         self._layers.catch_up(self._writer.wall_ns)
         self._driven.catch_up()
-        self._paths.catch_up()
 
     def finish(self) -> None:
         """Make all waiting drawings, and fit the view to the final map."""
         self._layers.finish()
-        self._paths.finish()
         self._driven.finish()
         if self._robot is not None:
             self._mark(entities.END, self._robot, draw.END_COLOUR)

@@ -25,9 +25,14 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
-from fasaco_edge.recording.write.inbox import QUEUE_BYTES, Inbox, afforded_bytes
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.process import Output, record
+from fasaco_edge.recording.write.process import (
+    QUEUE_BYTES,
+    Inbox,
+    Output,
+    afforded_bytes,
+    record,
+)
 from fasaco_edge.text import is_reported
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json

@@ -13,9 +13,8 @@ from pathlib import Path
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
-from fasaco_edge.recording.write.part import Flush, Part
+from fasaco_edge.recording.write.part import Flush, LatchedState, Part, send_blueprint, sweep
 from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.streams import LatchedState, send_blueprint, sweep
 
 LOG = logging.getLogger(__name__)
 
