@@ -14,7 +14,6 @@ import numpy as np
 from msgspec import UNSET
 from numpy.typing import NDArray
 
-from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
@@ -163,8 +162,9 @@ class Replans:
         return sorted(timed, key=lambda path: -(path.plan_ms or 0.0))
 
     def milliseconds(self, percent: float) -> float | None:
-        """Return a percentile of the durations [ms], by nearest rank."""
-        return percentile([p.plan_ms for p in self.later if p.plan_ms is not None], percent)
+        """Return a percentile of the durations [ms], by nearest rank; None without any."""
+        took = [path.plan_ms for path in self.later if path.plan_ms is not None]
+        return float(np.percentile(took, percent, method="inverted_cdf")) if took else None
 
 
 def kind_of(reason: str) -> str:
