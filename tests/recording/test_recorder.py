@@ -261,7 +261,8 @@ def test_an_area_that_is_none_does_not_end_it(tmp_path):
             area = {"name": "a", "polygon": polygon}
             order = {"zones": [area], "keep_out": [polygon]}
             command.put(encode_json({"command": "start", "order": order}))
-            mission = {"keep_outs": [area, {"name": "b", "polygon": [[0, 0], [1, 1]]}]}
+            mission = {"zones": [area]}
+            mission["keep_outs"] = [area, {"name": "b", "polygon": [[0, 0], [1, 1]]}]
             status.put(encode_json({"state": "covering", "mission": mission}))
         recorder.written(2 * len(polygons))
         assert recorder.process.poll() is None

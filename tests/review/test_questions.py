@@ -80,6 +80,7 @@ def parts(tmp_path_factory):
             def status(state, reason, **more):
                 said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
                 mission = {"zones": [{"name": "a", "polygon": ZONE}] if sent > 2 else []}
+                mission["keep_outs"] = [{"polygon": KEEP_OUT, "by": "order"}] if sent > 2 else []
                 tell("status", encode_json(said | {"mission": mission | more}))
 
             tell("map", map_bytes(seen_first()))

@@ -33,7 +33,12 @@ from fasaco_edge.fleet.recording.scene import FleetScene
 from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import NO_MAP
-from fasaco_edge.recording.write.process import Output, afforded_bytes, record
+from fasaco_edge.recording.write.process import (
+    BusRecorder,
+    Output,
+    afforded_bytes,
+    record,
+)
 from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -72,19 +77,19 @@ def run_fleet_recorder(
     )
 
 
-class FleetRecorder:
+class FleetRecorder(BusRecorder):
     """Connection of the bus to the writer: ``step`` takes samples, writes and draws them."""
 
     def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
         self._fleet = fleet
         self._schema = config.pose.schema
         recording = output.begin(file_name(fleet), build_layout((), NO_MAP))
-        self._writer, self._clock = recording.writer, recording.clock
+        self.writer, self._clock = recording.writer, recording.clock
         self._began_ns = recording.began_ns
         self._title = f"fleet {fleet} {recording.began} UTC"
-        self._writer.describe(self._title)
+        self.writer.describe(self._title)
         self._members = Members()
-        self._scene = FleetScene(self._writer, self._members)
+        self._scene = FleetScene(self.writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
         self._subscriptions = FleetSubscriptions(
             bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post
@@ -107,11 +112,11 @@ class FleetRecorder:
     def step(self, timeout_s: float) -> None:
         """Write and draw what arrives within ``timeout_s`` [s], and all drawings that are due."""
         for received in self._gathered(self._inbox.take(timeout_s)):
-            self._writer.message(received.arrival.wall_ns)
+            self.writer.message(received.arrival.wall_ns)
             self._attempt(received)
-            self._writer.sync(time.monotonic_ns())
+            self.writer.sync(time.monotonic_ns())
         now_ns = self._clock.now_ns()
-        self._writer.at(now_ns)
+        self.writer.at(now_ns)
         if now_ns >= self._next_note_ns:
             self._next_note_ns = now_ns + NOTE_NS
             self._note(now_ns)
@@ -120,19 +125,18 @@ class FleetRecorder:
             self._write()
         self._subscriptions.ask_for_maps([member.name for member in self._members], now_ns)
         self._scene.catch_up()
-        self._writer.sync(time.monotonic_ns())
+        self.writer.sync(time.monotonic_ns())
 
     def end(self) -> bool:
-        """Write waiting data and the footer; False if the disk fails."""
         self._gathers = False
         for received in self._gathered(self._inbox.take(0.0)):
             self._attempt(received)
         now_ns = self._clock.now_ns()
-        self._writer.at(now_ns)
+        self.writer.at(now_ns)
         self._note(now_ns)
         self._write()
         self._scene.finish()
-        return self._writer.close()
+        return self.writer.close()
 
     def _gathered(self, arrived: list[Received]) -> list[Received]:
         """Return the samples to process now.
@@ -156,13 +160,7 @@ class FleetRecorder:
         first, self._first = self._first, []
         return sorted(first, key=lambda received: received.robot)
 
-    @property
-    def hangs(self) -> bool:
-        """Whether Rerun would hang when the interpreter exits."""
-        return self._writer.hangs
-
     def note(self, line: str) -> None:
-        """Log a fault that occurred before the recording began."""
         self._scene.add_line(line, "WARN")
 
     def _attempt(self, received: Received) -> None:
@@ -273,16 +271,16 @@ class FleetRecorder:
 
     def _write(self) -> None:
         """Write the notes gathered; in a new part also the cells of earlier parts."""
-        if self._part != self._writer.part_number:
-            self._part = self._writer.part_number
-            at_ms = self._notes[0].at_ms if self._notes else self._ms(self._writer.wall_ns)
+        if self._part != self.writer.part_number:
+            self._part = self.writer.part_number
+            at_ms = self._notes[0].at_ms if self._notes else self._ms(self.writer.wall_ns)
             self._notes = [*(in_force(member, at_ms) for member in self._members), *self._notes]
         if not self._notes:
             return
         robots = [noted(member) for member in self._members]
         batch = NoteBatch(NOTES_VERSION, self._began_ns, self._fleet, robots, self._notes)
         self._notes = []
-        if not self._writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
+        if not self.writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
             # The next part repeats all cells.
             self._part = 0
 

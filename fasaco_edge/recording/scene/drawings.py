@@ -10,7 +10,6 @@ from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds, Polygon, Pose2D
-from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, MissionOrder
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.layers import Anchor, Layers
@@ -150,7 +149,7 @@ Named = tuple[str, Polygon | None]
 
 
 class AreaDrawing:
-    """Draws the outlines of rooms, of zones, and of the keep-outs of order and operator.
+    """Draws the outlines of rooms, of zones, and of keep-outs, if they have changed.
 
     Args:
         writer: writes the drawings.
@@ -162,57 +161,41 @@ class AreaDrawing:
         self, writer: RecordingWriter, layers: Layers, anchored: Callable[[Pose2D], Anchor]
     ) -> None:
         self._writer, self._layers, self._anchored = writer, layers, anchored
-        # The order of the last command, and the operator's keep-outs and zones of the last status.
-        self._order = EVERYTHING_ONCE
-        self._kept_out: list[Named] = []
-        self._zones: list[Named] = []
-        self._rooms: Sequence[Named] = ()
-
-    def begin(self, order: MissionOrder) -> None:
-        """Draw the zones of a new order."""
-        self._order, self._zones = order, []
-        self._draw()
+        self._newest: dict[str, Sequence[Named]] = {}
 
     def add_report(self, report: MissionReport) -> None:
-        """Draw zones and keep-outs, if they have changed."""
-        kept_out: list[Named] = [
-            (f"keep out: {keep_out.name}", keep_out.polygon)
-            for keep_out in report.keep_outs
-            if keep_out.by == "operator"
+        """Draw the zones and keep-outs of a mission."""
+        kept_out = [
+            (f"keep out: {each.name}" if each.name else "keep out", each.polygon)
+            for each in report.keep_outs
         ]
-        zones: list[Named] = [(zone.name, zone.polygon) for zone in report.zones if zone.polygon]
-        if (kept_out, zones) != (self._kept_out, self._zones):
-            self._kept_out, self._zones = kept_out, zones
-            self._draw()
-
-    def add_rooms(self, named: Sequence[Named]) -> None:
-        """Draw the rooms, if they have changed."""
-        if named == self._rooms:
-            return
-        self._rooms = named
-
-        def draw_rooms() -> None:
-            self._writer.log(entities.ROOMS, self._polygons(draw.ROOM, named), latched=True)
-
-        points = sum(len(outline or ()) for _, outline in named)
-        size = 2 * POINT_BYTES * points
-        self._layers.draw(entities.ROOMS, size, draw_rooms, self._writer.wall_ns)
-
-    def _draw(self) -> None:
-        order = self._order
-        # The order may name a zone or room; the status then has its polygon.
-        zones = self._zones or [(zone.name, zone.polygon) for zone in order.zones]
-        keep_out = [*(("keep out", polygon) for polygon in order.keep_out), *self._kept_out]
-        for entity, style, polygons in (
-            (entities.ZONES, draw.ZONE, zones),
-            (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
+        zones = [(zone.name, zone.polygon) for zone in report.zones]
+        for entity, areas, style in (
+            (entities.ZONES, zones, draw.ZONE),
+            (entities.KEEP_OUT, kept_out, draw.KEEP_OUT),
         ):
-            self._writer.log(entity, self._polygons(style, polygons), latched=True)
+            if self._is_new(entity, areas):
+                self._draw(entity, areas, style)
 
-    def _polygons(self, style: draw.LineStyle, polygons: Sequence[Named]) -> rr.LineStrips3D:
+    def add_rooms(self, rooms: Sequence[Named]) -> None:
+        """Draw rooms."""
+        if self._is_new(entities.ROOMS, rooms):
+            size = 2 * POINT_BYTES * sum(len(outline or ()) for _, outline in rooms)
+            self._layers.draw(
+                entities.ROOMS,
+                size,
+                lambda: self._draw(entities.ROOMS, rooms, draw.ROOM),
+                self._writer.wall_ns,
+            )
+
+    def _is_new(self, entity: str, areas: Sequence[Named]) -> bool:
+        before, self._newest[entity] = self._newest.get(entity, []), areas
+        return before != areas
+
+    def _draw(self, entity: str, areas: Sequence[Named], style: draw.LineStyle) -> None:
         placed = [
             (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
-            for name, corners in polygons
+            for name, corners in areas
             if corners
         ]
-        return draw.polygons_archetype(placed, style)
+        self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)

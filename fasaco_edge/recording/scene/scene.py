@@ -116,13 +116,10 @@ class Scene:
         self._writer.log(entity, draw.mark_archetype(pose, name, colour), latched=True)
 
     def add_command(self, command: Command) -> None:
-        """Log a command accepted by the mission; draw the zones of the new order."""
+        """Log a command accepted by the mission."""
         which = f" {command.keep_out.name!r}" if command.keep_out else ""
         which += f" {command.room.id!r}" if command.room else ""
         self.add_line(entities.MISSION_LOG, f"command: {command.name}{which}")
-        if command.name in ("start", "cancel", "reset"):
-            # The order of the other two commands is empty: the zones are removed.
-            self._areas.begin(command.order)
 
     def add_rooms(self, found: Rooms) -> None:
         """Draw the outlines of the rooms, with their names."""

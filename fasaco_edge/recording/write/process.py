@@ -17,12 +17,12 @@ from __future__ import annotations
 import os
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus, open_bus
@@ -136,24 +136,26 @@ class Inbox:
         self._waiting = kept
 
 
-class BusRecorder(Protocol):
-    """Connects the bus to a writer."""
+class BusRecorder(ABC):
+    """The connection of the bus to a writer."""
 
+    writer: RecordingWriter
+
+    @abstractmethod
     def note(self, line: str) -> None:
         """Log a fault in the recording."""
 
+    @abstractmethod
     def listen(self) -> None:
         """Subscribe to all recorded topics."""
 
+    @abstractmethod
     def step(self, timeout_s: float) -> None:
         """Record samples that arrive within ``timeout_s`` [s], and drawings that are due."""
 
+    @abstractmethod
     def end(self) -> bool:
         """Write waiting samples and the footer; False if the disk fails."""
-
-    @property
-    def hangs(self) -> bool:
-        """Whether Rerun would hang when the interpreter exits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +224,7 @@ def record(
         while not stop.is_set():
             recorder.step(TAKE_TIMEOUT_S)
         code = 0 if recorder.end() else EXIT_STALLED
-    if recorder.hangs:
+    if recorder.writer.hangs:
         # All recoverable data are saved.
         os._exit(code)
     return code

@@ -262,7 +262,7 @@ def test_a_later_part_can_be_read_alone(studio):
     studio.until(lambda: studio.joined("r1"))
     studio.pass_time(1.2)
     studio.recorder._write()
-    studio.recorder._writer._begin_part()
+    studio.recorder.writer._begin_part()
     robot.tell(cells=[(row, 5) for row in range(10)])
     studio.pass_time(1.3)
     first, second = studio.parts()
