@@ -41,7 +41,7 @@ END: Final = "world/trail/end"
 """Marks of the first pose and of the last one."""
 
 LATENCY: Final = "metrics/latency"
-COVERED_FRACTION: Final = "metrics/coverage/covered"
+COVERED_FRACTION: Final = "metrics/coverage/of_order"
 SWEPT: Final = "metrics/floor/swept_m2"
 RECOVERED_FRACTION: Final = "metrics/coverage/recovered"
 SAVED: Final = "metrics/saved"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeGuard
 
 import msgspec
 
@@ -96,46 +95,20 @@ def setup_words(setup: list[Difference]) -> str:
 
 
 def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object]:
-    """Return two documents, and the differences of their set-ups and of their numbers."""
+    """Return two documents, and the differences of their set-ups."""
     setup = setup_differences(one, other)
-    this, that = (msgspec.to_builtins(document) for document in (one, other))
     return {
-        "recording": this,
-        "against": that,
+        "recording": msgspec.to_builtins(one),
+        "against": msgspec.to_builtins(other),
         "setup": [dict(zip(("what", "recording", "against"), each, strict=True)) for each in setup],
         "compare": not other_problem(setup),
-        "difference": differences(this, that),
     }
-
-
-def differences(one: Mapping[str, object], other: Mapping[str, object]) -> dict[str, object]:
-    """Return the first number minus the second one, for each number in both documents."""
-    found: dict[str, object] = {}
-    for name, value in one.items():
-        mate = other.get(name)
-        if isinstance(value, dict) and isinstance(mate, dict):
-            if inner := differences(value, mate):
-                found[name] = inner
-        elif _is_number(value) and _is_number(mate):
-            found[name] = round(value - mate, 6)
-    return found
 
 
 def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
     """Return the figures of two runs side by side, with the difference of numbers."""
     pairs = zip(figures(one), figures(other), strict=True)
     return [(mine.name, mine.text, theirs.text, mine.less(theirs)) for mine, theirs in pairs]
-
-
-def reason_counts(documents: Sequence[ReviewDocument]) -> list[tuple[str, list[int]]]:
-    """Return each kind of reason for a replan, and the number of such replans in each run."""
-    counts = [document.replans_by_reason for document in documents]
-    kinds = dict.fromkeys(kind for count in counts for kind in count)
-    return [(kind, [count.get(kind, 0) for count in counts]) for kind in kinds]
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from fasaco_edge.recording.read.run import (
     TimedText,
     read_run_record,
 )
+from fasaco_edge.recording.scene.runcard import cells_of
 from fasaco_edge.review.floor import (
     MILESTONES,
     RoomChapter,
@@ -44,7 +45,7 @@ from fasaco_edge.review.moments import (
     spans_of,
     troubles_at_rest,
 )
-from fasaco_edge.review.orders import OVER, OrderChapter, cells_of, chapters, ordered_zones
+from fasaco_edge.review.orders import OVER, OrderChapter, chapters, ordered_zones
 from fasaco_edge.review.run_data import RunData, gather
 from fasaco_edge.wire.documents.settings import FleetSettings, known_settings
 from fasaco_edge.wire.topics import TURNS
@@ -151,29 +152,22 @@ class Review:
     def covered_share(self) -> NDArray[np.float64]:
         """Times [s] and covered shares of the cells coverable at the end, float64 (n, 2).
 
-        The recorded curve has a point every two seconds: a share of all cells coverable at that
-        time. The statuses, four a minute and one at the end, count all cells, and those of the
-        order.
+        The recorded curve has a point every two seconds: a share of the cells coverable at that
+        time. The statuses, four a minute and one at the end, count them.
         """
         known = [
-            (each.at_s, *cells, count.covered, count.coverable, status.state in OVER)
+            (each.at_s, *cells, each.status.state in OVER)
             for each in self.data.statuses
-            if (cells := cells_of(status := each.status)) and (count := status.coverage)
+            if (cells := cells_of(each.status))
         ]
         if not known or not known[-1][2]:
             return np.zeros((0, 2))
-        at_s, covered, coverable, of_all, all_cells, is_over = np.array(known, np.float64).T
+        at_s, covered, coverable, is_over = np.array(known, np.float64).T
         drawn = self.record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
         # The curve lags behind a little: its points after the end of an order are left out.
         before = np.searchsorted(at_s, drawn[:, 0], side="right") - 1
         drawn = drawn[(before < 0) | (is_over[before] == 0)]
-        # Between two statuses, the cells of zones are interpolated in proportion to all cells.
-        now = np.searchsorted(at_s, drawn[:, 0], side="right").clip(1, len(at_s)) - 1
-        then = np.minimum(now + 1, len(at_s) - 1)
-        since = drawn[:, 1] * np.interp(drawn[:, 0], at_s, all_cells) - of_all[now]
-        gain = (covered[then] - covered[now]) / np.maximum(of_all[then] - of_all[now], 1.0)
-        is_zoned = (covered != of_all) | (coverable != all_cells)
-        more = covered[now] + since * np.where(is_zoned[now], gain.clip(0.0, 1.0), 1.0)
+        more = drawn[:, 1] * np.interp(drawn[:, 0], at_s, coverable)
         points = np.vstack([np.column_stack((drawn[:, 0], more)), np.column_stack((at_s, covered))])
         points[:, 1] /= coverable[-1]
         found: NDArray[np.float64] = points[np.argsort(points[:, 0], kind="stable")]

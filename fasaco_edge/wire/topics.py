@@ -135,7 +135,7 @@ COVERAGE = Topic(
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
     qos=Qos("data_low", cache=1),
-    queues=Queues(recorder=NEWEST, watch=NEWEST),
+    queues=Queues(watch=NEWEST),
     limits=("max_grid_cells",),
 )
 FLOOR = Topic(

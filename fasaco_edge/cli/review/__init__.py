@@ -253,8 +253,8 @@ def _epilog() -> str:
     for line in explanations():
         lines += textwrap.wrap(line, 96, initial_indent="  ", subsequent_indent="      ")
     lines += textwrap.wrap(
-        "With --against it holds two of them, `recording` and `against`, and of all numbers that "
-        "both have the `difference`, the first less the second.",
+        "With --against it holds two of them, `recording` and `against`, their different settings, "
+        "`setup`, and whether their figures can be compared, `compare`.",
         96,
     )
     lines += textwrap.wrap(OF_A_FLEET, 96)

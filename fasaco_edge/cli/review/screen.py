@@ -15,7 +15,6 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import (
     compared_rows,
-    reason_counts,
     setup_differences,
     setup_words,
 )
@@ -99,11 +98,6 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     _print_table(console, "Set-up", ("", *names), setup)
     compared = compared_rows(one, other)
     _print_table(console, "Two runs", ("", *names, "difference"), compared)
-    counts = [
-        (kind, str(mine), str(theirs), f"{mine - theirs:+d}")
-        for kind, (mine, theirs) in reason_counts([one, other])
-    ]
-    _print_table(console, "Reasons of replans", ("reason", *names, "difference"), counts)
     for document in (one, other):
         for _, text in rows.clock_rows(document):
             _say(console, f"{document.recording}: its clock is {text}")

@@ -19,7 +19,6 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import TrailAttachment
-from fasaco_edge.wire.messages.maps import CoverageValue
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
@@ -189,15 +188,6 @@ def polygons_archetype(
     strips = [np.column_stack((xy, np.full(len(xy), style.z))) for xy in closed]
     names = [name for name, _ in polygons]
     return rr.LineStrips3D.from_fields(strips=strips, labels=names, show_labels=True)
-
-
-def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:
-    """Return the fractions of the coverable cells that are covered, and covered more than once."""
-    counts = np.bincount(grid.cells.view(np.uint8).ravel(), minlength=256)
-    recovered = int(counts[CoverageValue.RECOVERED])
-    covered = int(counts[CoverageValue.COVERED]) + recovered
-    coverable = int(counts[CoverageValue.TO_COVER]) + covered
-    return (covered / coverable, recovered / coverable) if coverable else (0.0, 0.0)
 
 
 def grid_archetype(

@@ -13,6 +13,7 @@ from msgspec.structs import asdict
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
+from fasaco_edge.recording.scene.runcard import cells_of
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment
@@ -126,6 +127,13 @@ class StatusFigures:
             self._curves.draw(entities.BATTERY, 100 * status.battery.level, BATTERY_NOISE)
         if status.floor is not None:
             self._curves.draw(entities.SWEPT, status.floor.swept_m2, spacing_ns=COUNT_SPACING_NS)
+        cells, counts = cells_of(status), status.coverage
+        if cells is not None and cells[1]:
+            share = cells[0] / cells[1]
+            self._curves.draw(entities.COVERED_FRACTION, share, spacing_ns=SHARE_SPACING_NS)
+        if counts is not None and counts.coverable:
+            again = counts.recovered / counts.coverable
+            self._curves.draw(entities.RECOVERED_FRACTION, again, spacing_ns=SHARE_SPACING_NS)
         if status.path is not None and status.path.line_gap is not None:
             self._curves.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
         by_code = status.errors.by_code

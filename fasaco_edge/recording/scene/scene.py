@@ -19,7 +19,6 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import (
     COUNT_SPACING_NS,
     NOISE,
-    SHARE_SPACING_NS,
     Curves,
     StatusFigures,
 )
@@ -133,12 +132,6 @@ class Scene:
         anchor = anchor or Anchor()
         self._paths.add(anchor.path(message), anchor.attachment(about))
         self._figures.add_path(about)
-
-    def add_coverage(self, grid: OccupancyGrid) -> None:
-        """Plot the share of the covered cells."""
-        covered, recovered = draw.coverage_fractions(grid)
-        self._curves.draw(entities.COVERED_FRACTION, covered, spacing_ns=SHARE_SPACING_NS)
-        self._curves.draw(entities.RECOVERED_FRACTION, recovered, spacing_ns=SHARE_SPACING_NS)
 
     def add_floor(self, grid: OccupancyGrid) -> None:
         """Tint the swept floor."""

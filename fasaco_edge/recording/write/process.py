@@ -27,11 +27,10 @@ from pathlib import Path
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import release_unused, return_soon, stop_event
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.sdk import rrb
-from fasaco_edge.recording.write.quota import DiskBudget, next_run
+from fasaco_edge.recording.write.quota import DiskBudget, cannot_record, next_run
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.topic_types import NEWEST
 from fasaco_edge.wire.topics import TOPICS
@@ -235,7 +234,5 @@ def _repaired(folder: Path) -> list[str]:
     try:
         repairs = repair_folder(folder)
     except OSError as error:
-        raise BadConfiguration(
-            f"cannot record into {folder}: {error}", hint="name a folder that may be written to"
-        ) from error
+        raise cannot_record(folder, error) from error
     return [str(repair) for repair in repairs]

@@ -78,7 +78,7 @@ class Recorder(BusRecorder):
         if capacity < QUEUE_BYTES:
             self.note(f"memory is limited: samples above {capacity / 1e6:.1f} MB are not recorded")
         scene = self._scene
-        grids = {"map": scene.add_map, "coverage": scene.add_coverage, "floor": scene.add_floor}
+        grids = {"map": scene.add_map, "floor": scene.add_floor}
         self._drawers: dict[str, Callable[[Sample], None]] = {
             **{topic: partial(_draw_grid, draw) for topic, draw in grids.items()},
             "map_update": lambda sample: scene.add_map_update(decode_map_update(sample.payload)),
