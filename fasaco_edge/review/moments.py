@@ -12,7 +12,6 @@ from itertools import groupby, pairwise
 import msgspec
 import numpy as np
 from msgspec import UNSET
-from numpy.typing import NDArray
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RunRecord
@@ -201,7 +200,7 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     recorders = [each.status.recorder for each in data.statuses]
     lost = [recorder.lost for recorder in recorders if recorder and recorder.lost is not UNSET]
     return Faults(
-        by_code=dict(sorted(_plotted(record.plots).items())),
+        by_code=_totals([each.status.errors.by_code for each in data.statuses]),
         lost=max(lost, default=None),
         complaints=tuple(
             line
@@ -212,12 +211,9 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     )
 
 
-def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> dict[str, int]:
-    """Return the total of each error's curve, by code; a restart of the daemon resets curves."""
-    counts: dict[str, int] = {}
-    for entity, points in plots.items():
-        if entity.startswith(f"{entities.ERRORS}/"):
-            values = points[:, 1]
-            ended = values[:-1][np.diff(values) < 0]
-            counts[entity.removeprefix(f"{entities.ERRORS}/")] = round(ended.sum() + values[-1])
-    return counts
+def _totals(counted: Sequence[Mapping[str, int]]) -> dict[str, int]:
+    """Return the total of each count, which a restart of the daemon resets."""
+    total = Counter[str]()
+    for before, now in pairwise((*counted, {})):
+        total.update({code: count for code, count in before.items() if now.get(code, 0) < count})
+    return dict(sorted(total.items()))

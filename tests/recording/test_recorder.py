@@ -200,7 +200,6 @@ def test_the_numbers_of_statuses_and_paths_are_curves(recorded):
     revision = recorded.mission.revision
     assert set(curve(entities.PROCESSOR)) == {20.0}
     assert len(curve(entities.GAP)) == revision
-    assert curve(f"{entities.ERRORS}/malformed_message") == [2]
 
 
 def test_the_map_is_not_mirrored(recorded):

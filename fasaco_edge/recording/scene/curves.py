@@ -6,7 +6,6 @@ once a second takes five megabytes an hour, whatever its content.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 from msgspec.structs import asdict
@@ -100,9 +99,6 @@ SHARE_SPACING_NS = 2_000_000_000
 COUNT_SPACING_NS = 30_000_000_000
 # Shortest period over which processor time is averaged [s].
 LEAST_SHARE_S = 30.0
-# Limit on the error codes drawn: a faulty daemon must not fill the recording.
-MOST_CODES = 50
-_CODE = re.compile(r"[a-z_]{1,40}")
 
 SAVED = (entities.SAVED_BY_ANTS, entities.SAVED_BY_LOCAL_SEARCH)
 
@@ -125,8 +121,6 @@ class StatusFigures:
         self._add_process(status)
         if status.battery is not None and status.battery.level is not None:
             self._curves.draw(entities.BATTERY, 100 * status.battery.level, BATTERY_NOISE)
-        if status.floor is not None:
-            self._curves.draw(entities.SWEPT, status.floor.swept_m2, spacing_ns=COUNT_SPACING_NS)
         cells, counts = cells_of(status), status.coverage
         if cells is not None and cells[1]:
             share = cells[0] / cells[1]
@@ -136,10 +130,6 @@ class StatusFigures:
             self._curves.draw(entities.RECOVERED_FRACTION, again, spacing_ns=SHARE_SPACING_NS)
         if status.path is not None and status.path.line_gap is not None:
             self._curves.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
-        by_code = status.errors.by_code
-        for code in sorted(filter(_CODE.fullmatch, by_code))[:MOST_CODES]:
-            entity = f"{entities.ERRORS}/{code}"
-            self._curves.draw(entity, by_code[code], spacing_ns=COUNT_SPACING_NS)
 
     def add_path(self, about: PathAttachment) -> None:
         """Draw the quality of a planned path."""
