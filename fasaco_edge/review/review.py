@@ -176,8 +176,7 @@ class Review:
     @property
     def cells(self) -> tuple[int, int] | None:
         """The daemon's last counts of covered and of reachable cells of the order, if known."""
-        counted = (cells_of(each.status) for each in reversed(self.data.statuses))
-        return next((cells for cells in counted if cells is not None), None)
+        return self.data.last(cells_of)
 
     @property
     def complete(self) -> bool | None:
@@ -188,8 +187,7 @@ class Review:
     def troubles(self) -> list[Span]:
         """The periods with a fault of mission or recorder, in order."""
         mission = [span for span in self.states if span.name in TROUBLES]
-        end_s = _end_s(self.record, self.data)
-        mission += troubles_at_rest(self.data.statuses, end_s)
+        mission += troubles_at_rest(self.data.statuses, self.duration_s)
         recorder = [
             replace(span, name=f"recorder: {span.name}")
             for span in self.recorder_states

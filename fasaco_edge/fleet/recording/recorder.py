@@ -53,8 +53,6 @@ NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
 # Robots that send within this time of the first robot [ns] are numbered in the order of their
 # names; largest number of messages that wait until then.
 GATHER_NS, MOST_GATHERED = 2_000_000_000, 1_000
-# Number of notes over which a robot's rate of messages is averaged for the plot.
-RATE_NOTES = 5
 # Number of unknown robots and topics whose faults are counted separately.
 MOST_FAULTS = 256
 TOO_LARGE = "what is larger than its share of the memory is left out, its map, say"
@@ -99,9 +97,7 @@ class FleetRecorder(BusRecorder):
         self._poses: dict[str, PoseDecoder] = {}
         self._pending: dict[str, PendingNote] = {}
         self._notes: list[Note] = []
-        self._rates: dict[str, list[int]] = {}
         self._next_note_ns = self._next_write_ns = self._began_ns
-        self._noted_ns = self._began_ns
         self._part = 0
         self._faults: Counter[tuple[str, str]] = Counter()
 
@@ -240,8 +236,6 @@ class FleetRecorder(BusRecorder):
 
     def _note(self, now_ns: int) -> None:
         """Note and show what arrived since the last note."""
-        passed_s = max(1e-9 * (now_ns - self._noted_ns), 1e-3)
-        self._noted_ns = now_ns
         for member in self._members:
             traffic = self._inbox.traffic(member.name)
             if traffic.too_large:
@@ -251,15 +245,7 @@ class FleetRecorder(BusRecorder):
             counts = traffic.messages, traffic.bytes
             note = self._pending[member.name].note(member, self._ms(now_ns), now_ns, counts)
             self._notes.append(note)
-            rates = self._rates.setdefault(member.name, [])
-            rates.append(traffic.bytes)
-            del rates[:-RATE_NOTES]
-            figures = {
-                "left_cells": float(note.open_cells),
-                "kb_s": round(sum(rates) / len(rates) / passed_s / 1000, 2),
-            }
-            if note.plans_ms:
-                figures["plan_ms"] = max(note.plans_ms)
+            figures = {"left_cells": float(note.open_cells)}
             if note.swept:
                 figures["swept_m2"] = member.swept.count * member.seat.cell_m**2
                 self._scene.add_cells(member)

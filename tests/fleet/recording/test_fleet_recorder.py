@@ -108,7 +108,14 @@ def test_each_robot_even_a_late_one_has_a_tree_of_its_own(studio):
     (part,) = studio.parts()
     assert is_fleet_recording(part)
     found = read_summary(part).rows
-    for name in ("world/map", "world/swept", "world/robot", "world/trail", "state", "metrics/kb_s"):
+    for name in (
+        "world/map",
+        "world/swept",
+        "world/robot",
+        "world/trail",
+        "state",
+        "metrics/left_cells",
+    ):
         assert found.get(f"robots/r1/{name}"), name
     assert found["robots/late/world/swept"]
     assert not [name for name in found if "stranger" in name]
