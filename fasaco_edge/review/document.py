@@ -129,7 +129,7 @@ class ReviewDocument(msgspec.Struct):
         samples_missing: number of samples missing, by gaps in their sequence numbers.
         unreadable: number of samples in the recording that could not be decoded, by topic.
         remarks: warnings in the recorder's log.
-        not_recorded: why a figure is null.
+        not_recorded: why figures of the floor, or of the daemon, are null.
     """
 
     recording: str = ""

@@ -183,16 +183,6 @@ def _not_recorded(review: Review) -> dict[str, str]:
         why[FLOOR] = "no pose lies on the map"
     if known_settings(data.config).fleet.name and review.by_others is None:
         why["swept_by_others_m2"] = "no message of another robot was recorded"
-    if data.ledger_floor is None:
-        why["ledger_swept_m2, left_by_reason, out_of_reach_by_reason"] = (
-            "no recorded status has figures of the floor"
-        )
-    if data.counts is None:
-        why["covered_cells, coverable_cells, recovered_cells"] = "no recorded status counts cells"
-    if not review.replans.later:
-        why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"
-    if review.faults.lost is None:
-        why["recorder_lost"] = "no recorded status has figures of the recorder"
     return why
 
 

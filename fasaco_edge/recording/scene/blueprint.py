@@ -60,7 +60,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
-        overrides={entities.DRIVEN_PATH: so_far()},
+        overrides={entities.DRIVEN_PATH: up_to_cursor()},
     )
 
 
@@ -162,19 +162,11 @@ def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D
     )
 
 
-def last_seconds(seconds: float) -> rrb.VisibleTimeRanges:
-    """Return the range of the last ``seconds`` [s] before the cursor."""
+def up_to_cursor(seconds: float | None = None) -> rrb.VisibleTimeRanges:
+    """Return the range of the last ``seconds`` [s] before the cursor; None for all before it."""
+    since = rrb.TimeRangeBoundary.infinite()
+    if seconds is not None:
+        since = rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds)
     return rrb.VisibleTimeRanges(
-        timeline=entities.WALL_CLOCK,
-        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
-    )
-
-
-def so_far() -> rrb.VisibleTimeRanges:
-    """Return the range from the beginning up to the cursor."""
-    return rrb.VisibleTimeRanges(
-        timeline=entities.WALL_CLOCK,
-        start=rrb.TimeRangeBoundary.infinite(),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
+        timeline=entities.WALL_CLOCK, start=since, end=rrb.TimeRangeBoundary.cursor_relative()
     )
