@@ -28,7 +28,6 @@ from fasaco_edge.recording.read.run import (
     POSES,
     STATUSES,
     RecordedSamples,
-    RunRecord,
     read_run_record,
 )
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
@@ -41,22 +40,20 @@ class Timeline:
     """Drawings and samples of a recording, in order of time.
 
     Attributes:
+        clock: conversion of the recording's times to the robot's.
         ended_ns: end of the recording, since the epoch [ns].
         samples: statuses, commands, rooms and digests of paths.
         pose_ns, poses: times int64 (n,) [ns], and float64 (n, 3): x [m], y [m], yaw [rad].
     """
 
+    clock: RobotClock
     ended_ns: int
     samples: Sequence[Arrival]
     pose_ns: NDArray[np.int64]
     poses: NDArray[np.float64]
-    _record: RunRecord
+    _drawn: Mapping[str, Sequence[Place]]
+    _anchor: NDArray[np.float64]
     _files: Mapping[Path, int]
-
-    @property
-    def clock(self) -> RobotClock:
-        """Conversion of the recording's times to the robot's."""
-        return self._record.clock
 
     @property
     def began_ns(self) -> int:
@@ -65,7 +62,7 @@ class Timeline:
 
     def newest(self, entity: str, at_ns: int) -> Place | None:
         """Return the last drawing of an entity up to a time [ns]; None before the first one."""
-        places = self._record.drawn.get(entity, ())
+        places = self._drawn.get(entity, ())
         index = bisect_right(places, at_ns, key=lambda place: place.at_ns)
         return places[index - 1] if index else None
 
@@ -97,7 +94,7 @@ class Timeline:
     def _read(self, read: Reader[Drawn], place: Place) -> Drawn:
         try:
             batch = chunk_at(self._files[place.path], place.offset).batch
-            return next(read(batch.slice(place.row, 1), self._record.anchor))
+            return next(read(batch.slice(place.row, 1), self._anchor))
         except BROKEN as error:
             raise UnreadableRecording(f"the recording can no longer be read: {error}") from error
 
@@ -111,15 +108,25 @@ def open_timeline(paths: Sequence[Path]) -> Iterator[Timeline]:
         DifferentRuns: the parts are not of one run.
     """
     with ExitStack() as files:
-        record = read_run_record(paths)
-        opened = {path: files.enter_context(path.open("rb")).fileno() for path in paths}
-        statuses, poses, kept = (
-            RecordedSamples((), record.batches, topics) for topics in (STATUSES, POSES, KEPT)
-        )
-        found = sorted(poses_of(known_of(statuses), poses), key=lambda one: one[0])
-        samples = sorted(kept, key=lambda one: one.wall_ns)
-        ended_ns = max([record.ended_ns, *(one.wall_ns for one in samples[-1:])])
-        pose_ns = np.array([at_ns for at_ns, _ in found], np.int64)
-        places = [(each.pose.x, each.pose.y, each.pose.yaw) for _, each in found]
-        at = np.array(places, np.float64).reshape(-1, 3)
-        yield Timeline(ended_ns, samples, pose_ns, at, record, opened)
+        yield _timeline(paths, files)
+
+
+def _timeline(paths: Sequence[Path], files: ExitStack) -> Timeline:
+    record = read_run_record(paths)
+    statuses, poses, kept = (
+        RecordedSamples((), record.batches, topics) for topics in (STATUSES, POSES, KEPT)
+    )
+    found = sorted(poses_of(known_of(statuses), poses), key=lambda one: one[0])
+    samples = sorted(kept, key=lambda one: one.wall_ns)
+    places = [(each.pose.x, each.pose.y, each.pose.yaw) for _, each in found]
+    return Timeline(
+        clock=record.clock,
+        ended_ns=max([record.ended_ns, *(one.wall_ns for one in samples[-1:])]),
+        samples=samples,
+        pose_ns=np.array([at_ns for at_ns, _ in found], np.int64),
+        poses=np.array(places, np.float64).reshape(-1, 3),
+        # Not the whole record, whose samples take much memory.
+        _drawn=record.drawn,
+        _anchor=record.anchor,
+        _files={path: files.enter_context(path.open("rb")).fileno() for path in paths},
+    )
