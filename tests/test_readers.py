@@ -66,9 +66,9 @@ SAYS = {
     "budget_s in (": r"(\{.*'gap'.*\}\n){3}",
     "from mine import": r"mine\.py:depth_first 666 333 \d+\n\(\d+, \d+\) 667 cells\n",
     "observe=fields.append": r"(\d \d+ \d\.\d+ at \(-?\d+\.\d+, -?\d+\.\d+\) m\n){8}",
-    "pheromone.parquet": r"\d+ fields; the last has \d+ cells,\nthe strongest at \(.*\) m\n"
+    "pheromone.csv": r"\d+ fields; the last has \d+ cells,\nthe strongest at \(.*\) m\n"
     r"from 0\.\d+ to \d\.\d+\n",
-    "floor.parquet": r"monday (\{.*\})\ntuesday \1\n",
+    "end.npz": r"monday( .*)\ntuesday\1\n",
 }
 # Nothing takes so long but on a machine that is busy with much else [s].
 TIMEOUT_S = 600.0

@@ -293,7 +293,6 @@ def recorded(folder: Path) -> Path:
     rr.set_time(entities.WALL_CLOCK, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream)
     for entity in (entities.MISSION_LOG, entities.BUS_LOG, entities.RECORDER_LOG):
         rr.log(entity, rr.TextLog(TAINT), recording=part.stream)
-    rr.log(f"{entities.ERRORS}/{SCRIPT.replace('/', '')}", rr.Scalars(3.0), recording=part.stream)
     part.write_blob(encoder.take(), BEGAN_NS)
     part.flush(30.0)
     part.close()

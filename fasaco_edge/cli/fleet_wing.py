@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fasaco_edge.fleet.mission.travel import apart
     from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
     from fasaco_edge.fleet.review.drawing import draw_fleet_mission
-    from fasaco_edge.fleet.review.others import swept_by_others
+    from fasaco_edge.fleet.review.tracks import swept_by_others
 
 __all__ = [
     "apart",
@@ -36,7 +36,7 @@ _PLACES = {
     "fleet_on_bus": "cli.watch",
     "print_fleet": "cli.review",
     "run_fleet_recorder": "recording.recorder",
-    "swept_by_others": "review.others",
+    "swept_by_others": "review.tracks",
 }
 
 

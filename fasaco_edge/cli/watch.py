@@ -84,8 +84,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _watch_robot(args: argparse.Namespace, keys: Keys, bus: BusSettings) -> None:
     from fasaco_edge.client.feed import Feed
-    from fasaco_edge.watch.robot_view import RobotView
-    from fasaco_edge.watch.robot_watch import RobotWatch
+    from fasaco_edge.watch.page import RobotWatch
+    from fasaco_edge.watch.picture import RobotView
 
     view = RobotView(keys.robot)
     with Feed(bus, keys) as feed:
@@ -110,7 +110,8 @@ def _watch(
 
 def _once(args: argparse.Namespace, watched: Watched, no_answer: Callable[[], FasacoError]) -> None:
     if not live.look_once(watched, args.timeout):
-        raise BusUnavailable(watched.trouble) if watched.trouble else no_answer()
+        trouble = watched.view.trouble
+        raise BusUnavailable(trouble) if trouble else no_answer()
     if args.json:
         live.print_json(watched.document())
         return

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.plot import MAX_HEIGHT, MAX_WIDTH, MapLayer, Plot, View, bounds_of
-from fasaco_edge.drawing.rooms import number_rooms, paint_rooms
+from fasaco_edge.drawing.floor import ENDS, draw_visits, number_rooms, paint_rooms, visits_of
+from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
-from fasaco_edge.drawing.visits import ENDS, draw_visits, visits_of
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.grid.lattice import CoverageLattice
@@ -243,7 +242,6 @@ def draw_mission(
     *,
     title: str,
     lines: Sequence[str],
-    space: tuple[int, int] = (MAX_WIDTH, MAX_HEIGHT),
     driven: NDArray[np.bool_] | None = None,
     swept: MapLayer | None = None,
     unswept: MapLayer | None = None,
@@ -261,7 +259,6 @@ def draw_mission(
         visits: number of visits of each cell, uint16, shape of the lattice; None with ``swept``.
         title: heading.
         lines: caption below it.
-        space: largest size of the map (width, height) [px].
         driven: which positions are joined with the next one, bool (n - 1,); None for all.
         swept: reachable floor that was swept, drawn instead of visited cells; None for the cells.
         unswept: reachable floor that was not swept; None if not known.
@@ -269,7 +266,7 @@ def draw_mission(
         zones, keep_out: polygons of the order [m].
         rooms: names and outlines [m].
     """
-    plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m, *space))
+    plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     if swept is None:

@@ -250,16 +250,8 @@ class Plot:
     def _spread(
         self, lattice: CoverageLattice, values: NDArray[np.uint8], outside: Colour | int
     ) -> Image.Image:
-        step = 1 / (self.view.samples_per_metre * lattice.cell_m)
-        col = self.view.left / lattice.cell_m - lattice.window.col0
-        row = self.view.top / lattice.cell_m - lattice.window.row0
-        return Image.fromarray(values).transform(
-            self._size,
-            Image.Transform.AFFINE,
-            (step, 0, col, 0, -step, row),
-            Image.Resampling.NEAREST,
-            fillcolor=outside,
-        )
+        geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
+        return self._placed(geometry, values, outside)
 
     def _rule(self, layer: Image.Image, cell_m: float) -> None:
         view, draw, (width, height) = self.view, ImageDraw.Draw(layer), self._size

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from fasaco_edge.recording.arrow import missing_rerun
+from fasaco_edge.recording.read.frames import missing_rerun
 
 # Rerun's allocator, mimalloc, keeps 130 MB of freed memory an hour unless this is set at import.
 os.environ.setdefault("MIMALLOC_PURGE_DELAY", "0")

@@ -2,35 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeGuard
 
 import msgspec
 
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.drive import MILESTONES
-from fasaco_edge.review.wording import NOT_KNOWN, count
+from fasaco_edge.review.floor import MILESTONES
 
-# Names of the compared settings, and their keys in the configuration.
-SETTINGS = {
-    "tool width": "robot.tool_width_m",
-    "robot radius": "robot.radius_m",
-    "overlap": "robot.overlap",
-    "line": "planner.line",
-    "planner": "planner.name",
-    "own planner": "planner.own",
-    "seed": "planner.seed",
-    "turn time": "robot.quarter_turn_s",
-    "turn rate": "robot.turn_deg_s",
-    "turn acceleration": "robot.turn_deg_s2",
-    "acceleration": "robot.acceleration_m_s2",
-    "simulated seconds per second": "robot.time_scale",
-}
-# Settings whose difference makes floor, cells and times incomparable.
-ANOTHER_PROBLEM = ("tool width", "robot radius", "overlap", "line", "building", "orders")
+# Differences that make floor, cells and times incomparable.
+ANOTHER_PROBLEM = (
+    *("robot.tool_width_m", "robot.radius_m", "robot.overlap", "planner.line"),
+    *("building", "orders"),
+)
+NOT_KNOWN = "not known"
 # Most difference between the sides of two maps of the same building [m].
 SIDE_M = 1.0
 
@@ -49,20 +36,31 @@ NUMBERS = (
     ("replan, median", "replan_ms_p50", "ms"),
     ("replan, p99", "replan_ms_p99", "ms"),
     ("replan, slowest", "replan_ms_max", "ms"),
-    ("plans made", "plans", ""),
-    ("plans not used", "plans_unused", ""),
-    ("attempts at a better path", "attempts", ""),
-    ("attempts that succeeded", "attempts_used", ""),
     ("peak memory of the daemon", "memory_mb_max", "MB"),
     ("peak memory of the recorder", "recorder_memory_mb_max", "MB"),
     ("processor time of the daemon", "processor_s", "s"),
     ("processor time of the recorder", "recorder_processor_s", "s"),
-    ("peak processor load", "processor_percent_max", "% of a core"),
     ("messages refused", "faults", ""),
     ("lost by the recorder", "recorder_lost", "samples"),
     ("samples missing", "samples_missing", ""),
 )
 """Name of each figure, its member of ``ReviewDocument``, and its unit."""
+
+
+def amount(value: float | None, unit: str) -> str:
+    """Return a value with its unit."""
+    if value is None:
+        return NOT_KNOWN
+    digits = 0 if abs(value) >= 100 or value == round(value) else 1 if abs(value) >= 10 else 2
+    return f"{value:,.{digits}f} {unit}".rstrip()
+
+
+def count(value: float | None, unit: str) -> str:
+    """Return a value with its unit: a whole number with all digits, others with one decimal."""
+    if value is None:
+        return NOT_KNOWN
+    text = f"{value:,}" if isinstance(value, int) else f"{value:,.1f}"
+    return f"{text} {unit}".rstrip()
 
 
 def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Difference]:
@@ -71,7 +69,7 @@ def setup_differences(one: ReviewDocument, other: ReviewDocument) -> list[Differ
     for name, mine, theirs in (
         ("robot", one.robot, other.robot),
         ("version", one.version, other.version),
-        *((name, one.config.get(key), other.config.get(key)) for name, key in SETTINGS.items()),
+        *((key, value, other.config.get(key)) for key, value in one.config.items()),
         ("orders", len(one.orders), len(other.orders)),
     ):
         if mine is not None and theirs is not None and mine != theirs:
@@ -97,46 +95,20 @@ def setup_words(setup: list[Difference]) -> str:
 
 
 def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object]:
-    """Return two documents, and the differences of their set-ups and of their numbers."""
+    """Return two documents, and the differences of their set-ups."""
     setup = setup_differences(one, other)
-    this, that = (msgspec.to_builtins(document) for document in (one, other))
     return {
-        "recording": this,
-        "against": that,
+        "recording": msgspec.to_builtins(one),
+        "against": msgspec.to_builtins(other),
         "setup": [dict(zip(("what", "recording", "against"), each, strict=True)) for each in setup],
         "compare": not other_problem(setup),
-        "difference": differences(this, that),
     }
-
-
-def differences(one: Mapping[str, object], other: Mapping[str, object]) -> dict[str, object]:
-    """Return the first number minus the second one, for each number in both documents."""
-    found: dict[str, object] = {}
-    for name, value in one.items():
-        mate = other.get(name)
-        if isinstance(value, dict) and isinstance(mate, dict):
-            if inner := differences(value, mate):
-                found[name] = inner
-        elif _is_number(value) and _is_number(mate):
-            found[name] = round(value - mate, 6)
-    return found
 
 
 def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
     """Return the figures of two runs side by side, with the difference of numbers."""
     pairs = zip(figures(one), figures(other), strict=True)
     return [(mine.name, mine.text, theirs.text, mine.less(theirs)) for mine, theirs in pairs]
-
-
-def reason_counts(documents: Sequence[ReviewDocument]) -> list[tuple[str, list[int]]]:
-    """Return each kind of reason for a replan, and the number of such replans in each run."""
-    counts = [document.replans_by_reason for document in documents]
-    kinds = dict.fromkeys(kind for count in counts for kind in count)
-    return [(kind, [count.get(kind, 0) for count in counts]) for kind in kinds]
-
-
-def _is_number(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True, slots=True)

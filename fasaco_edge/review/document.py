@@ -12,19 +12,11 @@ import msgspec
 from fasaco_edge.text import percent
 
 if TYPE_CHECKING:
+    from fasaco_edge.recording.read.run import PartFile
+    from fasaco_edge.review.floor import RoomChapter
     from fasaco_edge.review.moments import Stand
     from fasaco_edge.review.orders import CommandThen, OrderChapter
-    from fasaco_edge.review.rooms import RoomChapter
     from fasaco_edge.review.spot import LeftPatch
-
-
-class RecordedFile(msgspec.Struct):
-    """A file of a recording."""
-
-    path: str
-    bytes: int
-    torn_bytes: int
-    ended: bool
 
 
 class MapSize(msgspec.Struct):
@@ -40,20 +32,13 @@ class MapSize(msgspec.Struct):
         return self.cols * self.resolution_m, self.rows * self.resolution_m
 
 
-class TimesTaken(msgspec.Struct):
-    """The median and the slowest of some replans [ms]."""
-
-    p50: float | None
-    max: float | None
-
-
 class Trouble(msgspec.Struct):
     """A period with a fault."""
 
     state: str
     reason: str
-    at_s: float | None
-    seconds: float | None
+    at_s: float
+    seconds: float
 
 
 class Charge(msgspec.Struct, frozen=True):
@@ -122,19 +107,13 @@ class ReviewDocument(msgspec.Struct):
         first_plan_ms: duration of the first plan [ms].
         replan_ms_p50, replan_ms_p99, replan_ms_max: percentiles of the duration of replans, by
             nearest rank [ms].
-        replan_ms_by_reason: median (p50) and longest (max) duration by kind of reason [ms].
         replan_list: each replan: at_s, revision, reason, plan_ms, steps (to drive); of its plan,
             from the robot's position at that time: planned_steps, lower_bound_steps, cost_s (time
             of driving it, by the configuration), lower_bound_cost_s and gap (cost_s /
             lower_bound_cost_s - 1); changed, the changed rectangle of the map that caused it [m].
-        plans, plans_unused: the daemon's counts of all plans, and of plans that were not used, as
-            they equalled the current one or were outdated.
-        attempts, attempts_used: number of plans made to improve the path, and of those that did.
         memory_mb_max, recorder_memory_mb_max: peak memory of daemon and recorder [MB].
         processor_s, recorder_processor_s: total processor time of daemon and recorder, by the
             computer's clock [s].
-        processor_percent_max, threads_max: of the daemon: processor time over half a minute [% of a
-            core], threads.
         restored_cells: cells that were covered before a restart.
         states: seconds in each state.
         troubles: each period in which the mission was degraded, blocked or silent, had a trouble in
@@ -150,11 +129,11 @@ class ReviewDocument(msgspec.Struct):
         samples_missing: number of samples missing, by gaps in their sequence numbers.
         unreadable: number of samples in the recording that could not be decoded, by topic.
         remarks: warnings in the recorder's log.
-        not_recorded: why a figure is null.
+        not_recorded: why figures of the floor, or of the daemon, are null.
     """
 
     recording: str = ""
-    files: list[RecordedFile] = []
+    files: list[PartFile] = []
     robot: str | None = None
     version: str | None = None
     config: dict[str, str | float] = {}
@@ -191,18 +170,11 @@ class ReviewDocument(msgspec.Struct):
     replan_ms_p50: float | None = None
     replan_ms_p99: float | None = None
     replan_ms_max: float | None = None
-    replan_ms_by_reason: dict[str, TimesTaken] = {}
     replan_list: list[dict[str, object]] = []
-    plans: int | None = None
-    plans_unused: int | None = None
-    attempts: int | None = None
-    attempts_used: int | None = None
     memory_mb_max: float | None = None
     recorder_memory_mb_max: float | None = None
     processor_s: float | None = None
     recorder_processor_s: float | None = None
-    processor_percent_max: float | None = None
-    threads_max: float | None = None
     restored_cells: int = 0
     states: dict[str, float] = {}
     troubles: list[Trouble] = []

@@ -11,15 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
 from fasaco_edge.review.document import (
     Charge,
     MapSize,
-    RecordedFile,
     ReviewDocument,
-    TimesTaken,
     Trouble,
 )
 from fasaco_edge.review.orders import commands_of
@@ -38,10 +35,7 @@ def document_of(review: Review) -> ReviewDocument:
     began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
     document = ReviewDocument(
         recording=record.recording_id,
-        files=[
-            RecordedFile(str(part.path), part.bytes, part.torn_bytes, part.has_footer)
-            for part in record.parts
-        ],
+        files=list(record.parts),
         robot=data.robot or None,
         version=data.version or None,
         config=dict(flat_settings(data.config)),
@@ -64,15 +58,11 @@ def document_of(review: Review) -> ReviewDocument:
         replan_ms_p50=_rounded(replans.milliseconds(50)),
         replan_ms_p99=_rounded(replans.milliseconds(99)),
         replan_ms_max=_rounded(replans.milliseconds(100)),
-        replan_ms_by_reason={
-            kind: TimesTaken(_rounded(median), _rounded(most))
-            for kind, (median, most) in replans.spread_by_reason.items()
-        },
         replan_list=[_replan(path) for path in replans.later],
         restored_cells=data.restored_cells,
         states={name: round(s, 3) for name, s in review.seconds_by_state.items()},
         troubles=[
-            Trouble(s.name, s.reason, _rounded(s.begin_s), _rounded(s.seconds))
+            Trouble(s.name, s.reason, round(s.begin_s, 3), round(s.seconds, 3))
             for s in review.troubles
         ],
         charges=charges_of(review),
@@ -86,11 +76,9 @@ def document_of(review: Review) -> ReviewDocument:
         not_recorded=_not_recorded(review),
     )
     _add_coverage(document, review)
-    _add_plans(document, review)
     for member, entity in PLOTTED.items():
         if (points := record.plots.get(entity)) is not None:
             setattr(document, member, _rounded(float(points[:, 1].max())))
-    document.threads_max = max((each.status.threads for each in data.statuses), default=0) or None
     document.processor_s = _rounded(_used([each.status.cpu_s for each in data.statuses]))
     of_recorder = record.plots.get(entities.RECORDER_CPU_S)
     if of_recorder is not None:
@@ -127,7 +115,6 @@ def charges_of(review: Review) -> list[Charge]:
 PLOTTED = {
     "memory_mb_max": f"{entities.MEMORY}/planner",
     "recorder_memory_mb_max": f"{entities.MEMORY}/recorder",
-    "processor_percent_max": entities.PROCESSOR,
 }
 """Members that are the maximum of a curve, and the curve."""
 
@@ -164,22 +151,6 @@ def _by_reason(floor: tuple[FloorLeft, ...] | None) -> dict[str, float] | None:
     return None if floor is None else {part.reason: part.m2 for part in floor}
 
 
-def _add_plans(document: ReviewDocument, review: Review) -> None:
-    """Add the daemon's counts of plans."""
-    plans = [each.status.plan for each in review.data.statuses]
-    if not plans:
-        return
-    document.plans = _total([plan.plans for plan in plans])
-    document.plans_unused = _total([plan.unchanged + plan.outdated for plan in plans])
-    document.attempts = _total([plan.attempts for plan in plans])
-    document.attempts_used = sum(path.about.reason == BETTER for path in review.data.paths)
-
-
-def _total(counts: Sequence[int]) -> int:
-    """Return the total of a count that restarts at 0 with each process."""
-    return counts[-1] + sum(before for before, now in pairwise(counts) if now < before)
-
-
 # Members of a path's attachment in the list of replans.
 REPLAN = (
     *("revision", "reason", "steps", "planned_steps", "lower_bound_steps", "lower_bound_cost_s"),
@@ -201,9 +172,7 @@ FLOOR = "reachable_m2, swept_m2, patches_over_4_dm2, largest_patch_m2"
 def _not_recorded(review: Review) -> dict[str, str]:
     data, why = review.data, {}
     if not data.statuses:
-        why["robot, version, config, state, plans, attempts"] = (
-            "no status of the daemon was recorded"
-        )
+        why["robot, version, config, state"] = "no status of the daemon was recorded"
     if review.lattice is None:
         why[FLOOR] = review.no_lattice
     elif review.data.restored_cells:
@@ -214,16 +183,6 @@ def _not_recorded(review: Review) -> dict[str, str]:
         why[FLOOR] = "no pose lies on the map"
     if known_settings(data.config).fleet.name and review.by_others is None:
         why["swept_by_others_m2"] = "no message of another robot was recorded"
-    if data.ledger_floor is None:
-        why["ledger_swept_m2, left_by_reason, out_of_reach_by_reason"] = (
-            "no recorded status has figures of the floor"
-        )
-    if data.counts is None:
-        why["covered_cells, coverable_cells, recovered_cells"] = "no recorded status counts cells"
-    if not review.replans.later:
-        why["replan_ms_p50, replan_ms_p99, replan_ms_max"] = "there was no replan"
-    if review.faults.lost is None:
-        why["recorder_lost"] = "no recorded status has figures of the recorder"
     return why
 
 

@@ -1,4 +1,4 @@
-"""One moment of a recorded mission: robot, paths before and after, map, command, trail.
+"""One moment of a recorded mission: robot, paths before and after, map, command.
 
 It shows why the robot acted as it did then. Maps are decoded again up to that time. Paths are
 read from their drawings; of paths in quick succession, some have none.
@@ -7,7 +7,8 @@ read from their drawings; of paths in quick succession, some have none.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -17,12 +18,13 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLabel, DrawnLine, drawings
+from fasaco_edge.recording.read.drawn import DrawnLine, lines_in, read_drawings
 from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
+from fasaco_edge.review.floor import nearest_points
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.run_data import maps_of
-from fasaco_edge.review.turn import TurnThen, heading_from, turn_at
 from fasaco_edge.wire.documents.path_documents import Rectangle
+from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
@@ -30,6 +32,29 @@ if TYPE_CHECKING:
 
 # Period before the moment in which changes of the map are reported [s].
 MAP_S = 5.0
+# Period before and after the moment in which turns are searched, and longest turn [s].
+TURN_S = 2.0
+# Least angle of a turn [deg]. Among several turns the largest angle counts, minus this many degrees
+# for each second of duration and of distance from the moment [deg/s].
+TURN_DEG, SHORTER_DEG_S = 60.0, 20.0
+# Distance ahead at which a path's heading is taken [m]; least difference of two headings [deg].
+AHEAD_M = 0.5
+APART_DEG = 60.0
+DIRECTIONS = (
+    *("east", "north-east", "north", "north-west"),
+    *("west", "south-west", "south", "south-east"),
+)
+
+
+class TurnThen(msgspec.Struct):
+    """The sharpest turn near a time: angle to the left [deg], position [m], reason."""
+
+    begin_s: float
+    end_s: float
+    degrees: float
+    x: float
+    y: float
+    why: str
 
 
 class PathThen(msgspec.Struct):
@@ -89,7 +114,6 @@ class Instant(msgspec.Struct):
     map: MapThen | None
     command: CommandThen | None
     next_command: CommandThen | None
-    trail: str
 
 
 class Scene(msgspec.Struct, frozen=True):
@@ -111,15 +135,17 @@ def scene_at(review: Review, at_s: float) -> Scene:
     record, data = review.record, review.data
     pose_index = int(np.searchsorted(data.times, at_s, side="right")) - 1
     pose = data.poses[pose_index] if pose_index >= 0 else None
-    drawn = _Drawn.read(record)
+    lines: dict[int, DrawnLine] = {}
+    for line in read_drawings(record.drawn.get(entities.PATH, ()), lines_in, record.anchor):
+        lines.setdefault(line.revision, line)
     span = next((s for s in reversed(review.states) if s.begin_s <= at_s), None)
     chapter = next((c for c in reversed(review.orders) if c.at_s <= at_s), None)
-    turn = turn_at(review, drawn.lines, at_s)
+    turn = turn_at(review, lines, at_s)
     # A turn is caused by the path at its beginning.
     place = (turn.x, turn.y) if turn else pose[:2] if pose else None
     index = sum(path.at_s <= at_s for path in data.paths) - 1
     before, path, after = (
-        _path(data.paths, number, drawn, place) for number in (index - 1, index, index + 1)
+        _path(data.paths, number, lines, place) for number in (index - 1, index, index + 1)
     )
     grid, change = _map_at(record, at_s)
     commands = commands_of(data)
@@ -141,47 +167,21 @@ def scene_at(review: Review, at_s: float) -> Scene:
         map=change,
         command=past[-1] if past else None,
         next_command=next((each for each in commands if each.at_s > at_s), None),
-        trail=drawn.trail_at(record.clock.wall_ns(at_s)),
     )
-    lines = (drawn.lines.get(each.revision if each else 0) for each in (before, path, after))
-    return Scene(instant, grid, *lines)
-
-
-class _Drawn(msgspec.Struct):
-    """Lines and labels of a run."""
-
-    lines: dict[int, DrawnLine]
-    labels: list[DrawnLabel]
-
-    @classmethod
-    def read(cls, record: RunRecord) -> _Drawn:
-        lines: dict[int, DrawnLine] = {}
-        labels: list[DrawnLabel] = []
-        wanted = (entities.PATH, entities.TRAIL_LABEL)
-        for _, one in drawings([part.path for part in record.parts], *wanted):
-            if isinstance(one, DrawnLine):
-                lines.setdefault(one.revision, one)
-            elif isinstance(one, DrawnLabel):
-                labels.append(one)
-        return cls(lines, labels)
-
-    def trail_at(self, at_ns: int) -> str:
-        """Return the text of the living trail's label; "" if there was none."""
-        past = [one for one in self.labels if one.at_ns <= at_ns]
-        newest = max(past, key=lambda one: one.at_ns, default=None)
-        return newest.text.replace("\n", "; ") if newest is not None else ""
+    shown = (lines.get(each.revision if each else 0) for each in (before, path, after))
+    return Scene(instant, grid, *shown)
 
 
 def _path(
     paths: Sequence[PathSample],
     number: int,
-    drawn: _Drawn,
+    lines: Mapping[int, DrawnLine],
     place: tuple[float, float] | None,
 ) -> PathThen | None:
     if not 0 <= number < len(paths):
         return None
     at_s, about = paths[number].at_s, paths[number].about
-    line = drawn.lines.get(about.revision)
+    line = lines.get(about.revision)
     leads = heading_from(line.xy, place) if line is not None and place is not None else None
     return PathThen(
         round(at_s, 3),
@@ -252,3 +252,82 @@ def _map_change(old: OccupancyGrid, new: OccupancyGrid, since_s: float) -> MapTh
     if window is not None:
         around = Rectangle(*(round(edge, 2) for edge in new.geometry.bounds(window)))
     return MapThen(round(since_s, 3), seen_m2, blocked_m2, freed_m2, around)
+
+
+def heading_from(line: NDArray[np.float64], place: tuple[float, float]) -> float | None:
+    """Return the heading of a line (n, 2) at its point nearest to a place, in (-180, 180] [deg].
+
+    None if the line ends there.
+    """
+    if len(line) < 2:
+        return None
+    nearest = nearest_points(line, place)
+    index = int(np.argmin(np.hypot(*(nearest - place).T)))
+    rest = np.vstack([nearest[index], line[index + 1 :]])
+    far = np.hypot(*(rest - rest[0]).T) >= AHEAD_M
+    dx, dy = (rest[int(np.argmax(far))] if far.any() else rest[-1]) - rest[0]
+    return math.degrees(math.atan2(dy, dx)) if dx or dy else None
+
+
+def turn_at(review: Review, lines: Mapping[int, DrawnLine], at_s: float) -> TurnThen | None:
+    """Return the sharpest turn near a time; None if the robot made none."""
+    data = review.data
+    times, track = data.times, data.track
+    about = np.abs(times - at_s) <= TURN_S
+    times, track = times[about], track[about]
+    if len(times) < 2:
+        return None
+    yaw = np.degrees(np.unwrap(track[:, 2]))
+    turned = yaw[None, :] - yaw[:, None]
+    seconds = times[None, :] - times[:, None]
+    # Short turns near the moment come first; so two successive turns are not taken for one.
+    away = np.abs((times[None, :] + times[:, None]) / 2 - at_s)
+    sharp = np.minimum(np.abs(turned), 180.0) - SHORTER_DEG_S * (seconds + away)
+    worth = np.where((seconds > 0) & (seconds <= TURN_S), sharp, 0.0)
+    first, last = np.unravel_index(int(np.argmax(worth)), worth.shape)
+    degrees = float(turned[first, last])
+    if abs(degrees) < TURN_DEG:
+        return None
+    x, y, _ = track[first].tolist()
+    begin_s, end_s = float(times[first]), float(times[last])
+    why = _why(data.paths, lines, (x, y), begin_s, end_s)
+    return TurnThen(
+        round(begin_s, 3), round(end_s, 3), round(degrees, 1), round(x, 3), round(y, 3), why
+    )
+
+
+def _why(
+    paths: Sequence[PathSample],
+    lines: Mapping[int, DrawnLine],
+    place: tuple[float, float],
+    begin_s: float,
+    end_s: float,
+) -> str:
+    """Return the path that caused a turn: a new path, or the one the robot followed."""
+    index = sum(path.at_s <= begin_s for path in paths) - 1
+    known = [
+        (path, heading)
+        for path in paths[max(index - 1, 0) :]
+        if path.at_s <= end_s
+        and (line := lines.get(path.about.revision)) is not None
+        and (heading := heading_from(line.xy, place)) is not None
+    ]
+    for (old, was), (new, now) in pairwise(known):
+        apart = abs(math.remainder(now - was, 360.0))
+        if new.at_s >= begin_s - TURN_S and apart > APART_DEG:
+            return (
+                f"path {new.about.revision} came ({plain(new.about.reason)}) and leads "
+                f"{direction(now)}, "
+                f"where path {old.about.revision} led {direction(was)}"
+            )
+    led = [path.about for path in paths if path.at_s <= end_s and path.about.steps]
+    if not led:
+        return "there was no path"
+    planned = next((about for about in reversed(led) if about.planner), led[-1])
+    by = f", by the plan of path {planned.revision}" if planned is not led[-1] else ""
+    return f"as planned: path {led[-1].revision} turns there{by} ({plain(planned.reason)})"
+
+
+def direction(degrees: float) -> str:
+    """Return the compass point of a heading in the map frame [deg]; 0 is east, 90 north."""
+    return DIRECTIONS[round(degrees / 45.0) % 8]

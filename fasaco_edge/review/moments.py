@@ -12,9 +12,7 @@ from itertools import groupby, pairwise
 import msgspec
 import numpy as np
 from msgspec import UNSET
-from numpy.typing import NDArray
 
-from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
@@ -157,23 +155,15 @@ class Replans:
         return dict(Counter(kind_of(path.about.reason) for path in self.later).most_common())
 
     @property
-    def spread_by_reason(self) -> dict[str, tuple[float | None, float | None]]:
-        """Median and longest duration [ms] for each kind of reason, the most frequent first."""
-        took: dict[str, list[float]] = {kind: [] for kind in self.by_reason}
-        for path in self.later:
-            if path.plan_ms is not None:
-                took[kind_of(path.about.reason)].append(path.plan_ms)
-        return {kind: (percentile(ms, 50), percentile(ms, 100)) for kind, ms in took.items()}
-
-    @property
     def slowest_first(self) -> list[PathSample]:
         """Replans with a known duration, the slowest first."""
         timed = [path for path in self.later if path.plan_ms is not None]
         return sorted(timed, key=lambda path: -(path.plan_ms or 0.0))
 
     def milliseconds(self, percent: float) -> float | None:
-        """Return a percentile of the durations [ms], by nearest rank."""
-        return percentile([p.plan_ms for p in self.later if p.plan_ms is not None], percent)
+        """Return a percentile of the durations [ms], by nearest rank; None without any."""
+        took = [path.plan_ms for path in self.later if path.plan_ms is not None]
+        return float(np.percentile(took, percent, method="inverted_cdf")) if took else None
 
 
 def kind_of(reason: str) -> str:
@@ -210,7 +200,7 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     recorders = [each.status.recorder for each in data.statuses]
     lost = [recorder.lost for recorder in recorders if recorder and recorder.lost is not UNSET]
     return Faults(
-        by_code=dict(sorted(_plotted(record.plots).items())),
+        by_code=_totals([each.status.errors.by_code for each in data.statuses]),
         lost=max(lost, default=None),
         complaints=tuple(
             line
@@ -221,12 +211,9 @@ def faults_of(data: RunData, record: RunRecord) -> Faults:
     )
 
 
-def _plotted(plots: Mapping[str, NDArray[np.float64]]) -> dict[str, int]:
-    """Return the total of each error's curve, by code; a restart of the daemon resets curves."""
-    counts: dict[str, int] = {}
-    for entity, points in plots.items():
-        if entity.startswith(f"{entities.ERRORS}/"):
-            values = points[:, 1]
-            ended = values[:-1][np.diff(values) < 0]
-            counts[entity.removeprefix(f"{entities.ERRORS}/")] = round(ended.sum() + values[-1])
-    return counts
+def _totals(counted: Sequence[Mapping[str, int]]) -> dict[str, int]:
+    """Return the total of each count, which a restart of the daemon resets."""
+    total = Counter[str]()
+    for before, now in pairwise((*counted, {})):
+        total.update({code: count for code, count in before.items() if now.get(code, 0) < count})
+    return dict(sorted(total.items()))

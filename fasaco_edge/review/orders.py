@@ -15,11 +15,11 @@ from fasaco_edge.mission.orders.order import (
     order_document,
 )
 from fasaco_edge.mission.orders.passes import passes_words
+from fasaco_edge.recording.scene.runcard import cells_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.run_data import RunData
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
-from fasaco_edge.wire.documents.status import Status
 
 ENDS = ("cancel", "reset")
 # States without an order in force: the same order would begin anew.
@@ -97,14 +97,6 @@ def chapters(data: RunData, states: Sequence[Span], end_s: float) -> tuple[Order
         # The period before the first command counts only if the mission was at work.
         if len(held) == 1 or one[4] is not None or _has_begun(states, one[1], one[2])
     )
-
-
-def cells_of(status: Status) -> tuple[int, int] | None:
-    """Return the numbers of covered and of reachable cells of the order; None if unknown."""
-    if zones := status.mission.zones:
-        return sum(zone.covered for zone in zones), sum(zone.cells for zone in zones)
-    count = status.coverage
-    return None if count is None else (count.covered, count.coverable)
 
 
 def ordered_words(orders: Sequence[OrderChapter]) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import count
 from pathlib import Path
 from typing import TypeVar
 
@@ -23,10 +22,17 @@ from fasaco_edge.recording.read.run import (
     RecordedSamples,
     RunRecord,
     TimedText,
-    count_frames,
     read_run_record,
 )
-from fasaco_edge.review.drive import MILESTONES, swept_floor, visits_of
+from fasaco_edge.recording.scene.runcard import cells_of
+from fasaco_edge.review.floor import (
+    MILESTONES,
+    RoomChapter,
+    labels_of,
+    room_chapters,
+    swept_floor,
+    visits_of,
+)
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
@@ -39,8 +45,7 @@ from fasaco_edge.review.moments import (
     spans_of,
     troubles_at_rest,
 )
-from fasaco_edge.review.orders import OVER, OrderChapter, cells_of, chapters, ordered_zones
-from fasaco_edge.review.rooms import RoomChapter, labels_of, room_chapters
+from fasaco_edge.review.orders import OVER, OrderChapter, chapters, ordered_zones
 from fasaco_edge.review.run_data import RunData, gather
 from fasaco_edge.wire.documents.settings import FleetSettings, known_settings
 from fasaco_edge.wire.topics import TURNS
@@ -73,8 +78,7 @@ def read_review(
         UnreadableRecording: a file is missing, no recording, or without samples.
         DifferentRuns: the parts are not of one run.
     """
-    total, numbers = count_frames(paths), count(1)
-    record = read_run_record(paths, lambda: progress("reading", next(numbers), total))
+    record = read_run_record(paths, lambda *amounts: progress("reading", *amounts))
     samples = RecordedSamples((), record.batches)
     # The number of the last batch's first sample approximates the number of samples.
     about = max(batch.place.first for batch in record.batches) + 1
@@ -148,29 +152,22 @@ class Review:
     def covered_share(self) -> NDArray[np.float64]:
         """Times [s] and covered shares of the cells coverable at the end, float64 (n, 2).
 
-        The recorded curve has a point every two seconds: a share of all cells coverable at that
-        time. The statuses, four a minute and one at the end, count all cells, and those of the
-        order.
+        The recorded curve has a point every two seconds: a share of the cells coverable at that
+        time. The statuses, four a minute and one at the end, count them.
         """
         known = [
-            (each.at_s, *cells, count.covered, count.coverable, status.state in OVER)
+            (each.at_s, *cells, each.status.state in OVER)
             for each in self.data.statuses
-            if (cells := cells_of(status := each.status)) and (count := status.coverage)
+            if (cells := cells_of(each.status))
         ]
         if not known or not known[-1][2]:
             return np.zeros((0, 2))
-        at_s, covered, coverable, of_all, all_cells, is_over = np.array(known, np.float64).T
+        at_s, covered, coverable, is_over = np.array(known, np.float64).T
         drawn = self.record.plots.get(entities.COVERED_FRACTION, np.zeros((0, 2)))
         # The curve lags behind a little: its points after the end of an order are left out.
         before = np.searchsorted(at_s, drawn[:, 0], side="right") - 1
         drawn = drawn[(before < 0) | (is_over[before] == 0)]
-        # Between two statuses, the cells of zones are interpolated in proportion to all cells.
-        now = np.searchsorted(at_s, drawn[:, 0], side="right").clip(1, len(at_s)) - 1
-        then = np.minimum(now + 1, len(at_s) - 1)
-        since = drawn[:, 1] * np.interp(drawn[:, 0], at_s, all_cells) - of_all[now]
-        gain = (covered[then] - covered[now]) / np.maximum(of_all[then] - of_all[now], 1.0)
-        is_zoned = (covered != of_all) | (coverable != all_cells)
-        more = covered[now] + since * np.where(is_zoned[now], gain.clip(0.0, 1.0), 1.0)
+        more = drawn[:, 1] * np.interp(drawn[:, 0], at_s, coverable)
         points = np.vstack([np.column_stack((drawn[:, 0], more)), np.column_stack((at_s, covered))])
         points[:, 1] /= coverable[-1]
         found: NDArray[np.float64] = points[np.argsort(points[:, 0], kind="stable")]
@@ -179,8 +176,7 @@ class Review:
     @property
     def cells(self) -> tuple[int, int] | None:
         """The daemon's last counts of covered and of reachable cells of the order, if known."""
-        counted = (cells_of(each.status) for each in reversed(self.data.statuses))
-        return next((cells for cells in counted if cells is not None), None)
+        return self.data.last(cells_of)
 
     @property
     def complete(self) -> bool | None:
@@ -191,8 +187,7 @@ class Review:
     def troubles(self) -> list[Span]:
         """The periods with a fault of mission or recorder, in order."""
         mission = [span for span in self.states if span.name in TROUBLES]
-        end_s = _end_s(self.record, self.data)
-        mission += troubles_at_rest(self.data.statuses, end_s)
+        mission += troubles_at_rest(self.data.statuses, self.duration_s)
         recorder = [
             replace(span, name=f"recorder: {span.name}")
             for span in self.recorder_states

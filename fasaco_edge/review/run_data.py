@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_g
 from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
+Part = TypeVar("Part")
 # Smaller areas may come from the noise of poses and times [m2].
 SURELY_SWEPT_M2 = 0.1
 
@@ -117,17 +119,20 @@ class RunData:
         before_m2 = m2 - tool_m * (length_m + tool_m)
         return before_m2 if before_m2 > SURELY_SWEPT_M2 else 0.0
 
+    def last(self, part: Callable[[Status], Part | None]) -> Part | None:
+        """Return a part of the last status that has it; None if none has."""
+        found = (part(each.status) for each in reversed(self.statuses))
+        return next((one for one in found if one is not None), None)
+
     @property
     def counts(self) -> CoverageReport | None:
-        """The daemon's last count of cells; None if there is none."""
-        counted = (each.status.coverage for each in reversed(self.statuses))
-        return next((count for count in counted if count is not None), None)
+        """The daemon's last count of cells."""
+        return self.last(lambda status: status.coverage)
 
     @property
     def ledger_floor(self) -> FloorReport | None:
-        """The daemon's last report of the floor; None if there is none."""
-        floors = (each.status.floor for each in reversed(self.statuses))
-        return next((floor for floor in floors if floor is not None), None)
+        """The daemon's last report of the floor."""
+        return self.last(lambda status: status.floor)
 
     @property
     def keep_out(self) -> tuple[Polygon, ...]:

@@ -31,18 +31,18 @@ from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine, drawings
+from fasaco_edge.recording.read.drawn import DrawnLine, lines_in, read_drawings
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.review.drive import nearest_points, swept_floor
+from fasaco_edge.review.floor import nearest_points, swept_floor
 from fasaco_edge.review.run_data import maps_of
-from fasaco_edge.review.wording import SWEPT_BY_OTHERS
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
     from fasaco_edge.review.review import Review
 
+SWEPT_BY_OTHERS = "swept by others"
 # A path sweeps a spot this far inside the edge of the tool [m].
 NEAR_M = 0.02
 # The mission's reason for a path with the same walk and another line.
@@ -142,9 +142,9 @@ class _Recorded:
     @cached_property
     def paths(self) -> list[DrawnLine]:
         """The drawn paths, in order of time."""
-        parts = [part.path for part in self._review.record.parts]
-        found = [one for _, one in drawings(parts, entities.PATH) if isinstance(one, DrawnLine)]
-        return sorted((one for one in found if len(one.xy)), key=lambda one: one.at_ns)
+        record = self._review.record
+        places = record.drawn.get(entities.PATH, ())
+        return [one for one in read_drawings(places, lines_in, record.anchor) if len(one.xy)]
 
 
 class _Judge:

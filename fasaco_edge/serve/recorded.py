@@ -15,8 +15,8 @@ from fasaco_edge.client.robot_state import SILENCE_S
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine
-from fasaco_edge.recording.read.timeline import Place, Timeline
+from fasaco_edge.recording.read.drawn import DrawnLine, Place
+from fasaco_edge.recording.read.timeline import Timeline
 from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.served_view import MOST_POINTS, PERIODS_S, ServedView
 from fasaco_edge.wire.documents.json_text import decode_tolerant

@@ -10,6 +10,7 @@ import sys
 import termios
 import time
 import tty
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from types import FrameType
 from typing import Any, Protocol, Self, TextIO
@@ -27,41 +28,54 @@ LINE_EVERY_S = 1.0
 MOST_COLUMNS, MOST_LINES = 800, 400
 
 
-class Watched(Protocol):
-    """Object of a watch: one robot, or a fleet.
+class View(Protocol):
+    """The newest data of a robot or a fleet.
+
+    Attributes:
+        events: the latest events.
+        trouble: why the bus cannot be reached; "" if it can.
+    """
+
+    events: EventLog
+    trouble: str
+
+
+class Watched(ABC):
+    """A watch of one robot, or of a fleet.
 
     Attributes:
         rest_s: longest wait for complete data once something is known [s].
+        view: its newest data.
     """
 
     rest_s: float
+    view: View
 
-    @property
-    def events(self) -> EventLog:
-        """The latest events."""
-
-    @property
-    def trouble(self) -> str:
-        """Why the bus cannot be reached; "" if it can."""
-
+    @abstractmethod
     def take(self, timeout_s: float) -> bool:
         """Take in arrivals; wait up to ``timeout_s`` [s] for one; return whether one came."""
 
+    @abstractmethod
     def documents(self) -> list[dict[str, object]]:
         """Return the JSON objects that are due after the last ``take``."""
 
+    @abstractmethod
     def document(self) -> dict[str, object]:
         """Return the present state as a JSON object."""
 
+    @abstractmethod
     def line(self, now: float) -> str:
         """Return the state in a line."""
 
+    @abstractmethod
     def page(self, now: float, width: int, height: int) -> list[str]:
         """Return a page of lines."""
 
+    @abstractmethod
     def is_known(self) -> bool:
         """Return whether there is something to show."""
 
+    @abstractmethod
     def is_whole(self) -> bool:
         """Return whether everything that a page shows is known."""
 
@@ -81,7 +95,7 @@ def watch_on_screen(
         while not stop.is_set() and go_on():
             came = watched.take(0.0)
             now = phrases.steady_now()
-            key = (int(now), screen.size(), watched.trouble)
+            key = (int(now), screen.size(), watched.view.trouble)
             if came or key != shown_at:
                 shown_at, size = key, key[1]
                 screen.show(watched.page(now, *size), size)
@@ -98,9 +112,9 @@ def watch_in_lines(watched: Watched) -> None:
         while not stop.is_set():
             watched.take(FRAME_S)
             now = phrases.steady_now()
-            for entry in watched.events.since(printed):
+            for entry in watched.view.events.since(printed):
                 _print_line(entry.at_s, entry.text)
-            printed = watched.events.count
+            printed = watched.view.events.count
             if now >= next_line_at:
                 next_line_at, line = now + LINE_EVERY_S, watched.line(now)
                 if line != last_line:

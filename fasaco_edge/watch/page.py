@@ -1,21 +1,26 @@
-"""Screen of a watched robot: picture, figures beside it, legend and the latest events."""
+"""Watch of one robot, and its screen: picture, figures beside it, legend and the latest events."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 from rich.console import Console, RenderableType
 from rich.text import Text
 
+from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import TROUBLED
+from fasaco_edge.client.feed import Feed
 from fasaco_edge.client.phrases import age, clock
+from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
-from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
-from fasaco_edge.watch.picture import MissionPicture
-from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.watch.glyphs import FAINT, Blocks, with_keys
+from fasaco_edge.watch.live import Watched
+from fasaco_edge.watch.picture import MissionPicture, RobotView
 from fasaco_edge.watch.status_table import figures, state_colour
+from fasaco_edge.wire.documents.json_text import decode_json
 
 LEGEND = (
     (picture.COVERED, "covered"),
@@ -156,3 +161,66 @@ def headline(view: RobotView, now: float, width: int) -> Text:
         scale = view.settings.robot.time_scale
         line.append(f"  {scale:g} x real time" if scale != 1.0 else "", "dim")
     return with_keys(line, width, "q quits", clock(now))
+
+
+class RobotWatch(Watched):
+    """The watch of one robot."""
+
+    rest_s = 1.0
+    view: RobotView
+
+    def __init__(self, feed: Feed, view: RobotView, console: Console) -> None:
+        self._feed, self.view = feed, view
+        self._page = Page(console)
+        self._statuses: list[bytes] = []
+
+    def take(self, timeout_s: float) -> bool:
+        items = self._feed.take(timeout_s)
+        now = phrases.steady_now()
+        for topic, item in items:
+            self.view.take(topic, item, now)
+        self._statuses = [
+            item.payload for topic, item in items if topic == "status" and isinstance(item, Sample)
+        ]
+        self.view.trouble = self._feed.trouble
+        return bool(items)
+
+    def documents(self) -> list[dict[str, object]]:
+        """Return the statuses that the last ``take`` received."""
+        found = []
+        for payload in self._statuses:
+            # The view reports unreadable statuses.
+            with suppress(MalformedMessage):
+                found.append(decode_json(payload))
+        return found
+
+    def document(self) -> dict[str, object]:
+        """Return the newest status."""
+        return decode_json(self.view.document)
+
+    def line(self, now: float) -> str:
+        view, status = self.view, self.view.status
+        if view.trouble:
+            return f"waiting for the bus at {one_line(view.trouble)}"
+        if view.gone_since is not None:
+            return "waiting for the daemon to return"
+        if not view.is_here:
+            return f"waiting for a daemon of robot {view.robot}"
+        if status is None:
+            return "no status from the daemon yet"
+        if view.silent_s(now):
+            return "the daemon is silent"
+        fraction = status.coverage.fraction if status.coverage else 0.0
+        return f"{percent(fraction)} of cells  {phrases.figures(status)}"
+
+    def page(self, now: float, width: int, height: int) -> list[str]:
+        return self._page.lines(self.view, now, width, height)
+
+    def is_known(self) -> bool:
+        """Return whether a status of the robot's daemon has arrived."""
+        return self.view.status is not None and self.view.is_here
+
+    def is_whole(self) -> bool:
+        """Return whether map, coverage and path are known."""
+        view = self.view
+        return view.map is not None and view.coverage is not None and view.walk.revision > 0

@@ -30,8 +30,6 @@ LONGEST_BAR = 40
 LABEL_WIDTH = 9
 # Largest number of rooms shown.
 MOST_ROOMS = 12
-# Width from which optional parts are shown [characters].
-WIDE = 30
 
 
 def figures(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet) -> Table:
@@ -66,8 +64,6 @@ def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet
         rows.append(("twice", _text(_cells(status.coverage.recovered))))
     if status.floor is not None:
         rows += _floor(status.floor)
-    if status.path is not None:
-        rows += _plan(status.path, width)
     rows += _mission(status.mission)
     rows += _rooms(rooms)
     rows += _fleet(status.fleet)
@@ -100,17 +96,6 @@ def _path(path: PathReport, time: str) -> list[Row]:
     steps = f"{path.remaining_steps} steps"
     to_go = f"{time}, {steps}" if time else steps
     return [("to go", _text(to_go)), (number, _text(plain(path.reason)))]
-
-
-def _plan(path: PathReport, width: int) -> list[Row]:
-    if path.planned_steps is None:
-        return []
-    plan = f"{path.planned_steps} steps"
-    if path.lower_bound_steps is not None:
-        plan += f", bound {path.lower_bound_steps}"
-    if path.gap is not None and width >= WIDE:
-        plan += f", gap {100 * path.gap:.1f} % of time"
-    return [("plan", _text(plan))]
 
 
 def _mission(mission: MissionReport) -> list[Row]:
@@ -167,27 +152,16 @@ def _fleet(fleet: FleetReport | None) -> list[Row]:
 
 
 def _running(status: Status) -> list[Row]:
-    latency, errors = status.latency_ms, status.errors
-    latencies = [
-        f"{name} {milliseconds:.0f}"
-        for name, milliseconds in (
-            ("plan", latency.plan),
-            ("map to path", latency.map_to_path),
-            ("map", latency.ingest),
-        )
-        if milliseconds is not None
-    ]
+    errors = status.errors
     counted = ", ".join(f"{count} {code}" for code, count in errors.by_code.items())
-    rows: list[Row] = [
+    return [
         ("drive", _text(phrases.drive(status.drive))),
         *([("battery", _battery(status.battery))] if status.battery else []),
-        ("latency", _text(f"{', '.join(latencies)} ms" if latencies else "-")),
         ("errors", _text(counted, "red") if errors.total else _text("none")),
         ("ledger", _ledger(status)),
         ("recorder", _recorder(status.recorder)),
         ("daemon", _text(f"up {phrases.age(status.uptime_s)}, {status.rss_mb:.0f} MB")),
     ]
-    return rows
 
 
 def _battery(battery: BatteryReport) -> Text:

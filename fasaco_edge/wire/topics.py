@@ -135,7 +135,7 @@ COVERAGE = Topic(
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
     qos=Qos("data_low", cache=1),
-    queues=Queues(recorder=NEWEST, watch=NEWEST),
+    queues=Queues(watch=NEWEST),
     limits=("max_grid_cells",),
 )
 FLOOR = Topic(
@@ -183,7 +183,6 @@ DIRECTIONS = Topic(
     listeners=("viewer",),
     schemas=(schemas.OCCUPANCY_GRID,),
     qos=Qos("background", cache=1, why="as the pheromone"),
-    queues=Queues(recorder=NEWEST),
     limits=("max_grid_cells",),
 )
 ROOMS = Topic(

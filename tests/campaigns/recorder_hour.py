@@ -200,7 +200,6 @@ class Desk:
             "path": lambda sample: scene.add_path(
                 decode_path(sample.payload), decode_tolerant(sample.attachment, PathAttachment)
             ),
-            "coverage": lambda sample: scene.add_coverage(decode_occupancy_grid(sample.payload)),
             "pheromone": lambda sample: scene.add_pheromone(
                 decode_pheromone(sample.payload),
                 decode_tolerant(sample.attachment, TrailAttachment),

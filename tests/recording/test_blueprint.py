@@ -38,7 +38,7 @@ def shot(tmp_path_factory):
 
 def test_no_view_complains(shot):
     assert shot.complaints == ()
-    assert len(shot.views) == 12
+    assert len(shot.views) == 11
     assert {
         "Map, swept floor, track and path",
         "Pheromone that ants follow (bright: much), and the path of that time (white)",

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.recording.write.inbox import (
+from fasaco_edge.recording.write.process import (
     BASE_BYTES,
     BEHIND_SAMPLES,
     COPIES,

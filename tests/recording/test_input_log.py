@@ -236,14 +236,9 @@ def hear(one, bus, count):
 
 
 def test_a_recording_without_samples_is_named(tmp_path):
-    silent, drawn = Desk(tmp_path / "silent"), Desk(tmp_path / "drawn")
-    Scene(drawn.writer, RunDescription("robot", "now")).add_pose(
-        StampedPose(Pose2D(0.0, 0.0), "map", 0)
-    )
-    for desk, hint in ((silent, "check the robot's name"), (drawn, "of this release and later")):
-        with pytest.raises(UnreadableRecording, match="holds no samples") as raised:
-            RecordedSamples(desk.close())
-        assert hint in raised.value.hint
+    with pytest.raises(UnreadableRecording, match="holds no samples") as raised:
+        RecordedSamples(Desk(tmp_path / "silent").close())
+    assert "check the robot's name" in raised.value.hint
     (tmp_path / "a.rrd").write_text("hello")
     with pytest.raises(UnreadableRecording, match="no recording"):
         RecordedSamples([tmp_path / "a.rrd"])

@@ -115,14 +115,7 @@ def test_a_line_keeps_its_corners_and_loses_the_rest():
 
 
 @pytest.mark.parametrize(
-    ("steps", "words"),
-    [
-        (
-            9,
-            "9 steps to drive; ants see 1.8 ways in a cell (1: sure, 4: undecided)",
-        ),
-        (0, "nothing left to drive"),
-    ],
+    ("steps", "words"), [(9, "9 steps to drive"), (0, "nothing left to drive")]
 )
 def test_the_trail_s_label_leaves_out_what_says_nothing(steps, words):
     geometry = GridGeometry(2, 2, 0.3, Pose2D(0.0, 0.0))

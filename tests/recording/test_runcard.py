@@ -32,7 +32,7 @@ def test_settings_stand_below_by_their_names():
     ("words", "value", "line"),
     [
         (("r2", "now", "1.0"), "a|b\nc", r"| planner | a\|b\\nc |"),
-        (("[a](file:b)", "now", "![](c)"), "", r"**\[a\](file:b)**, version \!\[\](c)"),
+        (("[a](file:b)", "now", "![](c)"), "", r"| robot | \[a\](file:b) |"),
         (("r2", "now", "1.0"), "<img src=d>\x1b", r"| planner | \<img src=d\>\\x1b |"),
     ],
 )
@@ -44,11 +44,6 @@ def test_a_value_breaks_no_table_and_is_no_link(words, value, line):
 @given(st.dictionaries(st.sampled_from("abc"), JSON))
 def test_settings_of_any_type_make_a_card(config):
     RunDescription("r2", "now", "1.0", config).markdown()
-
-
-def test_the_first_line_has_robot_version_and_seed():
-    card = RunDescription("r2", "2026-01-01", "1.0", {"planner": {"seed": 7}}).markdown()
-    assert card.startswith("**r2**, version 1.0, seed 7\n")
 
 
 FLOOR = {"swept_m2": 47.7, "reachable_m2": 49.4, "left": None, "out_of_reach": None}

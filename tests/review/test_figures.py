@@ -18,7 +18,7 @@ from fasaco_edge.review.moments import (
 from fasaco_edge.review.review import review_of
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import CoverageReport
-from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.documents.status import ErrorCounts, Status
 
 
 def shares(drawn, counted):
@@ -37,7 +37,7 @@ def shares(drawn, counted):
         )
         for at_s, covered, cells in counted
     ]
-    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
+    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, {}, np.zeros(2), ())
     return review_of(record, RunData(statuses=statuses), 0)
 
 
@@ -114,9 +114,10 @@ def test_times_are_printed_as_on_a_clock():
 
 
 def test_counts_by_code_add_up_over_restarts():
-    plots = {
-        "metrics/errors/wrong_frame": np.array([(0, 1), (1, 3), (2, 1), (3, 2)], np.float64),
-        "metrics/latency/plan": np.array([(0, 9)], np.float64),
-    }
-    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, (), ())
-    assert faults_of(RunData(), record).by_code == {"wrong_frame": 5}
+    counts = ({"wrong_frame": 1}, {"wrong_frame": 3}, {"wrong_frame": 1, "odd": 1}, {"odd": 2})
+    told = [
+        StatusSample(float(at_s), Status(errors=ErrorCounts(by_code=by_code)))
+        for at_s, by_code in enumerate(counts)
+    ]
+    record = RunRecord("", (), 0, 0, RobotClock(0), {}, {}, {}, {}, np.zeros(2), ())
+    assert faults_of(RunData(statuses=told), record).by_code == {"odd": 2, "wrong_frame": 4}

@@ -13,7 +13,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.orders.zones import with_kept_out
 from fasaco_edge.review.comparison import Figure, figures
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.drive import swept_floor
+from fasaco_edge.review.floor import swept_floor
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.documents.status import LedgerReport, Status

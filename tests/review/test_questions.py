@@ -18,15 +18,14 @@ from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.drive import swept_floor
 from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.instant import scene_at
-from fasaco_edge.review.output.answer_rows import instant_rows
+from fasaco_edge.review.floor import swept_floor
+from fasaco_edge.review.instant import direction, heading_from, scene_at
+from fasaco_edge.review.output.answers import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain, spots_left
-from fasaco_edge.review.turn import direction, heading_from
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import FloorReport
@@ -81,6 +80,7 @@ def parts(tmp_path_factory):
             def status(state, reason, **more):
                 said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
                 mission = {"zones": [{"name": "a", "polygon": ZONE}] if sent > 2 else []}
+                mission["keep_outs"] = [{"polygon": KEEP_OUT, "by": "order"}] if sent > 2 else []
                 tell("status", encode_json(said | {"mission": mission | more}))
 
             tell("map", map_bytes(seen_first()))

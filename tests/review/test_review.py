@@ -121,23 +121,11 @@ def test_each_replan_says_why_and_where(told, recording):
         assert replan["changed"] == note["changed"]
         assert (note["changed"] is not None) == note["reason"].startswith(("map: ", "path blocked"))
     assert len(told["replan_list"]) == told["replans"]
-    took = [replan["plan_ms"] for replan in told["replan_list"]]
-    assert max(spread["max"] for spread in told["replan_ms_by_reason"].values()) == max(took)
-
-
-def test_plans_are_those_of_the_status(told, recording):
-    plan = recording.status["plan"]
-    assert told["plans"] == plan["plans"]
-    assert told["plans_unused"] == plan["unchanged"] + plan["outdated"]
-    assert told["attempts"] == plan["attempts"]
-    notes = {note["revision"]: note["reason"] for _, note in recording.notes}
-    assert told["attempts_used"] == list(notes.values()).count("better further on")
 
 
 def test_memory_and_threads_are_reported(told, recording):
     most = max(status["rss_mb"] for _, status in recording.statuses)
     assert told["memory_mb_max"] == pytest.approx(most, rel=0.11)
-    assert told["threads_max"] >= recording.status["threads"] > 1
     assert told["restored_cells"] == 0
     used = [status["cpu_s"] for _, status in recording.statuses]
     assert told["processor_s"] == pytest.approx(used[-1] - used[0], abs=0.05)
@@ -166,10 +154,8 @@ def test_states_match_the_recorded_statuses(told, review, recording):
     assert sum(told["states"].values()) <= told["duration_s"] + 0.01
 
 
-def test_a_moment_tells_what_the_colony_held(review):
+def test_a_moment_tells_the_path_in_force(review):
     instant = scene_at(review, 0.6 * review.duration_s).instant
-    assert instant.trail.startswith("pheromone at path ")
-    assert "; ants see " in instant.trail
     assert instant.path.at_s <= instant.at_s < (instant.path_after or instant.path).at_s + 60
 
 

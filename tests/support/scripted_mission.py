@@ -28,7 +28,7 @@ from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.maps import CoverageValue, direction_values, encode_occupancy_grid
+from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
@@ -63,10 +63,8 @@ class Mission:
         self._map = Sender(bus, topics.MAP)
         self._pose = Sender(bus, topics.POSE)
         self._path = Sender(bus, topics.PATH)
-        self._coverage = Sender(bus, topics.COVERAGE)
         self._floor = Sender(bus, topics.FLOOR)
         self._pheromone = Sender(bus, topics.PHEROMONE)
-        self._directions = Sender(bus, topics.DIRECTIONS)
         self._status = Sender(bus, topics.STATUS)
         self._rooms = Sender(bus, topics.ROOMS)
         self.walk = _walk()
@@ -74,7 +72,6 @@ class Mission:
         self.seen_cells = 0
         self.revision = 0
         self.best_steps = 0
-        self.covered = self.recovered = 0.0
         self.visits = np.zeros((ROWS // 5, COLS // 5), np.int64)
 
     @property
@@ -91,7 +88,7 @@ class Mission:
                 self.replan(done, "first map" if frame == 0 else "the map grew")
             self.drive(done)
             if frame % 4 == 0:
-                self.publish_coverage(done)
+                self.publish_floor()
                 self.publish_rooms(done)
             yield done
 
@@ -149,19 +146,6 @@ class Mission:
         note = {"revision": self.revision, "cells": 12, "branching": 2.0 - done}
         self._pheromone.put(self._field(done), json.dumps(note).encode())
 
-        # It points along the walk, up and down its columns, and is sure of that.
-        pointed = np.full((self.visits.shape[0], self.seen_cells), -1, np.int8)
-        (rows, cols), moves = cells(self.walk[:-1]), np.diff(self.walk, axis=0)
-        ways = np.select(
-            [moves[:, 0] > 0.01, moves[:, 1] > 0.01, moves[:, 0] < -0.01], [0, 1, 2], 3
-        )
-        seen = cols < self.seen_cells
-        pointed[rows[seen], cols[seen]] = ways[seen]
-        share = np.where(pointed < 0, 0, 0.75).astype(np.float32)
-        geometry = GridGeometry.of_cells(self._window(pointed), CELL_M)
-        grid = OccupancyGrid(geometry, direction_values(pointed, share))
-        self._directions.put(encode_occupancy_grid(grid))
-
     def _window(self, shown: NDArray[np.generic]) -> Window:
         col, row = (round(at / CELL_M) for at in ORIGIN)
         return Window(0, 0, *shown.shape).moved(row, col)
@@ -188,23 +172,11 @@ class Mission:
         pose = Pose2D(float(x), float(y), math.atan2(step[1], step[0]))
         self._pose.put(encode_pose_stamped(StampedPose(pose, "map", _stamp())))
 
-    def publish_coverage(self, done: float) -> None:
-        """Publish how often the robot was where, as far as the building is known."""
-        grid = coverage(self.visits, blocked_cells(done))
-        values = grid.cells.copy()
-        values[:, self.seen_cells :] = CoverageValue.UNKNOWN
-        recovered, covered = (
-            np.count_nonzero(values == CoverageValue.RECOVERED),
-            np.count_nonzero(values > 0),
-        )
-        covered -= np.count_nonzero(values == CoverageValue.BLOCKED)
-        coverable = covered + np.count_nonzero(values == CoverageValue.TO_COVER)
-        self.covered, self.recovered = covered / coverable, recovered / coverable
-        self._coverage.put(
-            encode_occupancy_grid(OccupancyGrid(grid.geometry, values, "map", _stamp()))
-        )
+    def publish_floor(self) -> None:
+        """Publish the floor that the robot swept."""
         swept = np.where(self.visits > 0, SWEPT_PERCENT, 0).astype(np.int8)
-        self._floor.put(encode_occupancy_grid(OccupancyGrid(grid.geometry, swept, "map", _stamp())))
+        geometry = GridGeometry(*swept.shape, CELL_M, Pose2D(*ORIGIN))
+        self._floor.put(encode_occupancy_grid(OccupancyGrid(geometry, swept, "map", _stamp())))
 
     def publish_status(self, state: str, done: float, planning: bool, **more: Any) -> None:
         """Publish a status as the daemon would."""
@@ -255,17 +227,6 @@ def blocked_cells(done: float = 0.0) -> np.ndarray:
     """Return which lattice cells hold an obstacle or something unknown, bool."""
     pixels = building(done) != 0
     return pixels.reshape(ROWS // 5, 5, COLS // 5, 5).any(axis=(1, 3))
-
-
-def coverage(visits: np.ndarray, blocked: np.ndarray) -> OccupancyGrid:
-    """Return the coverage for numbers of visits, and what is blocked, per lattice cell."""
-    values = np.full(visits.shape, CoverageValue.TO_COVER, np.int8)
-    values[visits == 1] = CoverageValue.COVERED
-    values[visits > 1] = CoverageValue.RECOVERED
-    values[blocked] = CoverageValue.BLOCKED
-    values[18:, 27:] = CoverageValue.UNKNOWN
-    geometry = GridGeometry(*visits.shape, CELL_M, Pose2D(*ORIGIN))
-    return OccupancyGrid(geometry, values, "map", _stamp())
 
 
 def cells(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import Token
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.watch.picture import RobotView
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path

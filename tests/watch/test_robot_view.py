@@ -13,7 +13,7 @@ from fasaco_edge.client.feed import SUBSCRIBED
 from fasaco_edge.client.robot_state import PathProgress
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch
-from fasaco_edge.watch.robot_view import RobotView
+from fasaco_edge.watch.picture import RobotView
 from fasaco_edge.wire.messages.maps import encode_map_update
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from tests.watch.grids import NOW, mid_mission, status, tell

@@ -115,7 +115,7 @@ class LiveView:
                 nonlocal is_over
                 is_over = step(0.0)
                 while self._unseen:
-                    watched.events.add(phrases.steady_now(), self._unseen.popleft(), ORDER)
+                    watched.view.events.add(phrases.steady_now(), self._unseen.popleft(), ORDER)
                 return not is_over
 
             stack.callback(self._print_again)
@@ -144,8 +144,8 @@ class LiveView:
             watched, _ = stack.enter_context(fleet_on_bus(FLEET, keys, self._bus, err()))
             return watched
         from fasaco_edge.client.feed import Feed
-        from fasaco_edge.watch.robot_view import RobotView
-        from fasaco_edge.watch.robot_watch import RobotWatch
+        from fasaco_edge.watch.page import RobotWatch
+        from fasaco_edge.watch.picture import RobotView
 
         feed = stack.enter_context(Feed(self._bus, keys))
         return RobotWatch(feed, RobotView(keys.robot), err())

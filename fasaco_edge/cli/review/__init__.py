@@ -46,7 +46,7 @@ examples:
   fasaco-edge review night.rrd --at 1:00 --png at.png  why did the robot turn here?
   fasaco-edge review night.rrd --point 2.55,0.24       why is this spot (x, y) [m] not swept?
   fasaco-edge review night.rrd --against last.rrd --png both.png
-  fasaco-edge review night.rrd --export night --export-as parquet
+  fasaco-edge review night.rrd --export night
   fasaco-edge serve night.rrd                          the mission in a browser, at any time
 """
 
@@ -96,8 +96,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--at",
         type=_time,
         metavar="MM:SS",
-        help="show this time since the recording began: robot, paths before and after, changes of "
-        "the map, commands, trail; --png draws it",
+        help="show this time since the recording began: robot, paths before and after, plan and "
+        "who found it, changes of the map, commands; --png draws it",
     )
     parser.add_argument(
         "--point",
@@ -119,16 +119,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--export",
         type=Path,
         metavar="DIR",
-        help="write tables: trail, paths and their points, plans, commands, states, coverage, "
-        "floor swept, rooms, pheromone, plots; and the map as .npz; columns.csv describes all "
-        "columns, with units",
-    )
-    parser.add_argument(
-        "--export-as",
-        choices=("csv", "parquet"),
-        default="csv",
-        help="format of the tables; Parquet files contain types and descriptions of the columns "
-        "(default: %(default)s)",
+        help="write tables as CSV: trail, paths and their points, states, coverage, pheromone, "
+        "plots; columns.csv describes all columns, with units; map and swept floor as .npz",
     )
 
 
@@ -174,7 +166,7 @@ def run(args: argparse.Namespace) -> int:
         from fasaco_edge.review.output.export import export
 
         with naming(args.export):
-            written = export(review, args.export, args.export_as)
+            written = export(review, args.export)
         width = max(len(str(file)) for file, _ in written)
         for file, what in written:
             terminal.err().print(f"{file!s:{width}}  {what}", soft_wrap=True, highlight=False)
@@ -191,7 +183,7 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
 
     from fasaco_edge.recording.read.robot_clock import clock
     from fasaco_edge.review.instant import scene_at
-    from fasaco_edge.review.output import answer_rows
+    from fasaco_edge.review.output import answers
     from fasaco_edge.review.output.pictures import draw_scene, draw_spots
     from fasaco_edge.review.spot import explain
 
@@ -204,17 +196,17 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
     scene = None if args.at is None else scene_at(review, args.at)
     spots = explain(review, args.point or ())
     if args.json:
-        answers = {"at": scene.instant if scene else None, "points": spots}
-        found = answers | {"time_scale": clock_of_robot.scale}
+        found: dict[str, object] = {"at": scene.instant if scene else None, "points": spots}
+        found["time_scale"] = clock_of_robot.scale
         print_json(msgspec.to_builtins(found))
     else:
         if clock_of_robot.words:
             console.print(f"{clock_of_robot.words}: times are the robot's")
         if scene is not None:
             console.print(f"at {clock(args.at)}", style="bold")
-            console.print(terminal.figures(answer_rows.instant_rows(scene.instant)))
+            console.print(terminal.figures(answers.instant_rows(scene.instant)))
         for spot in spots:
-            console.print(terminal.figures(answer_rows.spot_rows(spot)))
+            console.print(terminal.figures(answers.spot_rows(spot)))
     if args.png:
         picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
         _save(picture, review, args.png)
@@ -260,8 +252,8 @@ def _epilog() -> str:
     for line in explanations():
         lines += textwrap.wrap(line, 96, initial_indent="  ", subsequent_indent="      ")
     lines += textwrap.wrap(
-        "With --against it has two of them, `recording` and `against`, and the `difference` of all "
-        "numbers that both have, the first minus the second.",
+        "With --against it has two of them, `recording` and `against`, their different settings, "
+        "`setup`, and whether their figures can be compared, `compare`.",
         96,
     )
     lines += textwrap.wrap(OF_A_FLEET, 96)

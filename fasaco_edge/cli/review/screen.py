@@ -15,13 +15,12 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import (
     compared_rows,
-    reason_counts,
     setup_differences,
     setup_words,
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
-from fasaco_edge.review.output.verdicts import verdicts
+from fasaco_edge.review.output.answers import verdicts
 from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import one_line
 
@@ -99,11 +98,6 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     _print_table(console, "Set-up", ("", *names), setup)
     compared = compared_rows(one, other)
     _print_table(console, "Two runs", ("", *names, "difference"), compared)
-    counts = [
-        (kind, str(mine), str(theirs), f"{mine - theirs:+d}")
-        for kind, (mine, theirs) in reason_counts([one, other])
-    ]
-    _print_table(console, "Reasons of replans", ("reason", *names, "difference"), counts)
     for document in (one, other):
         for _, text in rows.clock_rows(document):
             _say(console, f"{document.recording}: its clock is {text}")

@@ -10,8 +10,7 @@ from rich.console import Console
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
-from fasaco_edge.fleet.watch.feed import FleetFeed
-from fasaco_edge.fleet.watch.page import FleetWatch
+from fasaco_edge.fleet.watch.page import FleetFeed, FleetWatch
 from fasaco_edge.fleet.watch.view import FleetView
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.keys import VERSION, Keys

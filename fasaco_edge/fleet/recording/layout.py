@@ -16,9 +16,9 @@ from fasaco_edge.recording.scene.blueprint import (
     MAP_BACKGROUND,
     MARGIN,
     eye_above,
-    last_seconds,
     log_view,
     plot_view,
+    up_to_cursor,
 )
 from fasaco_edge.recording.scene.runcard import markdown_cell
 from fasaco_edge.recording.sdk import rrb
@@ -43,7 +43,7 @@ def build_layout(robots: Sequence[str], bounds: Bounds) -> rrb.Blueprint:
         legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
         return plot_view(title, "", legend, top, contents=each(f"metrics/{name}"))
 
-    trails = {robot_entity(robot, "world/trail"): last_seconds(TRAIL_S) for robot in robots}
+    trails = {robot_entity(robot, "world/trail"): up_to_cursor(TRAIL_S) for robot in robots}
     worlds = [f"{world}/**" for world in each("world")]
     map_view = rrb.Spatial3DView(
         origin="/",
@@ -63,9 +63,7 @@ def build_layout(robots: Sequence[str], bounds: Bounds) -> rrb.Blueprint:
                 card,
                 plot("Swept [m2]", "swept_m2"),
                 plot("Cells left, as each knows", "left_cells"),
-                plot("Planning [ms]", "plan_ms"),
-                plot("Messages to the fleet [kB/s]", "kb_s"),
-                row_shares=[5, 4, 3, 3, 3],
+                row_shares=[5, 4, 3],
             ),
             column_shares=[18, 10],
         ),

@@ -23,9 +23,8 @@ from fasaco_edge.fleet.observer.cells import Place
 from fasaco_edge.fleet.observer.members import GONE, Member
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.arrow import pa
-from fasaco_edge.recording.read.frames import chunks, column
-from fasaco_edge.recording.read.repair import HINT, open_part
+from fasaco_edge.recording.read.frames import chunks_in, column, pa
+from fasaco_edge.recording.read.repair import HINT
 from fasaco_edge.wire.documents.fleet import CellEdge, CellTile
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status
@@ -269,12 +268,11 @@ def numbers_of(paths: Sequence[Path]) -> dict[str, int]:
 
 
 def _batches(path: Path) -> Iterator[NoteBatch]:
-    with open_part(path) as (recording, scan):
-        for chunk in chunks(recording, scan):
-            if chunk is None or chunk.entity != entities.FLEET_NOTES:
-                continue
-            for blob in column(chunk.batch, COMPONENT, pa.list_(pa.uint8())) or ():
-                try:
-                    yield decode_notes(np.asarray(blob.values, np.uint8).tobytes())
-                except (ValueError, msgspec.DecodeError) as error:
-                    raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error
+    for chunk in chunks_in(path):
+        if chunk.entity != entities.FLEET_NOTES:
+            continue
+        for blob in column(chunk.batch, COMPONENT, pa.list_(pa.uint8())) or ():
+            try:
+                yield decode_notes(np.asarray(blob.values, np.uint8).tobytes())
+            except (ValueError, msgspec.DecodeError) as error:
+                raise UnreadableRecording(f"{path}: {error}", hint=HINT) from error

@@ -33,8 +33,12 @@ from fasaco_edge.fleet.recording.scene import FleetScene
 from fasaco_edge.host.processes import memory_limit
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import NO_MAP
-from fasaco_edge.recording.write.inbox import afforded_bytes
-from fasaco_edge.recording.write.process import Output, record
+from fasaco_edge.recording.write.process import (
+    BusRecorder,
+    Output,
+    afforded_bytes,
+    record,
+)
 from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -49,8 +53,6 @@ NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
 # Robots that send within this time of the first robot [ns] are numbered in the order of their
 # names; largest number of messages that wait until then.
 GATHER_NS, MOST_GATHERED = 2_000_000_000, 1_000
-# Number of notes over which a robot's rate of messages is averaged for the plot.
-RATE_NOTES = 5
 # Number of unknown robots and topics whose faults are counted separately.
 MOST_FAULTS = 256
 TOO_LARGE = "what is larger than its share of the memory is left out, its map, say"
@@ -73,19 +75,19 @@ def run_fleet_recorder(
     )
 
 
-class FleetRecorder:
+class FleetRecorder(BusRecorder):
     """Connection of the bus to the writer: ``step`` takes samples, writes and draws them."""
 
     def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
         self._fleet = fleet
         self._schema = config.pose.schema
         recording = output.begin(file_name(fleet), build_layout((), NO_MAP))
-        self._writer, self._clock = recording.writer, recording.clock
+        self.writer, self._clock = recording.writer, recording.clock
         self._began_ns = recording.began_ns
         self._title = f"fleet {fleet} {recording.began} UTC"
-        self._writer.describe(self._title)
+        self.writer.describe(self._title)
         self._members = Members()
-        self._scene = FleetScene(self._writer, self._members)
+        self._scene = FleetScene(self.writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
         self._subscriptions = FleetSubscriptions(
             bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post
@@ -95,9 +97,7 @@ class FleetRecorder:
         self._poses: dict[str, PoseDecoder] = {}
         self._pending: dict[str, PendingNote] = {}
         self._notes: list[Note] = []
-        self._rates: dict[str, list[int]] = {}
         self._next_note_ns = self._next_write_ns = self._began_ns
-        self._noted_ns = self._began_ns
         self._part = 0
         self._faults: Counter[tuple[str, str]] = Counter()
 
@@ -108,11 +108,11 @@ class FleetRecorder:
     def step(self, timeout_s: float) -> None:
         """Write and draw what arrives within ``timeout_s`` [s], and all drawings that are due."""
         for received in self._gathered(self._inbox.take(timeout_s)):
-            self._writer.message(received.arrival.wall_ns)
+            self.writer.message(received.arrival.wall_ns)
             self._attempt(received)
-            self._writer.sync(time.monotonic_ns())
+            self.writer.sync(time.monotonic_ns())
         now_ns = self._clock.now_ns()
-        self._writer.at(now_ns)
+        self.writer.at(now_ns)
         if now_ns >= self._next_note_ns:
             self._next_note_ns = now_ns + NOTE_NS
             self._note(now_ns)
@@ -121,19 +121,18 @@ class FleetRecorder:
             self._write()
         self._subscriptions.ask_for_maps([member.name for member in self._members], now_ns)
         self._scene.catch_up()
-        self._writer.sync(time.monotonic_ns())
+        self.writer.sync(time.monotonic_ns())
 
     def end(self) -> bool:
-        """Write waiting data and the footer; False if the disk fails."""
         self._gathers = False
         for received in self._gathered(self._inbox.take(0.0)):
             self._attempt(received)
         now_ns = self._clock.now_ns()
-        self._writer.at(now_ns)
+        self.writer.at(now_ns)
         self._note(now_ns)
         self._write()
         self._scene.finish()
-        return self._writer.close()
+        return self.writer.close()
 
     def _gathered(self, arrived: list[Received]) -> list[Received]:
         """Return the samples to process now.
@@ -157,13 +156,7 @@ class FleetRecorder:
         first, self._first = self._first, []
         return sorted(first, key=lambda received: received.robot)
 
-    @property
-    def hangs(self) -> bool:
-        """Whether Rerun would hang when the interpreter exits."""
-        return self._writer.hangs
-
     def note(self, line: str) -> None:
-        """Log a fault that occurred before the recording began."""
         self._scene.add_line(line, "WARN")
 
     def _attempt(self, received: Received) -> None:
@@ -243,8 +236,6 @@ class FleetRecorder:
 
     def _note(self, now_ns: int) -> None:
         """Note and show what arrived since the last note."""
-        passed_s = max(1e-9 * (now_ns - self._noted_ns), 1e-3)
-        self._noted_ns = now_ns
         for member in self._members:
             traffic = self._inbox.traffic(member.name)
             if traffic.too_large:
@@ -254,15 +245,7 @@ class FleetRecorder:
             counts = traffic.messages, traffic.bytes
             note = self._pending[member.name].note(member, self._ms(now_ns), now_ns, counts)
             self._notes.append(note)
-            rates = self._rates.setdefault(member.name, [])
-            rates.append(traffic.bytes)
-            del rates[:-RATE_NOTES]
-            figures = {
-                "left_cells": float(note.open_cells),
-                "kb_s": round(sum(rates) / len(rates) / passed_s / 1000, 2),
-            }
-            if note.plans_ms:
-                figures["plan_ms"] = max(note.plans_ms)
+            figures = {"left_cells": float(note.open_cells)}
             if note.swept:
                 figures["swept_m2"] = member.swept.count * member.seat.cell_m**2
                 self._scene.add_cells(member)
@@ -274,16 +257,16 @@ class FleetRecorder:
 
     def _write(self) -> None:
         """Write the notes gathered; in a new part also the cells of earlier parts."""
-        if self._part != self._writer.part_number:
-            self._part = self._writer.part_number
-            at_ms = self._notes[0].at_ms if self._notes else self._ms(self._writer.wall_ns)
+        if self._part != self.writer.part_number:
+            self._part = self.writer.part_number
+            at_ms = self._notes[0].at_ms if self._notes else self._ms(self.writer.wall_ns)
             self._notes = [*(in_force(member, at_ms) for member in self._members), *self._notes]
         if not self._notes:
             return
         robots = [noted(member) for member in self._members]
         batch = NoteBatch(NOTES_VERSION, self._began_ns, self._fleet, robots, self._notes)
         self._notes = []
-        if not self._writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
+        if not self.writer.write_blob(encode_notes(batch), entities.FLEET_NOTES):
             # The next part repeats all cells.
             self._part = 0
 

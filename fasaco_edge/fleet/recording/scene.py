@@ -48,7 +48,7 @@ SHARE_ALPHA, SWEPT_ALPHA, TWICE_COLOUR = 55, 150, (60, 60, 70, 150)
 PATH_Z, TRAIL_Z, LABEL_Z = 0.05, 0.04, 0.1
 TRAIL_SPACING_M = 0.05
 MOST_TRAIL = 4_000
-METRICS = ("swept_m2", "left_cells", "plan_ms", "kb_s")
+METRICS = ("swept_m2", "left_cells")
 STATES = {
     **draw.STATES[entities.MISSION_STATE],
     "waiting": 0xDB2777FF,

@@ -1,24 +1,29 @@
-"""Screen of ``watch --fleet``: a table of the robots' activities, and the latest events."""
+"""Watch of a fleet, its feed and its screen: robots' activities, latest events."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
+from fasaco_edge.bus.arrival import Arrival, Sample
+from fasaco_edge.bus.session import Bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client import phrases
-from fasaco_edge.client.events import EventLog
-from fasaco_edge.client.phrases import clock
+from fasaco_edge.client.feed import Joining
+from fasaco_edge.client.phrases import clock, steady_now
+from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
 from fasaco_edge.fleet.observer.survey import Survey
-from fasaco_edge.fleet.watch.feed import FleetFeed
 from fasaco_edge.fleet.watch.view import FleetRobot, FleetView, short
 from fasaco_edge.text import one_line, percent
-from fasaco_edge.watch.blocks import FAINT, Blocks, with_keys
-from fasaco_edge.watch.glyphs import GlyphSet
+from fasaco_edge.watch.glyphs import FAINT, Blocks, GlyphSet, with_keys
+from fasaco_edge.watch.live import Watched
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.topics import STATUS
 
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
 # Largest width of the table [characters].
@@ -119,6 +124,50 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: i
     return with_keys(line, width, "q quits", clock(now))
 
 
+# Largest size of all waiting samples [bytes]; a robot gets at most a quarter of it.
+CAPACITY_BYTES = 128_000_000
+
+
+class FleetFeed(Joining):
+    """The samples of the robots of a fleet; a context manager.
+
+    The reader gets the fleet messages of all robots, and selects by ``attend`` the robots whose
+    statuses it wants.
+    """
+
+    def __init__(self, settings: BusSettings, keys: Keys) -> None:
+        super().__init__(settings)
+        self._keys = keys
+        self._inbox = FleetInbox(CAPACITY_BYTES, _stamped)
+        self._subscriptions: FleetSubscriptions | None = None
+
+    def take(self, timeout_s: float) -> list[Received]:
+        """Return what has arrived, robot by robot; wait up to ``timeout_s`` [s] for a sample."""
+        return self._inbox.take(timeout_s)
+
+    def attend(self, robots: Collection[str]) -> None:
+        """Subscribe to the robots of these names; call it often."""
+        subscriptions = self._subscriptions
+        if subscriptions is None:
+            return
+        for robot in set(robots) - subscriptions.robots:
+            subscriptions.subscribe(robot)
+
+    def forget(self, robot: str) -> None:
+        """Drop the queues of a robot of another fleet."""
+        self._inbox.forget(robot)
+
+    def _listen(self, bus: Bus) -> None:
+        subscriptions = FleetSubscriptions(bus, self._keys, (STATUS,), self._inbox.post)
+        subscriptions.listen()
+        self._subscriptions = subscriptions
+
+
+def _stamped(topic: str, sample: Sample) -> Arrival:
+    at_ns = int(1e9 * steady_now())
+    return Arrival(topic, sample, at_ns, at_ns)
+
+
 # Longest time to wait for the other robots after the first message; time within which each robot
 # sends a message, as it sends one per second [s].
 REST_S, SENT_S = 4.0, 1.3
@@ -126,31 +175,21 @@ REST_S, SENT_S = 4.0, 1.3
 EVERY_S = 1.0
 
 
-class FleetWatch:
+class FleetWatch(Watched):
     """The watch of a fleet, see ``live.Watched``."""
 
     rest_s = REST_S
+    view: FleetView
 
     def __init__(self, feed: FleetFeed, view: FleetView, console: Console) -> None:
-        self._feed, self._view = feed, view
+        self._feed, self.view = feed, view
         self._page = FleetPage(console)
-        self._known_at = phrases.steady_now()
+        self._known_at = steady_now()
         self._printed_at = float("-inf")
         self._printed: dict[str, object] = {}
 
-    @property
-    def events(self) -> EventLog:
-        """The latest events."""
-        return self._view.events
-
-    @property
-    def trouble(self) -> str:
-        """Why the bus cannot be reached; "" if it can."""
-        return self._view.trouble
-
     def take(self, timeout_s: float) -> bool:
-        """Take in arrivals; wait up to ``timeout_s`` [s] for one; return whether one came."""
-        view, feed = self._view, self._feed
+        view, feed = self.view, self._feed
         items = feed.take(timeout_s)
         was_known = self.is_known()
         for received in items:
@@ -158,7 +197,7 @@ class FleetWatch:
             if view.members.get(received.robot) is None:
                 # Invented names must not take all queues.
                 feed.forget(received.robot)
-        now = phrases.steady_now()
+        now = steady_now()
         if not was_known:
             self._known_at = now
         view.trouble = feed.trouble
@@ -168,7 +207,7 @@ class FleetWatch:
 
     def documents(self) -> list[dict[str, object]]:
         """Return the fleet's document if it is due and has changed, else none."""
-        now = phrases.steady_now()
+        now = steady_now()
         if now - self._printed_at < EVERY_S or not self.is_known():
             return []
         document = self.document()
@@ -179,11 +218,11 @@ class FleetWatch:
 
     def document(self) -> dict[str, object]:
         """Return the fleet's document."""
-        return self._view.document(phrases.steady_now())
+        return self.view.document(steady_now())
 
     def line(self, now: float) -> str:
         """Return the robots' activities in a line."""
-        view, robots = self._view, self._view.robots(now)
+        view, robots = self.view, self.view.robots(now)
         if view.trouble:
             return f"waiting for the bus at {one_line(view.trouble)}"
         if not robots:
@@ -193,15 +232,14 @@ class FleetWatch:
         return f"{share}{', '.join(f'{robot.name}: {robot.doing}' for robot in robots)}"
 
     def page(self, now: float, width: int, height: int) -> list[str]:
-        """Return a page of lines."""
-        return self._page.lines(self._view, now, width, height)
+        return self._page.lines(self.view, now, width, height)
 
     def is_known(self) -> bool:
         """Return whether a message of a robot has arrived."""
-        return len(self._view.members) > 0
+        return len(self.view.members) > 0
 
     def is_whole(self) -> bool:
         """Return whether all robots have had time for a message."""
-        view = self._view
-        is_complete = phrases.steady_now() - self._known_at > SENT_S
+        view = self.view
+        is_complete = steady_now() - self._known_at > SENT_S
         return is_complete and view.floor.robots >= set(view.names())

@@ -9,7 +9,7 @@ both clocks run at the same rate.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.errors import FasacoError
+from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.wire.documents.json_text import decode_tolerant
 from fasaco_edge.wire.documents.settings import KnownSettings, known_settings
 from fasaco_edge.wire.documents.status import Status
@@ -50,20 +51,11 @@ class RobotClock:
     @classmethod
     def of(cls, statuses: Iterable[Arrival], poses: Iterable[Arrival], began_ns: int) -> RobotClock:
         """Return the clock of a recording; ``poses`` are read only for a simulated robot."""
-        known = next(filter(None, map(_settings, statuses)), KnownSettings())
+        known = known_of(statuses)
         scale = known.robot.time_scale
         if scale == 1.0 or not 0.0 < scale < math.inf:
             return cls(began_ns)
-        decoder = PoseDecoder(known.pose.schema or POSE_STAMPED)
-        if frames := known.ros2.frames:
-            decoder.follow((frames.map, frames.robot))
-        times = []
-        for arrival in poses:
-            sample, is_static = arrival.sample, arrival.topic == "tf_static"
-            with suppress(FasacoError):
-                pose = decoder.decode(sample.payload, sample.schema, is_static=is_static)
-                if pose is not None:
-                    times.append((arrival.wall_ns - began_ns, pose.stamp_ns))
+        times = [(at_ns - began_ns, pose.stamp_ns) for at_ns, pose in poses_of(known, poses)]
         if not times:
             return cls(began_ns, scale)
         came_s, stamps_s = 1e-9 * np.array(sorted(times), np.int64).T
@@ -104,6 +96,24 @@ def clock(seconds: float) -> str:
     minutes, rest = divmod(round(seconds, 1), 60)
     hours, minutes = divmod(int(minutes), 60)
     return f"{hours}:{minutes:02d}:{rest:04.1f}" if hours else f"{minutes}:{rest:04.1f}"
+
+
+def known_of(statuses: Iterable[Arrival]) -> KnownSettings:
+    """Return the settings in the first status that has any; the defaults if none has."""
+    return next(filter(None, map(_settings, statuses)), KnownSettings())
+
+
+def poses_of(known: KnownSettings, samples: Iterable[Arrival]) -> Iterator[tuple[int, StampedPose]]:
+    """Yield the poses in samples, each with its arrival by the recorder's clock [ns]."""
+    decoder = PoseDecoder(known.pose.schema or POSE_STAMPED)
+    if frames := known.ros2.frames:
+        decoder.follow((frames.map, frames.robot))
+    for arrival in samples:
+        sample, is_static = arrival.sample, arrival.topic == "tf_static"
+        with suppress(FasacoError):
+            pose = decoder.decode(sample.payload, sample.schema, is_static=is_static)
+            if pose is not None:
+                yield arrival.wall_ns, pose
 
 
 def _settings(arrival: Arrival) -> KnownSettings | None:

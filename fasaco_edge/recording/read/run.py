@@ -1,7 +1,7 @@
-"""Content of the parts of a run: samples byte for byte, plots, states and log.
+"""Content of the parts of a run: samples byte for byte, plots, states, log, places of drawings.
 
 Of a file that is torn or still being written, the complete frames are read; no file is changed.
-Drawings are skipped chunk by chunk, so they take no memory.
+Drawings are large: only their places in the files are kept, and each is read on request.
 """
 
 from __future__ import annotations
@@ -11,18 +11,22 @@ from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.arrow import pa
+from fasaco_edge.recording.read.drawn import Place as DrawnPlace
+from fasaco_edge.recording.read.drawn import anchor_in
 from fasaco_edge.recording.read.frames import (
     Chunk,
     chunks,
+    chunks_in,
     column,
     is_fleet_recording,
+    pa,
     recording_id,
     wall_ns,
 )
@@ -62,7 +66,13 @@ class RecordedSamples:
         topics: Container[str] | None = None,
     ) -> None:
         if batches is None:
-            batches = [batch for path in paths for batch in _batches(path)]
+            batches = [
+                batch
+                for path in paths
+                for chunk in chunks_in(path)
+                if chunk.entity == entities.INPUTS
+                for batch in _batches_of(chunk, path)
+            ]
             # A single part may have no batches, if its recorder was killed just after the start.
             if not batches:
                 raise _no_samples(paths)
@@ -119,48 +129,33 @@ def _no_samples(paths: Sequence[Path]) -> UnreadableRecording:
             f"{files}: this is the recording of a fleet",
             hint="name the recording of one of its robots",
         )
-    hint = "no message came while it was recorded: check the robot's name, and the endpoint"
-    if any(_is_drawn(path) for path in paths):
-        hint = "recordings of this release and later ones do"
-    return UnreadableRecording(f"{files}: holds no samples", hint=hint)
-
-
-def _is_drawn(path: Path) -> bool:
-    """Return whether a file shows a robot or a map, so that a daemon was recorded."""
-    with open_part(path) as (recording, scan):
-        found = (chunk.entity for chunk in chunks(recording, scan) if chunk is not None)
-        return any(entity in (entities.MAP, entities.ROBOT) for entity in found)
-
-
-def _batches(path: Path) -> list[Batch]:
-    with open_part(path) as (recording, scan):
-        return [
-            batch
-            for chunk in chunks(recording, scan)
-            if chunk is not None and chunk.entity == entities.INPUTS
-            for batch in _batches_of(chunk, path)
-        ]
+    return UnreadableRecording(
+        f"{files}: holds no samples",
+        hint="no message came while it was recorded: check the robot's name, and the endpoint",
+    )
 
 
 SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
 READ = ("metrics/", "state/", "log/")
+DRAWN = (entities.MAP, entities.FLOOR, entities.PHEROMONE, entities.PATH)
 STATUSES, POSES = ("status",), ("pose", "tf_static")
 # Limit on the uncompressed data kept of a file: this many times its size, plus this many bytes.
 MOST_RATIO, LEAST_BYTES = 16, 16_000_000
+# Memory for the place of a drawing [bytes].
+PLACE_BYTES = 200
 
 TimedText = tuple[int, str]
 """Time [ns] and text."""
 Row = tuple[int, float | str]
 
 
-@dataclass(frozen=True, slots=True)
-class PartFile:
+class PartFile(msgspec.Struct, frozen=True):
     """A file of a recording: its size, torn bytes, and whether it was closed properly."""
 
-    path: Path
+    path: str
     bytes: int
     torn_bytes: int
-    has_footer: bool
+    ended: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,7 +171,9 @@ class RunRecord:
             [s], and value.
         states: times and names of the states of each state entity.
         log: times and texts of each log entity.
-        field_ns: times of the drawings of the pheromone field [ns].
+        drawn: places of the drawings of each entity of DRAWN, in order of time. Each part repeats
+            those in force at its beginning.
+        anchor: origin of drawings (x, y) [m], float64 (2,).
         batches: the samples, for ``RecordedSamples``.
     """
 
@@ -188,37 +185,32 @@ class RunRecord:
     plots: Mapping[str, NDArray[np.float64]]
     states: Mapping[str, tuple[TimedText, ...]]
     log: Mapping[str, tuple[TimedText, ...]]
-    field_ns: tuple[int, ...]
+    drawn: Mapping[str, tuple[DrawnPlace, ...]]
+    anchor: NDArray[np.float64]
     batches: tuple[Batch, ...]
 
 
-def count_frames(paths: Sequence[Path]) -> int:
-    """Return the number of frames to read.
-
-    Raises:
-        UnreadableRecording: a file is missing, or is no recording.
-    """
-    count = 0
-    for path in paths:
-        with open_part(path) as (_, scan):
-            count += scan.frames
-    return count
+Progress = Callable[[int, int], None]
+"""Called with the amount done and the whole amount."""
 
 
-def read_run_record(paths: Sequence[Path], advance: Callable[[], None]) -> RunRecord:
+def read_run_record(paths: Sequence[Path], progress: Progress = lambda *_: None) -> RunRecord:
     """Read the parts of one run, in any order.
 
     Args:
         paths: the files; a torn one is read up to its last complete frame, and not changed.
-        advance: called with each frame.
+        progress: called with each chunk, with amounts in bytes.
 
     Raises:
         UnreadableRecording: a file is missing or no recording, or there are no samples.
         DifferentRuns: the parts are not of one run.
     """
-    reader = _RunReader(advance)
+    reader, done = _RunReader(), 0
+    total = sum(path.stat().st_size for path in paths if path.is_file())
     for path in sorted(set(paths)):
-        reader.read(path)
+        for offset in reader.read(path):
+            progress(done + offset, total)
+        done += reader.parts[-1].bytes
     return reader.record()
 
 
@@ -226,40 +218,50 @@ def read_clock(paths: Sequence[Path]) -> RobotClock:
     """Return the clock of the first run in ``paths``; errors as for ``read_run_record``."""
     ids = {path: recording_id(path) for path in paths}
     first = min(filter(None, ids.values()), default="")
-    return read_run_record([path for path in paths if ids[path] == first], lambda: None).clock
+    return read_run_record([path for path in paths if ids[path] == first]).clock
 
 
 @dataclass(slots=True)
 class _RunReader:
     """Collects the content of the parts."""
 
-    advance: Callable[[], None]
     ids: dict[str, Path] = field(default_factory=dict)
     parts: list[PartFile] = field(default_factory=list)
     span: list[int] = field(default_factory=list)
     rows: dict[str, list[Row]] = field(default_factory=lambda: defaultdict(list))
     batches: list[Batch] = field(default_factory=list)
-    field_ns: list[int] = field(default_factory=list)
+    drawn: dict[str, list[DrawnPlace]] = field(default_factory=lambda: defaultdict(list))
+    anchor: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
 
-    def read(self, path: Path) -> None:
+    def read(self, path: Path) -> Iterator[int]:
+        """Read a file; yield the offset of each chunk."""
         with open_part(path) as (recording, scan):
             torn = 0 if scan.has_footer else scan.torn_bytes
-            self.parts.append(PartFile(path, scan.total_bytes, torn, scan.has_footer))
+            self.parts.append(PartFile(str(path), scan.total_bytes, torn, scan.has_footer))
             left_bytes = MOST_RATIO * scan.total_bytes + LEAST_BYTES
             for chunk in chunks(recording, scan):
-                self.advance()
-                if chunk is not None:
-                    self.ids.setdefault(chunk.recording_id, path)
-                    left_bytes -= self._take(chunk, path)
-                    if left_bytes < 0:
-                        raise ValueError(f"unpacks to more than {MOST_RATIO} times its size")
+                yield chunk.offset
+                self.ids.setdefault(chunk.recording_id, path)
+                left_bytes -= self._take(chunk, path)
+                if left_bytes < 0:
+                    raise ValueError(f"unpacks to more than {MOST_RATIO} times its size")
 
     def _take(self, chunk: Chunk, path: Path) -> int:
         """Take a chunk; return the number of bytes kept."""
         entity, batch = chunk.entity, chunk.batch
         if entity == entities.INPUTS:
             self.batches += _batches_of(chunk, path)
-        elif entity.startswith(READ) and not chunk.is_static and batch.num_rows:
+        elif chunk.is_static or not batch.num_rows:
+            if entity == entities.WORLD:
+                self.anchor = anchor_in(batch, self.anchor)
+            return 0
+        elif entity in DRAWN:
+            times = wall_ns(batch)
+            self.drawn[entity] += [
+                DrawnPlace(at, path, chunk.offset, row) for row, at in enumerate(times)
+            ]
+            return PLACE_BYTES * len(times)
+        elif entity.startswith(READ):
             times = wall_ns(batch)
             self.span += [min(times), max(times)]
             self.rows[entity] += [
@@ -268,8 +270,6 @@ class _RunReader:
                 if value and value[0] is not None
             ]
         else:
-            if entity == entities.PHEROMONE and not chunk.is_static and batch.num_rows:
-                self.field_ns += wall_ns(batch)
             return 0
         return chunk.bytes
 
@@ -281,10 +281,12 @@ class _RunReader:
                 + ", ".join(f"{path} of {name}" for name, path in sorted(self.ids.items()))
             )
         if not self.batches:
-            raise _no_samples([part.path for part in self.parts])
+            raise _no_samples([Path(part.path) for part in self.parts])
         began = min(self.span, default=0)
         for rows in self.rows.values():
             rows.sort(key=lambda row: row[0])
+        for places in self.drawn.values():
+            places.sort(key=lambda place: place.at_ns)
         statuses, poses = (
             RecordedSamples((), self.batches, topics) for topics in (STATUSES, POSES)
         )
@@ -298,7 +300,8 @@ class _RunReader:
             plots=dict(self._plots(clock)),
             states=self._texts("state/"),
             log=self._texts("log/"),
-            field_ns=tuple(sorted(self.field_ns)),
+            drawn={entity: tuple(places) for entity, places in self.drawn.items()},
+            anchor=self.anchor,
             batches=tuple(self.batches),
         )
 

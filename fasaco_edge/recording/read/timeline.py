@@ -1,55 +1,38 @@
-"""A recording by time: what was in force at any moment.
-
-Poses, statuses and commands are kept in memory. Grids and paths are large: only their places in
-the file are kept, and each is read on request.
-"""
+"""A recording by time: what was in force at any moment."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import UnreadableRecording
-from fasaco_edge.recording import entities
-from fasaco_edge.recording.arrow import pa
 from fasaco_edge.recording.read.drawn import (
+    Drawn,
     DrawnGrid,
     DrawnLine,
-    anchor_in,
+    Place,
+    Reader,
     grids_in,
     lines_in,
-    poses_in,
 )
-from fasaco_edge.recording.read.frames import BROKEN, Chunk, chunk_at, chunks, wall_ns
-from fasaco_edge.recording.read.repair import open_part
-from fasaco_edge.recording.read.robot_clock import RobotClock
-from fasaco_edge.recording.read.run import RecordedSamples, read_run_record
+from fasaco_edge.recording.read.frames import BROKEN, chunk_at
+from fasaco_edge.recording.read.robot_clock import RobotClock, known_of, poses_of
+from fasaco_edge.recording.read.run import (
+    POSES,
+    STATUSES,
+    RecordedSamples,
+    read_run_record,
+)
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 
-GRIDS = (entities.MAP, entities.FLOOR, entities.PHEROMONE)
 KEPT = ("status", "command", "rooms", PATH_DIGEST)
-# Limit on the rows of poses and drawings of a file: one per ``ROW_BYTES``, plus ``FEW_ROWS``.
-ROW_BYTES, FEW_ROWS = 8, 100_000
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Place of a drawing: its time [ns], open file, offset of the frame [bytes], row."""
-
-    at_ns: int
-    descriptor: int
-    offset: int
-    row: int
 
 
 @dataclass(slots=True)
@@ -57,7 +40,7 @@ class Timeline:
     """Drawings and samples of a recording, in order of time.
 
     Attributes:
-        clock: converts the recording's times to the robot's.
+        clock: conversion of the recording's times to the robot's.
         ended_ns: end of the recording, since the epoch [ns].
         samples: statuses, commands, rooms and digests of paths.
         pose_ns, poses: times int64 (n,) [ns], and float64 (n, 3): x [m], y [m], yaw [rad].
@@ -68,7 +51,9 @@ class Timeline:
     samples: Sequence[Arrival]
     pose_ns: NDArray[np.int64]
     poses: NDArray[np.float64]
-    _drawn: _Drawn
+    _drawn: Mapping[str, Sequence[Place]]
+    _anchor: NDArray[np.float64]
+    _files: Mapping[Path, int]
 
     @property
     def began_ns(self) -> int:
@@ -77,7 +62,7 @@ class Timeline:
 
     def newest(self, entity: str, at_ns: int) -> Place | None:
         """Return the last drawing of an entity up to a time [ns]; None before the first one."""
-        places = self._drawn.places.get(entity, [])
+        places = self._drawn.get(entity, ())
         index = bisect_right(places, at_ns, key=lambda place: place.at_ns)
         return places[index - 1] if index else None
 
@@ -100,21 +85,18 @@ class Timeline:
         Raises:
             UnreadableRecording: the file is damaged, or was changed.
         """
-        return _first(partial(grids_in, anchor=self._drawn.anchor), place)
+        return self._read(grids_in, place)
 
     def line(self, place: Place) -> DrawnLine:
         """Read a drawn line; errors as for ``grid``."""
-        return _first(partial(lines_in, anchor=self._drawn.anchor), place)
+        return self._read(lines_in, place)
 
-
-Drawn = TypeVar("Drawn")
-
-
-def _first(read: Callable[[pa.RecordBatch], Iterator[Drawn]], place: Place) -> Drawn:
-    try:
-        return next(read(chunk_at(place.descriptor, place.offset).batch.slice(place.row, 1)))
-    except BROKEN as error:
-        raise UnreadableRecording(f"the recording can no longer be read: {error}") from error
+    def _read(self, read: Reader[Drawn], place: Place) -> Drawn:
+        try:
+            batch = chunk_at(self._files[place.path], place.offset).batch
+            return next(read(batch.slice(place.row, 1), self._anchor))
+        except BROKEN as error:
+            raise UnreadableRecording(f"the recording can no longer be read: {error}") from error
 
 
 @contextmanager
@@ -125,48 +107,26 @@ def open_timeline(paths: Sequence[Path]) -> Iterator[Timeline]:
         UnreadableRecording: a file is missing or no recording, or there are no samples.
         DifferentRuns: the parts are not of one run.
     """
-    record = read_run_record(paths, lambda: None)
-    samples = sorted(RecordedSamples((), record.batches, KEPT), key=lambda one: one.wall_ns)
-    drawn = _Drawn()
     with ExitStack() as files:
-        for path in sorted(set(paths)):
-            with open_part(path) as (recording, scan):
-                descriptor = files.enter_context(path.open("rb")).fileno()
-                left = scan.total_bytes // ROW_BYTES + FEW_ROWS
-                for chunk in chunks(recording, scan):
-                    left -= drawn.take(chunk, descriptor) if chunk is not None else 0
-                    if left < 0:
-                        raise ValueError("holds more rows than its size allows")
-        for places in drawn.places.values():
-            places.sort(key=lambda place: place.at_ns)
-        pose_ns, poses = np.concatenate(drawn.pose_ns), np.concatenate(drawn.poses)
-        poses[:, :2] += drawn.anchor
-        order = np.argsort(pose_ns, kind="stable")
-        ended_ns = max([record.ended_ns, *(one.wall_ns for one in samples[-1:])])
-        yield Timeline(record.clock, ended_ns, samples, pose_ns[order], poses[order], drawn)
+        yield _timeline(paths, files)
 
 
-class _Drawn:
-    """Places of drawings, and the poses, in the order of the files."""
-
-    def __init__(self) -> None:
-        self.anchor = np.zeros(2)
-        self.places: dict[str, list[Place]] = defaultdict(list)
-        self.pose_ns = [np.zeros(0, np.int64)]
-        self.poses = [np.zeros((0, 3))]
-
-    def take(self, chunk: Chunk, descriptor: int) -> int:
-        """Take a chunk; return the number of rows kept."""
-        entity, batch = chunk.entity, chunk.batch
-        if chunk.is_static and entity == entities.WORLD:
-            self.anchor = anchor_in(batch, self.anchor)
-        if chunk.is_static or entity not in (*GRIDS, entities.PATH, entities.ROBOT):
-            return 0
-        times = wall_ns(batch)
-        if entity == entities.ROBOT:
-            self.pose_ns.append(np.array(times, np.int64))
-            self.poses.append(poses_in(batch))
-        else:
-            rows = enumerate(times)
-            self.places[entity] += [Place(at, descriptor, chunk.offset, row) for row, at in rows]
-        return len(times)
+def _timeline(paths: Sequence[Path], files: ExitStack) -> Timeline:
+    record = read_run_record(paths)
+    statuses, poses, kept = (
+        RecordedSamples((), record.batches, topics) for topics in (STATUSES, POSES, KEPT)
+    )
+    found = sorted(poses_of(known_of(statuses), poses), key=lambda one: one[0])
+    samples = sorted(kept, key=lambda one: one.wall_ns)
+    places = [(each.pose.x, each.pose.y, each.pose.yaw) for _, each in found]
+    return Timeline(
+        clock=record.clock,
+        ended_ns=max([record.ended_ns, *(one.wall_ns for one in samples[-1:])]),
+        samples=samples,
+        pose_ns=np.array([at_ns for at_ns, _ in found], np.int64),
+        poses=np.array(places, np.float64).reshape(-1, 3),
+        # Not the whole record, whose samples take much memory.
+        _drawn=record.drawn,
+        _anchor=record.anchor,
+        _files={path: files.enter_context(path.open("rb")).fileno() for path in paths},
+    )

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds, GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.scene.flows import Flows
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import TrailAttachment
-from fasaco_edge.wire.messages.maps import CoverageValue
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
@@ -34,14 +32,10 @@ LABEL_COLOUR: Colour = (255, 255, 255)
 # Bright colours: the labels have them, too, on a dark background.
 START_COLOUR: Colour = (74, 222, 128)
 END_COLOUR: Colour = (251, 113, 133)
-# Arrows along the trail; the field below them goes from black over red to yellow.
-UNDECIDED_COLOUR: Colour = (70, 80, 130)
-DECIDED_COLOUR: Colour = (94, 234, 255)
 
 # Heights [m] only order the layers: the camera looks straight down.
-ARROW_Z, ROBOT_Z, LABEL_Z = 0.03, 0.06, 0.1
-# Sizes on the screen [points].
-ARROW_WIDTH = 1.0
+ROBOT_Z, LABEL_Z = 0.06, 0.1
+# Size on the screen [points].
 MARK_RADIUS = 5.0
 MAP_ORDER, FLOOR_ORDER = 0.0, 0.5
 # Distance of a label above its field, as a share of the field's height.
@@ -102,14 +96,9 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
 
 
 def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
-    """Return the label over the living trail: its path, and its branching factor."""
-    text = f"pheromone at path {about.revision}, "
-    if message.best_steps:
-        text += f"{message.best_steps} steps to drive; "
-        text += f"ants see {about.branching:.1f} ways in a cell (1: sure, 4: undecided)"
-    else:
-        # Without a path the branching factor means nothing.
-        text += "nothing left to drive"
+    """Return the label over the living trail: the path at that time."""
+    left = f"{message.best_steps} steps" if message.best_steps else "nothing left"
+    text = f"pheromone at path {about.revision}, {left} to drive"
     return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
 
 
@@ -120,18 +109,6 @@ def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D
     """
     points = np.column_stack((xy, np.full(len(xy), style.z)))
     return rr.LineStrips3D.from_fields(strips=[points] if len(points) >= 2 else [])
-
-
-def arrows_archetype(flows: Flows) -> rr.Arrows3D:
-    """Return arrows along the trail; they are brighter where the trail is more decided."""
-    count = len(flows.origins)
-    origins = np.column_stack((flows.origins, np.full(count, ARROW_Z))).astype(np.float32)
-    vectors = np.column_stack((flows.vectors, np.zeros(count))).astype(np.float32)
-    # The share is a quarter in a cell with four equal directions, and 1 in a decided cell.
-    sure = np.clip((flows.share - 0.25) / 0.75, 0.0, 1.0)[:, np.newaxis]
-    low, high = np.array(UNDECIDED_COLOUR), np.array(DECIDED_COLOUR)
-    colours = np.rint(low + sure * (high - low)).astype(np.uint8)
-    return rr.Arrows3D(origins=origins, vectors=vectors, colors=colours, radii=-ARROW_WIDTH)
 
 
 def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3D:
@@ -211,15 +188,6 @@ def polygons_archetype(
     strips = [np.column_stack((xy, np.full(len(xy), style.z))) for xy in closed]
     names = [name for name, _ in polygons]
     return rr.LineStrips3D.from_fields(strips=strips, labels=names, show_labels=True)
-
-
-def coverage_fractions(grid: OccupancyGrid) -> tuple[float, float]:
-    """Return the fractions of the coverable cells that are covered, and covered more than once."""
-    counts = np.bincount(grid.cells.view(np.uint8).ravel(), minlength=256)
-    recovered = int(counts[CoverageValue.RECOVERED])
-    covered = int(counts[CoverageValue.COVERED]) + recovered
-    coverable = int(counts[CoverageValue.TO_COVER]) + covered
-    return (covered / coverable, recovered / coverable) if coverable else (0.0, 0.0)
 
 
 def grid_archetype(

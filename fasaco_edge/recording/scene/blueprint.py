@@ -56,11 +56,11 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         # The parent entity may lie too far away for float32.
         origin=f"/{entities.WORLD}",
         name="Map, swept floor, track and path",
-        contents=["/world/**", f"- /{entities.PHEROMONE}/**", f"- /{entities.DIRECTIONS}/**"],
+        contents=["/world/**", f"- /{entities.PHEROMONE}/**"],
         eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
-        overrides={entities.DRIVEN_PATH: so_far()},
+        overrides={entities.DRIVEN_PATH: up_to_cursor()},
     )
 
 
@@ -121,11 +121,6 @@ def _details() -> list[rrb.TimeSeriesView]:
             "Time above the least possible, as a share of it", "metrics/plan", right, MOST_GAP, gaps
         ),
         plot_view("Driving time saved by search, summed over all plans [s]", entities.SAVED, left),
-        plot_view(
-            "Branching factor of the pheromone: 1 if each cell has one way, 4 if none is preferred",
-            entities.BRANCHING,
-            rrb.PlotLegend(visible=False),
-        ),
         plot_view("Memory [MB]", entities.MEMORY, left),
         plot_view(
             "Processor [% of a core], battery [%]", "metrics/resources", right, contents=used
@@ -167,19 +162,11 @@ def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D
     )
 
 
-def last_seconds(seconds: float) -> rrb.VisibleTimeRanges:
-    """Return the range of the last ``seconds`` [s] before the cursor."""
+def up_to_cursor(seconds: float | None = None) -> rrb.VisibleTimeRanges:
+    """Return the range of the last ``seconds`` [s] before the cursor; None for all before it."""
+    since = rrb.TimeRangeBoundary.infinite()
+    if seconds is not None:
+        since = rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds)
     return rrb.VisibleTimeRanges(
-        timeline=entities.WALL_CLOCK,
-        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-seconds),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
-    )
-
-
-def so_far() -> rrb.VisibleTimeRanges:
-    """Return the range from the beginning up to the cursor."""
-    return rrb.VisibleTimeRanges(
-        timeline=entities.WALL_CLOCK,
-        start=rrb.TimeRangeBoundary.infinite(),
-        end=rrb.TimeRangeBoundary.cursor_relative(),
+        timeline=entities.WALL_CLOCK, start=since, end=rrb.TimeRangeBoundary.cursor_relative()
     )

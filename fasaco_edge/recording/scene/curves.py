@@ -6,13 +6,13 @@ once a second takes five megabytes an hour, whatever its content.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 
 from msgspec.structs import asdict
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
+from fasaco_edge.recording.scene.runcard import cells_of
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment
@@ -32,7 +32,6 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (f"{entities.LATENCY}/ingest", "map in", (56, 152, 222)),
     (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
-    (entities.BRANCHING, "branching", (244, 114, 182)),
     (entities.GAP, "gap of the walk", (250, 204, 21)),
     (entities.LINE_GAP, "gap of the line", (52, 211, 153)),
     (entities.SAVED_BY_ANTS, "ants", (244, 114, 182)),
@@ -100,9 +99,6 @@ SHARE_SPACING_NS = 2_000_000_000
 COUNT_SPACING_NS = 30_000_000_000
 # Shortest period over which processor time is averaged [s].
 LEAST_SHARE_S = 30.0
-# Limit on the error codes drawn: a faulty daemon must not fill the recording.
-MOST_CODES = 50
-_CODE = re.compile(r"[a-z_]{1,40}")
 
 SAVED = (entities.SAVED_BY_ANTS, entities.SAVED_BY_LOCAL_SEARCH)
 
@@ -125,14 +121,15 @@ class StatusFigures:
         self._add_process(status)
         if status.battery is not None and status.battery.level is not None:
             self._curves.draw(entities.BATTERY, 100 * status.battery.level, BATTERY_NOISE)
-        if status.floor is not None:
-            self._curves.draw(entities.SWEPT, status.floor.swept_m2, spacing_ns=COUNT_SPACING_NS)
+        cells, counts = cells_of(status), status.coverage
+        if cells is not None and cells[1]:
+            share = cells[0] / cells[1]
+            self._curves.draw(entities.COVERED_FRACTION, share, spacing_ns=SHARE_SPACING_NS)
+        if counts is not None and counts.coverable:
+            again = counts.recovered / counts.coverable
+            self._curves.draw(entities.RECOVERED_FRACTION, again, spacing_ns=SHARE_SPACING_NS)
         if status.path is not None and status.path.line_gap is not None:
             self._curves.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
-        by_code = status.errors.by_code
-        for code in sorted(filter(_CODE.fullmatch, by_code))[:MOST_CODES]:
-            entity = f"{entities.ERRORS}/{code}"
-            self._curves.draw(entity, by_code[code], spacing_ns=COUNT_SPACING_NS)
 
     def add_path(self, about: PathAttachment) -> None:
         """Draw the quality of a planned path."""

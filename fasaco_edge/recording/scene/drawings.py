@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds, Polygon, Pose2D
-from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, MissionOrder
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.layers import Anchor, Layers
@@ -25,6 +23,8 @@ from fasaco_edge.wire.reasons import plain
 
 # Bytes of a path's point in the file: each path is drawn twice, also as the previous path.
 POINT_BYTES = 2 * 12
+# Time after which a plan of the same kind as the one before is logged at level INFO again.
+LOGGED_AGAIN_NS = 60_000_000_000
 
 
 Line = NDArray[np.float64]
@@ -36,8 +36,8 @@ class PathDrawing:
     def __init__(self, writer: RecordingWriter, layers: Layers) -> None:
         self._writer = writer
         self._layers = layers
-        self._log = PathLog(writer)
-        self.catch_up, self.finish = self._log.catch_up, self._log.finish
+        # Kind and time [ns] of the last plan logged at level INFO.
+        self._logged = ("", -LOGGED_AGAIN_NS)
         self._revision = -1
         self._has_window = False
         # Revision and line of the path drawn last.
@@ -49,7 +49,7 @@ class PathDrawing:
         if revision:
             self._writer.sequence(entities.REPLAN, revision)
         if self._revision != revision:
-            self._log.add(about, _path_line(message, about))
+            self._log(about, _path_line(message, about))
             self._draw_window(about.changed, about.reason)
         self._revision, line = revision, draw.corners(message.xy)
 
@@ -60,6 +60,20 @@ class PathDrawing:
             self._draw(entities.PATH, line, draw.PATH)
 
         self._layers.draw(entities.PATH, POINT_BYTES * len(line), draw_path, self._writer.wall_ns)
+
+    def _log(self, about: PathAttachment, line: str) -> None:
+        """Log a path, at level DEBUG if it says nothing new; the layout does not show that level.
+
+        A plan of the same kind as the one before is new after a while; a path without a plan, such
+        as a polished line, never is.
+        """
+        kind, now_ns = about.reason.partition(":")[0], self._writer.wall_ns
+        shown, at_ns = self._logged
+        is_new = bool(about.planner) and (kind != shown or now_ns - at_ns >= LOGGED_AGAIN_NS)
+        if is_new:
+            self._logged = kind, now_ns
+        log_line = rr.TextLog(line, level="INFO" if is_new else "DEBUG")
+        self._writer.log(entities.PATH_LOG, log_line)
 
     def _draw_window(self, changed: Rectangle | None, reason: str) -> None:
         """Draw the changed part of the map that caused the path, if any."""
@@ -79,63 +93,6 @@ class PathDrawing:
     def _draw(self, entity: str, line: Line, style: draw.LineStyle) -> None:
         archetype = draw.line_archetype(line, style)
         self._writer.log(entity, archetype, latched=True, size=line.nbytes)
-
-
-# Successive plans of one kind share a line of the log for this long.
-GROUP_NS = 60_000_000_000
-
-
-@dataclass(slots=True)
-class _Group:
-    """Successive plans of one kind: time of the first [ns], number of others, newest revision."""
-
-    kind: str
-    since_ns: int
-    more: int = 0
-    newest: int = 0
-
-
-class PathLog:
-    """Logs paths: successive plans with the same kind of reason are summed up in one line.
-
-    The first plan of a kind is logged at once, the others form a group. Each path of a group, and
-    each path without a plan (such as a polished line), has a line of level DEBUG, too, which the
-    layout does not show.
-    """
-
-    def __init__(self, writer: RecordingWriter) -> None:
-        self._writer = writer
-        self._group: _Group | None = None
-
-    def add(self, about: PathAttachment, line: str) -> None:
-        """Log a path."""
-        kind, group = about.reason.partition(":")[0], self._group
-        if not about.planner:
-            self._write(line, "DEBUG")
-        elif group is not None and group.kind == kind:
-            group.more, group.newest = group.more + 1, about.revision
-            self._write(line, "DEBUG")
-            self.catch_up()
-        else:
-            self.finish()
-            self._group = _Group(kind, self._writer.wall_ns)
-            self._write(line, "INFO")
-
-    def catch_up(self) -> None:
-        """Log the group once it is old enough; call it often."""
-        if self._group is not None and self._writer.wall_ns - self._group.since_ns >= GROUP_NS:
-            self.finish()
-
-    def finish(self) -> None:
-        """Log the waiting group."""
-        group, self._group = self._group, None
-        if group is not None and group.more:
-            plans = f"{group.more} more plan{'s' * (group.more != 1)}"
-            why = "the map changed" if group.kind == "map" else plain(group.kind)
-            self._write(f"{plans} up to path {group.newest}: {why}", "INFO")
-
-    def _write(self, line: str, level: str) -> None:
-        self._writer.log(entities.PATH_LOG, rr.TextLog(line, level=level))
 
 
 def _path_line(message: PathMessage, about: PathAttachment) -> str:
@@ -192,7 +149,7 @@ Named = tuple[str, Polygon | None]
 
 
 class AreaDrawing:
-    """Draws the outlines of rooms, of zones, and of the keep-outs of order and operator.
+    """Draws the outlines of rooms, of zones, and of keep-outs, if they have changed.
 
     Args:
         writer: writes the drawings.
@@ -204,57 +161,41 @@ class AreaDrawing:
         self, writer: RecordingWriter, layers: Layers, anchored: Callable[[Pose2D], Anchor]
     ) -> None:
         self._writer, self._layers, self._anchored = writer, layers, anchored
-        # The order of the last command, and the operator's keep-outs and zones of the last status.
-        self._order = EVERYTHING_ONCE
-        self._kept_out: list[Named] = []
-        self._zones: list[Named] = []
-        self._rooms: Sequence[Named] = ()
-
-    def begin(self, order: MissionOrder) -> None:
-        """Draw the zones of a new order."""
-        self._order, self._zones = order, []
-        self._draw()
+        self._newest: dict[str, Sequence[Named]] = {}
 
     def add_report(self, report: MissionReport) -> None:
-        """Draw zones and keep-outs, if they have changed."""
-        kept_out: list[Named] = [
-            (f"keep out: {keep_out.name}", keep_out.polygon)
-            for keep_out in report.keep_outs
-            if keep_out.by == "operator"
+        """Draw the zones and keep-outs of a mission."""
+        kept_out = [
+            (f"keep out: {each.name}" if each.name else "keep out", each.polygon)
+            for each in report.keep_outs
         ]
-        zones: list[Named] = [(zone.name, zone.polygon) for zone in report.zones if zone.polygon]
-        if (kept_out, zones) != (self._kept_out, self._zones):
-            self._kept_out, self._zones = kept_out, zones
-            self._draw()
-
-    def add_rooms(self, named: Sequence[Named]) -> None:
-        """Draw the rooms, if they have changed."""
-        if named == self._rooms:
-            return
-        self._rooms = named
-
-        def draw_rooms() -> None:
-            self._writer.log(entities.ROOMS, self._polygons(draw.ROOM, named), latched=True)
-
-        points = sum(len(outline or ()) for _, outline in named)
-        size = 2 * POINT_BYTES * points
-        self._layers.draw(entities.ROOMS, size, draw_rooms, self._writer.wall_ns)
-
-    def _draw(self) -> None:
-        order = self._order
-        # The order may name a zone or room; the status then has its polygon.
-        zones = self._zones or [(zone.name, zone.polygon) for zone in order.zones]
-        keep_out = [*(("keep out", polygon) for polygon in order.keep_out), *self._kept_out]
-        for entity, style, polygons in (
-            (entities.ZONES, draw.ZONE, zones),
-            (entities.KEEP_OUT, draw.KEEP_OUT, keep_out),
+        zones = [(zone.name, zone.polygon) for zone in report.zones]
+        for entity, areas, style in (
+            (entities.ZONES, zones, draw.ZONE),
+            (entities.KEEP_OUT, kept_out, draw.KEEP_OUT),
         ):
-            self._writer.log(entity, self._polygons(style, polygons), latched=True)
+            if self._is_new(entity, areas):
+                self._draw(entity, areas, style)
 
-    def _polygons(self, style: draw.LineStyle, polygons: Sequence[Named]) -> rr.LineStrips3D:
+    def add_rooms(self, rooms: Sequence[Named]) -> None:
+        """Draw rooms."""
+        if self._is_new(entities.ROOMS, rooms):
+            size = 2 * POINT_BYTES * sum(len(outline or ()) for _, outline in rooms)
+            self._layers.draw(
+                entities.ROOMS,
+                size,
+                lambda: self._draw(entities.ROOMS, rooms, draw.ROOM),
+                self._writer.wall_ns,
+            )
+
+    def _is_new(self, entity: str, areas: Sequence[Named]) -> bool:
+        before, self._newest[entity] = self._newest.get(entity, []), areas
+        return before != areas
+
+    def _draw(self, entity: str, areas: Sequence[Named], style: draw.LineStyle) -> None:
         placed = [
             (one_line(name), np.array(corners) - self._anchored(Pose2D(*corners[0])).xy)
-            for name, corners in polygons
+            for name, corners in areas
             if corners
         ]
-        return draw.polygons_archetype(placed, style)
+        self._writer.log(entity, draw.polygons_archetype(placed, style), latched=True)

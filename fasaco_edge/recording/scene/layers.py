@@ -94,7 +94,6 @@ RATES = {
     entities.MAP: 3_000,
     entities.FLOOR: 1_000,
     entities.PHEROMONE: 3_500,
-    entities.DIRECTIONS: 2_500,
     entities.PATH: 2_000,
     entities.ROOMS: 500,
 }

@@ -13,12 +13,6 @@ from fasaco_edge.wire.documents.settings import Settings, known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.reasons import plain
 
-HEAD = (
-    ("seed", "seed", ""),
-    ("tool_width_m", "cells of", " m"),
-    ("radius_m", "radius", " m"),
-)
-
 # Markdown characters that end a cell, or make links, pictures and HTML.
 MARK_UP = re.compile(r"[\\`\[\]<>!|]")
 
@@ -71,19 +65,8 @@ class RunDescription:
         table = "\n".join(
             f"| {markdown_cell(name)} | {markdown_cell(value)} |" for name, value in rows
         )
-        head = "\n\n".join(filter(None, (markdown_cell(self.outcome), self._head())))
-        return f"{head}\n\n{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
-
-    def _head(self) -> str:
-        """Return the most important settings in a line."""
-        settings = {name.rpartition(".")[2]: value for name, value in flat_settings(self.config)}
-        facts = [
-            f"{text} {markdown_cell(settings[name])}{m}"
-            for name, text, m in HEAD
-            if name in settings
-        ]
-        robot, version = markdown_cell(self.robot), markdown_cell(self.version or "unknown")
-        return ", ".join([f"**{robot}**", f"version {version}", *facts])
+        head = f"{markdown_cell(self.outcome)}\n\n" if self.outcome else ""
+        return f"{head}{LEGEND}\n\n| setting | value |\n|---|---|\n{table}\n"
 
 
 def flat_settings(config: Settings, prefix: str = "") -> Iterator[tuple[str, str | float]]:
@@ -100,6 +83,14 @@ def flat_settings(config: Settings, prefix: str = "") -> Iterator[tuple[str, str
 def markdown_cell(value: object) -> str:
     """Return a value as one line of plain text in a table of Markdown."""
     return MARK_UP.sub(r"\\\g<0>", one_line(str(value)))
+
+
+def cells_of(status: Status) -> tuple[int, int] | None:
+    """Return the numbers of covered and of reachable cells of the order; None if unknown."""
+    if zones := status.mission.zones:
+        return sum(zone.covered for zone in zones), sum(zone.cells for zone in zones)
+    count = status.coverage
+    return None if count is None else (count.covered, count.coverable)
 
 
 # States without an outcome.

@@ -19,19 +19,17 @@ from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.curves import (
     COUNT_SPACING_NS,
     NOISE,
-    SHARE_SPACING_NS,
     Curves,
     StatusFigures,
 )
 from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
-from fasaco_edge.recording.scene.flows import flows_of
 from fasaco_edge.recording.scene.layers import (
     Anchor,
     Layers,
     is_far_from,
     size_in_file,
 )
-from fasaco_edge.recording.scene.runcard import UNDER_WAY, Outcome, RunDescription
+from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
@@ -39,7 +37,6 @@ from fasaco_edge.wire.documents.replies import TROUBLES
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import ErrorCounts, Recorder, Status
-from fasaco_edge.wire.messages.maps import directions_of
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 from fasaco_edge.wire.reasons import plain
@@ -118,13 +115,10 @@ class Scene:
         self._writer.log(entity, draw.mark_archetype(pose, name, colour), latched=True)
 
     def add_command(self, command: Command) -> None:
-        """Log a command accepted by the mission; draw the zones of the new order."""
+        """Log a command accepted by the mission."""
         which = f" {command.keep_out.name!r}" if command.keep_out else ""
         which += f" {command.room.id!r}" if command.room else ""
         self.add_line(entities.MISSION_LOG, f"command: {command.name}{which}")
-        if command.name in ("start", "cancel", "reset"):
-            # The order of the other two commands is empty: the zones are removed.
-            self._areas.begin(command.order)
 
     def add_rooms(self, found: Rooms) -> None:
         """Draw the outlines of the rooms, with their names."""
@@ -139,12 +133,6 @@ class Scene:
         self._paths.add(anchor.path(message), anchor.attachment(about))
         self._figures.add_path(about)
 
-    def add_coverage(self, grid: OccupancyGrid) -> None:
-        """Plot the share of the covered cells."""
-        covered, recovered = draw.coverage_fractions(grid)
-        self._curves.draw(entities.COVERED_FRACTION, covered, spacing_ns=SHARE_SPACING_NS)
-        self._curves.draw(entities.RECOVERED_FRACTION, recovered, spacing_ns=SHARE_SPACING_NS)
-
     def add_floor(self, grid: OccupancyGrid) -> None:
         """Tint the swept floor."""
         if self._comes_again(entities.FLOOR, grid.geometry, grid.cells):
@@ -155,11 +143,10 @@ class Scene:
         self._draw(entities.FLOOR, size, lambda: draw.floor_archetype(grid), drawn)
 
     def add_pheromone(self, message: PheromoneMessage, about: TrailAttachment) -> None:
-        """Draw the living trail; plot its branching factor."""
+        """Draw the living trail."""
         if self._comes_again(entities.PHEROMONE, (message.geometry, about), message.levels):
             return
         message = self._anchored(message.geometry.origin).grid(message)
-        self._curves.draw(entities.BRANCHING, about.branching)
 
         def draw_pheromone() -> rr.GridMap:
             label = draw.trail_label(message, about)
@@ -172,15 +159,6 @@ class Scene:
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
 
-    def add_directions(self, grid: OccupancyGrid) -> None:
-        """Draw the directions of the living trail."""
-        if self._comes_again(entities.DIRECTIONS, grid.geometry, grid.cells):
-            return
-        grid = self._anchored(grid.geometry.origin).grid(grid)
-        flows = flows_of(grid.geometry, *directions_of(grid))
-        size = flows.size_bytes
-        self._draw(entities.DIRECTIONS, size, lambda: draw.arrows_archetype(flows), size)
-
     def add_status(self, status: Status) -> None:
         """Plot the planner's figures, show its states, log its errors."""
         self._figures.add(status)
@@ -188,10 +166,6 @@ class Scene:
         self._add_configuration(status)
         self._add_restored(status.ledger.restored_cells)
         self._areas.add_report(status.mission)
-        if status.state not in UNDER_WAY:
-            # A later time puts the plans first: a viewer sorts lines of the same time by entity.
-            self._paths.finish()
-            self._writer.at(self._writer.wall_ns + 1)
         self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
         self._add_troubles(status)
         self._add_errors(status.errors)
@@ -222,12 +196,10 @@ class Scene:
         """Make the drawings that are due; call it often."""
         self._layers.catch_up(self._writer.wall_ns)
         self._driven.catch_up()
-        self._paths.catch_up()
 
     def finish(self) -> None:
         """Make all waiting drawings, and fit the view to the final map."""
         self._layers.finish()
-        self._paths.finish()
         self._driven.finish()
         if self._robot is not None:
             self._mark(entities.END, self._robot, draw.END_COLOUR)

@@ -1,46 +1,160 @@
-"""The recording process, common to the recorders of robots and fleets."""
+"""The recording process of robots and fleets: clock, queue of samples, loop.
+
+The queue's capacity bounds the recorder's memory. Zenoh, the drawing, the inputs and Rerun hold up
+to ten copies of a sample, and allocators keep some freed memory. With the largest maps that fit
+into the queue, at any publishing rate, the recorder takes at most
+
+    BASE_BYTES + COPIES * capacity
+
+``MemoryHigh=`` of the recorder's systemd unit is this sum for ``QUEUE_BYTES``, ``MemoryMax=`` is
+10 % more (a test checks the unit). Under a lower limit the queue is smaller. Measured on x86-64
+for a minute each, with random maps at 10 Hz, each followed by an update of the whole map: idle
+136 MB; 25 million pixels 488 MB; 31 million pixels 622 MB.
+"""
 
 from __future__ import annotations
 
 import os
+import threading
+import time
+from abc import ABC, abstractmethod
+from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
 
+from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import release_unused, return_soon, stop_event
 from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.sdk import rrb
-from fasaco_edge.recording.write.inbox import RunClock
-from fasaco_edge.recording.write.quota import DiskBudget, next_run
+from fasaco_edge.recording.write.quota import DiskBudget, cannot_record, next_run
 from fasaco_edge.recording.write.writer import RecordingWriter
+from fasaco_edge.wire.topic_types import NEWEST
+from fasaco_edge.wire.topics import TOPICS
 
 TAKE_TIMEOUT_S = 0.1
 EXIT_STALLED = 1
 
 
-class BusRecorder(Protocol):
-    """Connects the bus to a writer."""
+class RunClock:
+    """Monotonic UTC [ns]: the timeline continues if the system clock is set during a run."""
 
+    def __init__(self) -> None:
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
+
+    def now_ns(self) -> int:
+        """Return the time since the epoch [ns]; later settings of the system clock are ignored."""
+        return self._offset_ns + time.monotonic_ns()
+
+    def arrival(self, topic: str, sample: Sample) -> Arrival:
+        """Return a sample with its time of arrival, now."""
+        at_ns = time.monotonic_ns()
+        return Arrival(topic, sample, at_ns, self._offset_ns + at_ns)
+
+
+MB = 1_000_000
+BASE_BYTES = 145 * MB
+COPIES = 15
+# Queue size without a memory limit [bytes]: maps of up to 32 million pixels.
+QUEUE_BYTES = 32 * MB
+# Least queue size: small maps and other samples.
+LEAST_QUEUE_BYTES = 4 * MB
+
+
+def afforded_bytes(limit: int | None) -> int:
+    """Return the queue size under a memory limit [bytes]; None is no limit."""
+    if limit is None:
+        return QUEUE_BYTES
+    return min(max((limit - BASE_BYTES) // COPIES, LEAST_QUEUE_BYTES), QUEUE_BYTES)
+
+
+# Number of waiting samples at which the writer is behind: about ten seconds of poses.
+BEHIND_SAMPLES = 1024
+
+# For each topic: when the writer is behind, a new sample replaces waiting ones of these topics. A
+# map replaces map updates, too.
+SUPERSEDED = {
+    topic.name: frozenset({topic.name}) for topic in TOPICS if topic.queues.recorder == NEWEST
+}
+SUPERSEDED["map"] |= {"map_update"}
+
+
+class Inbox:
+    """A queue of samples in order of arrival, of at most ``capacity_bytes``.
+
+    While the writer is behind, a sample replaces older ones (``SUPERSEDED``). While the queue is
+    full, new samples are dropped. Both kinds are counted as lost.
+    """
+
+    def __init__(self, capacity_bytes: int, stamp: Callable[[str, Sample], Arrival]) -> None:
+        self._stamp = stamp
+        self._changed = threading.Condition()
+        self._waiting: deque[Arrival] = deque()
+        self._capacity = capacity_bytes
+        self._bytes = 0
+        self._lost: Counter[str] = Counter()
+
+    def post(self, topic: str, sample: Sample) -> None:
+        """Add a sample; thread-safe, never waits for the writer."""
+        size = sample.size
+        with self._changed:
+            # The lock is held: samples of several threads get increasing times.
+            arrival = self._stamp(topic, sample)
+            if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
+                self._drop(SUPERSEDED.get(arrival.topic, frozenset()))
+            if self._bytes + size > self._capacity:
+                self._lost[arrival.topic] += 1
+                return
+            self._waiting.append(arrival)
+            self._bytes += size
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> list[Arrival]:
+        """Return all waiting samples; wait up to ``timeout_s`` [s] for the first one."""
+        with self._changed:
+            if not self._waiting:
+                self._changed.wait(timeout_s)
+            arrivals = list(self._waiting)
+            self._waiting.clear()
+            self._bytes = 0
+            return arrivals
+
+    @property
+    def lost(self) -> Counter[str]:
+        """Number of lost samples of each topic."""
+        with self._changed:
+            return self._lost.copy()
+
+    def _drop(self, topics: frozenset[str]) -> None:
+        self._lost.update(arrival.topic for arrival in self._waiting if arrival.topic in topics)
+        kept = deque(arrival for arrival in self._waiting if arrival.topic not in topics)
+        self._bytes = sum(arrival.sample.size for arrival in kept)
+        self._waiting = kept
+
+
+class BusRecorder(ABC):
+    """The connection of the bus to a writer."""
+
+    writer: RecordingWriter
+
+    @abstractmethod
     def note(self, line: str) -> None:
         """Log a fault in the recording."""
 
+    @abstractmethod
     def listen(self) -> None:
         """Subscribe to all recorded topics."""
 
+    @abstractmethod
     def step(self, timeout_s: float) -> None:
         """Record samples that arrive within ``timeout_s`` [s], and drawings that are due."""
 
+    @abstractmethod
     def end(self) -> bool:
         """Write waiting samples and the footer; False if the disk fails."""
-
-    @property
-    def hangs(self) -> bool:
-        """Whether Rerun would hang when the interpreter exits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +223,7 @@ def record(
         while not stop.is_set():
             recorder.step(TAKE_TIMEOUT_S)
         code = 0 if recorder.end() else EXIT_STALLED
-    if recorder.hangs:
+    if recorder.writer.hangs:
         # All recoverable data are saved.
         os._exit(code)
     return code
@@ -120,7 +234,5 @@ def _repaired(folder: Path) -> list[str]:
     try:
         repairs = repair_folder(folder)
     except OSError as error:
-        raise BadConfiguration(
-            f"cannot record into {folder}: {error}", hint="name a folder that may be written to"
-        ) from error
+        raise cannot_record(folder, error) from error
     return [str(repair) for repair in repairs]

@@ -30,6 +30,13 @@ RESUME_BYTES = 1_000_000
 LOG = logging.getLogger(__name__)
 
 
+def cannot_record(folder: Path, error: OSError) -> BadConfiguration:
+    """Return the error of a folder that cannot be read, made or written to."""
+    return BadConfiguration(
+        f"cannot record into {folder}: {error}", hint="name a folder that may be written to"
+    )
+
+
 def next_run(folder: Path, robot: str, began: datetime) -> str:
     """Return the name of a new run of ``robot``, numbered after all existing ones.
 
@@ -39,9 +46,7 @@ def next_run(folder: Path, robot: str, began: datetime) -> str:
     try:
         names = os.listdir(folder) if folder.is_dir() else []
     except OSError as error:
-        raise BadConfiguration(
-            f"cannot record into {folder}: {error}", hint="name a folder that may be written to"
-        ) from error
+        raise cannot_record(folder, error) from error
     runs = [int(match[1]) for match in map(NUMBERED.fullmatch, names) if match]
     newest = max((number for number in runs if number < MOST_RUNS), default=0)
     return f"run{newest + 1:05}-{began:{TIME}}-{robot}"

@@ -25,9 +25,15 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.runcard import RunDescription
 from fasaco_edge.recording.scene.scene import Scene
-from fasaco_edge.recording.write.inbox import QUEUE_BYTES, Inbox, afforded_bytes
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.process import Output, record
+from fasaco_edge.recording.write.process import (
+    QUEUE_BYTES,
+    BusRecorder,
+    Inbox,
+    Output,
+    afforded_bytes,
+    record,
+)
 from fasaco_edge.text import is_reported
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
@@ -56,28 +62,23 @@ def run_recorder(config: DaemonConfig, bus_settings: BusSettings, output: Output
     return record(output.folder, bus_settings, lambda bus: Recorder(config, bus, output))
 
 
-class Recorder:
+class Recorder(BusRecorder):
     """Connects the bus to the writer: ``step`` takes samples, writes them, and reports."""
 
     def __init__(self, config: DaemonConfig, bus: Bus, output: Output) -> None:
         self._config = config
         self._bus = bus
         recording = output.begin(config.robot.name, build_blueprint(None))
-        self._writer, self._clock = recording.writer, recording.clock
-        self._inputs = InputLog(self._writer, recording.began_ns)
+        self.writer, self._clock = recording.writer, recording.clock
+        self._inputs = InputLog(self.writer, recording.began_ns)
         description = RunDescription(config.robot.name, f"{recording.began} UTC")
-        self._scene = Scene(self._writer, description)
+        self._scene = Scene(self.writer, description)
         capacity = afforded_bytes(memory_limit())
         self._inbox = Inbox(capacity, self._clock.arrival)
         if capacity < QUEUE_BYTES:
             self.note(f"memory is limited: samples above {capacity / 1e6:.1f} MB are not recorded")
         scene = self._scene
-        grids = {
-            "map": scene.add_map,
-            "coverage": scene.add_coverage,
-            "floor": scene.add_floor,
-            "directions": scene.add_directions,
-        }
+        grids = {"map": scene.add_map, "floor": scene.add_floor}
         self._drawers: dict[str, Callable[[Sample], None]] = {
             **{topic: partial(_draw_grid, draw) for topic, draw in grids.items()},
             "map_update": lambda sample: scene.add_map_update(decode_map_update(sample.payload)),
@@ -120,35 +121,28 @@ class Recorder:
             # Report during a long backlog, too.
             self._report_writing()
         self._inputs.note_lost(self._inbox.lost)
-        self._writer.at(self._clock.now_ns())
+        self.writer.at(self._clock.now_ns())
         self._sync()
         self._scene.catch_up()
         self._watch_planner(heard_ns)
         self._report_writing()
 
     def end(self) -> bool:
-        """Write waiting samples and the footer; False if the disk fails."""
         deadline_ns, undrawn = time.monotonic_ns() + LAST_DRAWN_NS, 0
         for arrival in self._inbox.take(0.0):
             is_late = time.monotonic_ns() >= deadline_ns
             self._write(arrival, is_drawn=not is_late)
             undrawn += is_late
         self._inputs.note_lost(self._inbox.lost)
-        self._writer.at(self._clock.now_ns())
+        self.writer.at(self._clock.now_ns())
         self._inputs.finish()
         if undrawn:
             self.note(f"the last {undrawn} messages are not drawn: there was no time")
         self._report_state("stopping", "asked to end")
         self._scene.finish()
-        return self._writer.close()
-
-    @property
-    def hangs(self) -> bool:
-        """Whether Rerun would hang when the interpreter exits."""
-        return self._writer.hangs
+        return self.writer.close()
 
     def note(self, line: str) -> None:
-        """Log a fault in the recording."""
         self._scene.add_line(entities.RECORDER_LOG, line, "WARN")
 
     def _subscribe(
@@ -164,12 +158,12 @@ class Recorder:
     def _sync(self) -> None:
         now_ns = time.monotonic_ns()
         self._inputs.write_if_due(now_ns)
-        self._writer.sync(now_ns)
+        self.writer.sync(now_ns)
 
     def _write(self, arrival: Arrival, *, is_drawn: bool = True) -> None:
         """Write a sample as an input for a replay; draw it if ``is_drawn``."""
         self._messages += 1
-        self._writer.message(arrival.wall_ns)
+        self.writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):
             line = "a second daemon of this robot's name waits: it is not recorded"
             self._scene.add_line(entities.BUS_LOG, line, "WARN")
@@ -210,7 +204,7 @@ class Recorder:
             self._scene.enter(entities.MISSION_STATE, "silent", SILENT)
 
     def _report_writing(self) -> None:
-        self._report_state(self._writer.state.value, self._writer.reason)
+        self._report_state(self.writer.state.value, self.writer.reason)
 
     def _report_state(self, state: str, reason: str) -> None:
         """Report on the bus and in the recording, on change and once a second."""
@@ -219,14 +213,14 @@ class Recorder:
         if last is not None and last.state == state and now_ns < self._next_report_ns:
             return
         self._next_report_ns = now_ns + REPORT_PERIOD_NS
-        path = self._writer.path
+        path = self.writer.path
         self._report = RecorderReport(
             state=state,
             reason=reason,
             file=str(path) if path else "",
-            bytes=self._writer.size,
+            bytes=self.writer.size,
             messages=self._messages,
-            lost=self._writer.lost + self._inbox.lost.total(),
+            lost=self.writer.lost + self._inbox.lost.total(),
             malformed=self._malformed,
             rss_mb=resident_mb(),
             cpu_s=round(time.process_time(), 3),

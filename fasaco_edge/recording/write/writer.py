@@ -10,12 +10,10 @@ import enum
 import logging
 from pathlib import Path
 
-from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
-from fasaco_edge.recording.write.part import Flush, Part
-from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.streams import LatchedState, send_blueprint, sweep
+from fasaco_edge.recording.write.part import Flush, LatchedState, Part, send_blueprint, sweep
+from fasaco_edge.recording.write.quota import DiskBudget, cannot_record
 
 LOG = logging.getLogger(__name__)
 
@@ -78,10 +76,7 @@ class RecordingWriter:
             self._begin_part()
         except OSError as error:
             if not self._abandoned:
-                raise BadConfiguration(
-                    f"cannot record into {folder}: {error}",
-                    hint="name a folder that may be written to",
-                ) from error
+                raise cannot_record(folder, error) from error
             self._enter(WriterState.STALLED, f"no part: {error}")
 
     @property

@@ -1,39 +1,61 @@
-"""The export of a review for other programs: CSV or Parquet tables, and NumPy arrays."""
+"""The export of a review for other programs: tables as CSV, maps as NumPy arrays."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from msgspec.structs import astuple
 from numpy.typing import NDArray
 
+from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.host.outputs import whole
-from fasaco_edge.recording.arrow import pa
-from fasaco_edge.review.output.tables import Column, Table, tables_of
+from fasaco_edge.recording import entities
+from fasaco_edge.recording.read.drawn import grids_in, lines_in, read_drawings
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import one_line
 
 FORMULA = re.compile(r"[=@]|[+-](?![\d.]+(e[+-]?\d+)?\Z)")
-CSV, PARQUET = FORMATS = ("csv", "parquet")
-TYPES = {"float": pa.float64(), "int": pa.int64(), "bool": pa.bool_(), "text": pa.string()}
-DESCRIPTION = "columns"
-"""The table that describes the columns of the other tables."""
+# Limit on the pheromone fields of a table, besides the last one.
+MOST_FIELDS = 64
 
 
-def export(review: Review, folder: Path, form: str = CSV) -> list[tuple[Path, str]]:
-    """Write all tables of a review into ``folder``; return each file, and a phrase about it.
+class Column(NamedTuple):
+    """A column: name, unit, meaning."""
 
-    Also written are columns.csv, which describes the columns and their units, and end.npz: map
-    (int8), its origin (x [m], y [m], yaw [rad]) and resolution [m]; visits (uint16) of the
-    lattice, its first row and column, and the edge of its cells [m].
+    name: str
+    unit: str
+    about: str
+
+
+class Table(NamedTuple):
+    """A table: name of its file, meaning of a row, columns, rows; unknown values are None."""
+
+    name: str
+    about: str
+    columns: tuple[Column, ...]
+    rows: Iterable[Sequence[object]]
+
+
+AT = Column("at_s", "s", "time since the recording began, by the robot's clock")
+X, Y = (Column(f"{axis}_m", "m", f"{axis} in the map frame") for axis in "xy")
+REVISION = Column("revision", "", "number of the published path")
+REASON = Column("reason", "", "reason given by the daemon")
+
+
+def export(review: Review, folder: Path) -> list[tuple[Path, str]]:
+    """Write tables and arrays of a review into ``folder``; return each file, and a phrase about it.
+
+    columns.csv describes the columns and their units; end.npz holds arrays as of the end, see
+    ``_write_arrays``.
 
     Args:
         review: the review.
         folder: created if missing.
-        form: CSV or PARQUET.
 
     Raises:
         OSError: a file cannot be written.
@@ -41,30 +63,25 @@ def export(review: Review, folder: Path, form: str = CSV) -> list[tuple[Path, st
     """
     folder.mkdir(parents=True, exist_ok=True)
     described, written = [], []
-    for table in tables_of(review):
-        file = folder / f"{table.name}.{form}"
-        if form == CSV:
-            _write_csv(table, file)
-        else:
-            _write_parquet(table, file)
+    for table in _tables(review):
+        file = folder / f"{table.name}.csv"
+        _write_csv(table, file)
         written.append((file, f"a row is {table.about}"))
         described += [(file.name, table.about, *column) for column in table.columns]
     columns = (
-        Column("file", "text", "", "its name"),
-        Column("row", "text", "", "what one of its rows is"),
-        Column("column", "text", "", "its name"),
-        Column("type", "text", "", "float, int, bool or text"),
-        Column("unit", "text", "", "of its values"),
-        Column("description", "text", "", "what it is"),
+        Column("file", "", "name of the file"),
+        Column("row", "", "meaning of a row"),
+        Column("column", "", "name of the column"),
+        Column("unit", "", "unit of its values"),
+        Column("description", "", "meaning of its values"),
     )
-    # This table is CSV even with Parquet, for people to read.
-    columns_of, arrays = folder / f"{DESCRIPTION}.csv", folder / "end.npz"
-    _write_csv(Table(DESCRIPTION, "", columns, described), columns_of)
+    columns_of, arrays = folder / "columns.csv", folder / "end.npz"
+    _write_csv(Table("columns", "", columns, described), columns_of)
     _write_arrays(review, arrays)
     return [
-        (columns_of, "what the columns of the tables hold, in what units: begin here"),
+        (columns_of, "meaning and unit of each table's columns: begin here"),
         *written,
-        (arrays, "the map at the end, and how often each cell was covered, for NumPy"),
+        (arrays, "map, swept floor and visited cells at the end, for NumPy"),
     ]
 
 
@@ -75,58 +92,26 @@ def _write_csv(table: Table, file: Path) -> None:
         writer.writerows([_cell(value) for value in row] for row in table.rows)
 
 
-def _write_parquet(table: Table, file: Path) -> None:
-    from pyarrow import parquet  # noqa: PLC0415
-
-    schema = pa.schema(
-        [
-            pa.field(
-                column.name,
-                TYPES[column.kind],
-                metadata={"unit": column.unit, "description": column.about},
-            )
-            for column in table.columns
-        ],
-        metadata={"description": table.about},
-    )
-    with whole(file) as new, parquet.ParquetWriter(new, schema) as writer:
-        rows: list[Sequence[object]] = []
-        for row in table.rows:
-            rows.append([one_line(value) if isinstance(value, str) else value for value in row])
-            if len(rows) == ROWS:
-                writer.write_batch(_batch(rows, schema))
-                rows = []
-        writer.write_batch(_batch(rows, schema))
-
-
-# Limit on the rows held in memory.
-ROWS = 50_000
-
-
-def _batch(rows: list[Sequence[object]], schema: pa.Schema) -> pa.RecordBatch:
-    values = zip(*rows, strict=True) if rows else ((),) * len(schema)
-    arrays = [pa.array(column, kind) for column, kind in zip(values, schema.types, strict=True)]
-    return pa.record_batch(arrays, schema=schema)
-
-
 def _cell(value: object) -> object:
     """Return a value that no spreadsheet takes for a formula."""
-    if isinstance(value, bool):
-        return int(value)
     text = one_line(value) if isinstance(value, str) else value
     return f"'{text}" if isinstance(text, str) and FORMULA.match(text) else text
 
 
 def _write_arrays(review: Review, file: Path) -> None:
-    grid, lattice, visits = review.data.grid, review.lattice, review.visits
+    """Write the arrays: row 0 is the lowest, origins are x [m], y [m], yaw [rad].
+
+    The map, int8, and the floor, bool, in pixels that may be finer; for each the origin, and the
+    edge of a pixel [m]. The visits, uint16, of each cell; row and column of the first cell on the
+    lattice, and the edge of a cell [m].
+    """
+    grid, floor, lattice, visits = review.data.grid, review.floor, review.lattice, review.visits
     arrays: dict[str, NDArray[np.generic]] = {}
     if grid is not None:
-        origin = grid.geometry.origin
-        arrays |= {
-            "map": grid.cells,
-            "map_origin": np.array((origin.x, origin.y, origin.yaw)),
-            "map_resolution_m": np.array(grid.geometry.resolution),
-        }
+        arrays |= {"map": grid.cells, **_place("map", grid.geometry)}
+    if floor is not None:
+        arrays |= {"reachable": floor.reachable, "swept": floor.swept}
+        arrays |= _place("floor", floor.geometry)
     if lattice is not None and visits is not None:
         arrays |= {
             "visits": visits,
@@ -136,3 +121,128 @@ def _write_arrays(review: Review, file: Path) -> None:
     # NumPy's type stub mistakes the first array for an option.
     with whole(file) as new:
         np.savez_compressed(new, **arrays)  # type: ignore[arg-type]
+
+
+def _place(name: str, geometry: GridGeometry) -> dict[str, NDArray[np.float64]]:
+    origin = geometry.origin
+    return {
+        f"{name}_origin": np.array((origin.x, origin.y, origin.yaw)),
+        f"{name}_resolution_m": np.array(geometry.resolution),
+    }
+
+
+def _tables(review: Review) -> Iterator[Table]:
+    data = review.data
+    yield Table(
+        "trail",
+        "a pose of the robot",
+        (AT, X, Y, Column("yaw_rad", "rad", "heading, counter-clockwise from the x axis")),
+        (
+            (round(at, 6), round(x, 4), round(y, 4), round(yaw, 5))
+            for at, (x, y, yaw) in zip(data.pose_s, data.poses, strict=True)
+        ),
+    )
+    yield _paths(review)
+    yield Table(
+        "path_points",
+        "a corner of a path, which leads straight on to the next corner",
+        (AT, REVISION, Column("number", "", "number of the corner on its path, from 0"), X, Y),
+        _points(review),
+    )
+    begin, end = (
+        Column(f"{name}_s", "s", f"{name} of the state, since the recording began")
+        for name in ("begin", "end")
+    )
+    yield Table(
+        "states",
+        "a period of a mission's state",
+        (begin, end, Column("state", "", "state of the mission"), REASON),
+        ((round(s.begin_s, 6), round(s.end_s, 6), s.name, s.reason) for s in review.states),
+    )
+    yield Table(
+        "coverage",
+        "the share covered at a time",
+        (AT, Column("share", "", "covered cells over the cells coverable at the end")),
+        ((round(at, 6), round(part, 6)) for at, part in review.covered_share.tolist()),
+    )
+    yield Table(
+        "plots",
+        "a plotted value",
+        (
+            AT,
+            Column("name", "", "name of the plot"),
+            Column("value", "", "plotted value, in force until the next row of that name"),
+        ),
+        (
+            (round(at, 6), name, value)
+            for name, points in sorted(review.record.plots.items())
+            for at, value in points.tolist()
+        ),
+    )
+    level = (
+        "1 to 255 on a log scale: pheromone = min * (max / min) ** ((level - 1) / 254), by the "
+        f"last values of {entities.PHEROMONE_RANGE}/min and /max in plots until at_s"
+    )
+    yield Table(
+        "pheromone",
+        "pheromone of a cell at one of up to 65 times, spread over the recording",
+        (AT, X, Y, Column("level", "", level)),
+        _levels(review),
+    )
+
+
+def _paths(review: Review) -> Table:
+    sides = zip(("x_min", "y_min", "x_max", "y_max"), ("left", "lower", "right", "upper"),
+                strict=True)  # fmt: skip
+    columns = (
+        AT,
+        REVISION,
+        Column("steps", "", "steps from point to point of the path"),
+        Column("planner", "", "planner of the path; empty if no plan was needed"),
+        Column("plan_ms", "ms", "duration of planning"),
+        Column("planned_steps", "", "steps of the walk as planned"),
+        Column("lower_bound_steps", "", "least steps of any walk"),
+        Column("gap", "", "cost_s / lower_bound_cost_s - 1"),
+        Column("cost_s", "s", "time to drive the walk as planned"),
+        Column("lower_bound_cost_s", "s", "least time of any walk"),
+        *(Column(name, "m", f"{side} edge of the changed part of the map") for name, side in sides),
+        REASON,
+    )
+    rows = (
+        (
+            *(round(path.at_s, 6), about.revision, about.steps, about.planner, path.plan_ms),
+            *(about.planned_steps, about.lower_bound_steps, about.gap),
+            *(about.planned_cost_s, about.lower_bound_cost_s),
+            *(astuple(about.changed) if about.changed else (None,) * 4),
+            about.reason,
+        )
+        for path, about in ((path, path.about) for path in review.data.paths)
+    )
+    return Table("paths", "a published path", columns, rows)
+
+
+def _points(review: Review) -> Iterator[Sequence[object]]:
+    record, seen = review.record, set[int]()
+    for line in read_drawings(record.drawn.get(entities.PATH, ()), lines_in, record.anchor):
+        # Each part repeats the path in force at its beginning.
+        if line.revision not in seen and len(line.xy):
+            seen.add(line.revision)
+            at_s = round(record.clock.seconds(line.at_ns), 6)
+            for number, (x, y) in enumerate(line.xy.tolist()):
+                yield at_s, line.revision, number, round(x, 4), round(y, 4)
+
+
+def _levels(review: Review) -> Iterator[Sequence[object]]:
+    record = review.record
+    places = record.drawn.get(entities.PHEROMONE, ())
+    # A limited number of fields at regular intervals, and the last one.
+    every = -(-len(places) // MOST_FIELDS) or 1
+    wanted = dict.fromkeys((*places[::every], *places[-1:]))
+    for field in read_drawings(wanted, grids_in, record.anchor):
+        at_s = round(record.clock.seconds(field.at_ns), 6)
+        rows, cols = np.nonzero(field.pixels)
+        middles = cols.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5
+        x, y = field.geometry.to_map(*middles)
+        levels = field.pixels[rows, cols].tolist()
+        for place_x, place_y, level in zip(x.tolist(), y.tolist(), levels, strict=True):
+            yield at_s, round(place_x, 4), round(place_y, 4), level

@@ -20,11 +20,11 @@ from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
+from fasaco_edge.review.floor import outlined
 from fasaco_edge.review.instant import Scene
 from fasaco_edge.review.orders import ordered_words
-from fasaco_edge.review.output.answer_rows import instant_rows, spot_rows
+from fasaco_edge.review.output.answers import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
-from fasaco_edge.review.rooms import outlined
 from fasaco_edge.review.run_data import RunData
 from fasaco_edge.review.spot import Spot
 from fasaco_edge.text import one_line

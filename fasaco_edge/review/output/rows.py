@@ -10,12 +10,10 @@ from msgspec.structs import astuple
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.comparison import figures, floor_words
+from fasaco_edge.review.comparison import NOT_KNOWN, amount, count, figures, floor_words
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.drive import MILESTONES
+from fasaco_edge.review.floor import MILESTONES, room_at
 from fasaco_edge.review.orders import order_words, ordered_words
-from fasaco_edge.review.rooms import room_at
-from fasaco_edge.review.wording import NOT_KNOWN, amount, count
 from fasaco_edge.text import percent
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
@@ -26,7 +24,7 @@ if TYPE_CHECKING:
     from fasaco_edge.review.run_data import PathSample
     from fasaco_edge.review.spot import Spot
 
-REASONS = ("reason", "replans", "median", "slowest")
+REASONS = ("reason", "replans")
 REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
 """Columns of ``reason_rows`` and ``replan_rows``."""
 # Keys of the settings shown; the run card and the JSON document have all.
@@ -113,7 +111,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     by_name = {figure.name: figure.text for figure in figures(document)}
     config, grid = document.config, document.map
     sides = "" if grid is None else "{:.1f} x {:.1f} m, ".format(*grid.sides_m)
-    planner = config.get("planner.own") or config.get("planner.name", "planner not recorded")
+    planner = config.get("planner.name", "planner not recorded")
     reached = [
         f"{percent} % {by_name[f'{percent} % of cells covered after']}" for percent in MILESTONES
     ]
@@ -128,7 +126,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         for area in order.unreached
     ]
     troubles = [
-        f"{clock(t.at_s or 0.0)} for {t.seconds or 0:.1f} s: {plain(t.reason) or t.state}"
+        f"{clock(t.at_s)} for {t.seconds:.1f} s: {plain(t.reason) or t.state}"
         for t in document.troubles
     ]
     commands = [" ".join(row) for row in command_rows(document)]
@@ -255,13 +253,9 @@ def figure_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     return [(figure.name, figure.text) for figure in figures(document)]
 
 
-def reason_rows(document: ReviewDocument) -> list[tuple[str, str, str, str]]:
-    """Return each kind of reason for a replan: number, median and longest duration."""
-    took = document.replan_ms_by_reason
-    return [
-        (plain(kind), str(count), amount(took[kind].p50, "ms"), amount(took[kind].max, "ms"))
-        for kind, count in document.replans_by_reason.items()
-    ]
+def reason_rows(document: ReviewDocument) -> list[tuple[str, str]]:
+    """Return each kind of reason for a replan, and the number of such replans."""
+    return [(plain(kind), str(count)) for kind, count in document.replans_by_reason.items()]
 
 
 def replan_rows(review: Review) -> list[tuple[str, ...]]:

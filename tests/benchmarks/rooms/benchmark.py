@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
-from fasaco_edge.drawing.rooms import draw_rooms
+from fasaco_edge.drawing.floor import number_rooms, paint_rooms
+from fasaco_edge.drawing.plot import Plot, View
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
 from tests.benchmarks.harness import add_floors
 from tests.benchmarks.rooms.homes import KINDS, RESOLUTION_M, home, seen
@@ -21,6 +22,9 @@ from tests.benchmarks.rooms.judge import Score, judge
 SHARES = (1.0, 0.8, 0.5, 0.2)
 GOAL_RECALL, GOAL_PRECISION, GOAL_MATTHEWS, GOAL_MS = 0.95, 0.95, 0.9, 200.0
 HEADER = ("floor", "seen", "floors", "recall", "precision", "matthews", "true", "found", "ms/Mpx")
+
+# Margin around a picture [m].
+MARGIN_M = 0.3
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +63,11 @@ def measure(kinds: Sequence[str], seeds: Sequence[int], pictures: Path | None) -
                 found[row : row + rows, col : col + cols] = rooms.labels
                 truth = np.where(grid.cells == 0, floor.rooms, 0)
                 if pictures:
-                    draw_rooms(grid, rooms).save(pictures / f"{floor.name}-{100 * share:.0f}.png")
+                    plot = Plot(View.over(grid.geometry.bounds(), MARGIN_M))
+                    plot.ground(grid)
+                    paint_rooms(plot, rooms)
+                    number_rooms(plot, rooms)
+                    plot.finished().save(pictures / f"{floor.name}-{100 * share:.0f}.png")
                 yield Found(kind, share, judge(truth, found, least), cpu_s, grid.cells.size)
 
 

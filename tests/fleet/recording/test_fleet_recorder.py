@@ -108,7 +108,14 @@ def test_each_robot_even_a_late_one_has_a_tree_of_its_own(studio):
     (part,) = studio.parts()
     assert is_fleet_recording(part)
     found = read_summary(part).rows
-    for name in ("world/map", "world/swept", "world/robot", "world/trail", "state", "metrics/kb_s"):
+    for name in (
+        "world/map",
+        "world/swept",
+        "world/robot",
+        "world/trail",
+        "state",
+        "metrics/left_cells",
+    ):
         assert found.get(f"robots/r1/{name}"), name
     assert found["robots/late/world/swept"]
     assert not [name for name in found if "stranger" in name]
@@ -262,7 +269,7 @@ def test_a_later_part_can_be_read_alone(studio):
     studio.until(lambda: studio.joined("r1"))
     studio.pass_time(1.2)
     studio.recorder._write()
-    studio.recorder._writer._begin_part()
+    studio.recorder.writer._begin_part()
     robot.tell(cells=[(row, 5) for row in range(10)])
     studio.pass_time(1.3)
     first, second = studio.parts()

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.fleet.review.others import swept_by_others
+from fasaco_edge.fleet.review.tracks import swept_by_others
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.wire.documents.json_text import encode_json

@@ -1,4 +1,4 @@
-"""Cells of a lattice, tinted by a walk's number of visits."""
+"""Floor of a picture: cells of a lattice, tinted by a walk's number of visits, and rooms."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.plot import Plot
+from fasaco_edge.drawing.plot import MapLayer, Plot
 from fasaco_edge.drawing.sheet import KeyEntry
 from fasaco_edge.grid.lattice import COVERABLE, Cell, CoverageLattice
+from fasaco_edge.grid.rooms import FoundRooms
 from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.kernels.rooms.clearance import clearances
 
 ENDS = (KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end"))
+# Share of a room's colour on white, low so that drawings on a room are visible.
+TINT = 0.38
+# Distance up to which rooms are neighbours, the depth of a door [m].
+NEAR_M = 0.2
 
 
 def draw_visits(
@@ -78,3 +84,42 @@ def visits_of(lattice: CoverageLattice, cells: NDArray[np.int32]) -> NDArray[np.
     window = lattice.window
     np.add.at(visits, (cells[:, 0] - window.row0, cells[:, 1] - window.col0), 1)
     return visits
+
+
+def paint_rooms(plot: Plot, rooms: FoundRooms) -> None:
+    """Paint rooms onto a map."""
+    reach = round(NEAR_M / rooms.geometry.resolution)
+    colours = _colours(rooms.labels, rooms.count, reach)
+    for number in range(1, rooms.count + 1):
+        mask = rooms.labels == number
+        plot.paint(MapLayer(rooms.geometry, mask), colours[number - 1])
+
+
+def number_rooms(plot: Plot, rooms: FoundRooms) -> None:
+    """Write each room's number where it is widest."""
+    for number in range(1, rooms.count + 1):
+        clear = clearances(rooms.labels != number, 100)
+        row, col = np.unravel_index(int(clear.argmax()), clear.shape)
+        place = rooms.geometry.to_map(float(col) + 0.5, float(row) + 0.5)
+        plot.text(str(number), place)
+
+
+def _colours(labels: NDArray[np.int32], count: int, reach: int) -> list[palette.Colour]:
+    """Return a colour for each room; neighbours differ if there are enough colours."""
+    near: list[set[int]] = [set() for _ in range(count + 1)]
+    for axis in (0, 1):
+        for by in range(1, reach + 1):
+            one = labels[by:] if axis == 0 else labels[:, by:]
+            other = labels[:-by] if axis == 0 else labels[:, :-by]
+            touch = (one != other) & (one > 0) & (other > 0)
+            for a, b in set(zip(one[touch].tolist(), other[touch].tolist(), strict=True)):
+                near[a].add(b)
+                near[b].add(a)
+    chosen = [-1] * (count + 1)
+    for number in range(1, count + 1):
+        taken = [chosen[other] for other in near[number]]
+        used = [chosen.count(colour) for colour in range(len(palette.ROBOTS))]
+        chosen[number] = min(
+            range(len(palette.ROBOTS)), key=lambda colour: (taken.count(colour), used[colour])
+        )
+    return [palette.tint(palette.robot(colour)[1], TINT) for colour in chosen[1:]]
