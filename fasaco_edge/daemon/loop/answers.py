@@ -26,9 +26,8 @@ from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.order import Command
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents import replies
-from fasaco_edge.wire.documents.json_text import decode_json, encode_json
+from fasaco_edge.wire.documents.json_text import Settings, decode_json, encode_json
 from fasaco_edge.wire.documents.replies import Version, encode_error
-from fasaco_edge.wire.documents.settings import Settings
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
 from fasaco_edge.wire.messages.ros_services import (
