@@ -10,9 +10,8 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.publisher import Publisher, RosPublisher
-from fasaco_edge.bus.session import Bus
+from fasaco_edge.bus.session import Bus, join
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.daemons import BaseClaim
 from fasaco_edge.follow.estimate import STAND, Command

@@ -11,15 +11,16 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import PathProgress, RobotState
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.serve.digest import Way, areas, lately, state
-from fasaco_edge.serve.marks import (
+from fasaco_edge.serve.messages import (
     COVERAGE_MARKS,
     FIELD_MARKS,
     FLOOR_MARKS,
     UNSWEPT_MARKS,
+    framed,
     grid_message,
     map_marks,
+    message_text,
 )
-from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.rooms import rooms, shares
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document

@@ -9,9 +9,8 @@ from contextlib import ExitStack
 from typing import Literal, NamedTuple
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.session import Bus, join, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.host.processes import stop_event

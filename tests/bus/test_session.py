@@ -213,7 +213,7 @@ def test_who_joined_listens_once_the_other_is_gone(endpoint, samples, mode):
 
         until(is_reached)
         assert samples.get(timeout=TIMEOUT_S).payload == b"to the second"
-        until(third.is_in_touch)
+        until(lambda: third.keep_in_touch(time.monotonic()))
 
 
 @pytest.mark.parametrize(

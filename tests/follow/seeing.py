@@ -9,8 +9,7 @@ import numpy as np
 
 from fasaco_edge.follow.estimate import STAND, moved
 from fasaco_edge.follow.follower import Follower
-from fasaco_edge.follow.scanner import Mount
-from fasaco_edge.follow.sight import Sight
+from fasaco_edge.follow.sight import Mount, Sight
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.motion import limited
 from fasaco_edge.grid.occupancy import OccupancyGrid

@@ -5,16 +5,17 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.scanner import (
+from fasaco_edge.follow.sight import (
     KNOWN_M,
     MARGIN_M,
+    STANDS_S,
     STOP_M,
     Mount,
+    Sight,
     Thing,
     first_met,
     points_of,
 )
-from fasaco_edge.follow.sight import STANDS_S, Sight
 from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid

@@ -30,7 +30,7 @@ from fasaco_edge.wire.documents.json_text import Settings, decode_json, encode_j
 from fasaco_edge.wire.documents.replies import Version, encode_error
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
-from fasaco_edge.wire.messages.ros_services import (
+from fasaco_edge.wire.messages.ros_node import (
     Triggered,
     check_request,
     encode_response,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.host.outputs import whole
+from fasaco_edge.host.durable import whole
 from fasaco_edge.recording.arrow import pa
 from fasaco_edge.review.output.tables import Column, Table, tables_of
 from fasaco_edge.review.review import Review

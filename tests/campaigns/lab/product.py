@@ -25,8 +25,7 @@ from fasaco_edge.daemon.loop.periodic import MOST_SQUARES
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.follow.follower import Follower
-from fasaco_edge.follow.scanner import Mount
-from fasaco_edge.follow.sight import Sight
+from fasaco_edge.follow.sight import Mount, Sight
 from fasaco_edge.follow.standstill import Standstill
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
