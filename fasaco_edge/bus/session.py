@@ -191,7 +191,7 @@ class Bus:
                 )
 
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
-        """Query ``selector`` (a key, parameters after ``?``), with JSON or b"" as its payload.
+        """Query ``selector``, a key, with JSON or b"" as its payload.
 
         Returns all replies that arrive within ``timeout_s`` [s].
         """

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import time
-from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import Any
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.robot_state import RobotState
-from fasaco_edge.grid.geometry import Point
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.json_text import Corners
 from fasaco_edge.wire.documents.replies import FloorReport, MissionReport
-from fasaco_edge.wire.documents.settings import KnownSettings, RobotSettings
-from fasaco_edge.wire.documents.status import DriveReport, FleetReport, Status
+from fasaco_edge.wire.documents.settings import KnownSettings
+from fasaco_edge.wire.documents.status import FleetReport, Status
 from fasaco_edge.wire.reasons import plain as plain_words
 
 Digest = dict[str, object]
@@ -33,46 +30,8 @@ MOST_M = 1e6
 UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
 
 
-class Way:
-    """The remaining distance and turns from each point of a path.
-
-    Args:
-        xy: points (x, y) of the path [m].
-    """
-
-    def __init__(self, xy: Sequence[Point] = ()) -> None:
-        way_m, turns, heading = 0.0, 0.0, None
-        lengths, quarters = array("d"), array("d")
-        for here, there in zip(xy[-2::-1], xy[:0:-1], strict=True):
-            way_m += math.dist(here, there)
-            towards = math.atan2(there[1] - here[1], there[0] - here[0])
-            if heading is not None:
-                turns += abs(math.remainder(heading - towards, math.tau)) / (math.pi / 2)
-            heading = towards
-            lengths.append(way_m)
-            quarters.append(turns)
-        self._is_known = len(xy) > 0
-        self._lengths, self._quarters = lengths[::-1], quarters[::-1]
-
-    def left_s(
-        self, at: int, robot: RobotSettings, drive: DriveReport, beyond_m: float = 0.0
-    ) -> float | None:
-        """Return the remaining time [s] from a place ``beyond_m`` [m] after point ``at``.
-
-        None if speed or path is unknown.
-        """
-        speed_m_s = drive.speed_m_s or robot.speed_m_s
-        if not speed_m_s > 0.0 or not self._is_known:
-            return None
-        if not 0 <= at < len(self._lengths):
-            return 0.0
-        turn_s = drive.quarter_turn_s or drive.planned_quarter_turn_s
-        return max(self._lengths[at] - beyond_m, 0.0) / speed_m_s + self._quarters[at] * turn_s
-
-
 def state(
     view: RobotState,
-    way: Way,
     now: float,
     ordered: Status | None = None,
     order: dict[str, Any] | None = None,
@@ -81,7 +40,6 @@ def state(
 
     Args:
         view: state of the robot.
-        way: path of the robot.
         now: time by the clock of ``view`` [s].
         ordered: the newest status with an order.
         order: the newest order given by command; None if unknown.
@@ -107,7 +65,7 @@ def state(
         "reason": _reason(status),
         "cells": status.coverage.fraction if status.coverage else None,
         "floor": _floor(floor) if floor else None,
-        "to_go_s": _to_go_s(view, status, way),
+        "to_go_s": _to_go_s(view, status),
         "grows": view.grows(now),
         "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
@@ -152,19 +110,14 @@ def _floor(floor: FloorReport) -> Digest:
     }
 
 
-def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
-    if status.state not in UNDERWAY or view.gone_since is not None:
-        return None
+def _to_go_s(view: RobotState, status: Status) -> int | None:
     path = status.path
-    if path is None:  # the daemon has not planned since its start
+    if status.state not in UNDERWAY or view.gone_since is not None or path is None:
         return None
-    left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)
-    if not path.steps:
-        # A paused robot will continue on its last path. If this server does not have that path, as
-        # after its restart, the daemon's time counts. In any other state the robot does not drive.
-        is_paused = status.state == "paused"
-        left_s = (left_s or path.line_s or None) if is_paused else None
-    return None if left_s is None or left_s > MOST_TO_GO_S else round(left_s)
+    # Without steps only a paused robot will go on with its line.
+    is_driven = path.steps or status.state == "paused"
+    left_s = path.line_s if is_driven else None
+    return None if not left_s or left_s > MOST_TO_GO_S else round(left_s)
 
 
 def _mission(mission: MissionReport) -> Digest:

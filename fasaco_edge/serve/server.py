@@ -13,7 +13,6 @@ import signal
 import ssl
 import threading
 from collections.abc import Callable
-from contextlib import suppress
 from http import HTTPStatus
 from importlib.resources import files
 
@@ -23,11 +22,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
-from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.client.phrases import steady_now
-from fasaco_edge.errors import FasacoError
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.serve.guard import Guard, is_same_origin
@@ -218,8 +215,6 @@ class Server:
 
 # Least period of messages to viewers, and longest wait for samples [s].
 FRAME_S, IDLE_S = 0.1, 0.2
-# Timeout of the query for a path [s].
-PATH_S = 1.0
 
 
 class LiveServer(Server):
@@ -256,8 +251,6 @@ class LiveServer(Server):
             now = steady_now()
             for topic, item in items:
                 self._view.take(topic, item, now)
-            if self._view.lacks_path:
-                self._ask_for_path(now)
             self._view.trouble = self._feed.trouble
             viewers = tuple(self._viewers)
             self._feed.want(FLOOR, bool(viewers))
@@ -266,16 +259,6 @@ class LiveServer(Server):
             if viewers and (news := self._view.news(now)) and self._loop is not None:
                 self._loop.call_soon_threadsafe(self._publish, news)
             self._ended.wait(max(FRAME_S - (steady_now() - now), 0.0))
-
-    def _ask_for_path(self, now: float) -> None:
-        """Query the path on which a paused robot continues, published before this server began."""
-        self._view.lacks_path = False
-        with suppress(FasacoError):
-            for reply in self._feed.ask("path?before_stop", b"", PATH_S):
-                if not reply.is_error:
-                    self._view.take_path_before(
-                        Sample("", reply.payload, reply.schema, reply.attachment), now
-                    )
 
     def _publish(self, news: dict[str, str | bytes]) -> None:
         for kind, message in news.items():

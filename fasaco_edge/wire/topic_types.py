@@ -144,7 +144,6 @@ class Query:
         schema: message type of the reply; "" for JSON.
         json: JSON Schema of the reply; "" for none.
         payload: JSON Schema of the query's payload; "" for none.
-        parameters: allowed parameters after ``?``.
         answered: ``at once``: with the newest sample; ``loop``: by the loop, with its decision.
         timeout_s: timeout of the reply [s].
         errors: codes of its errors, besides ``bad_query``.
@@ -155,7 +154,6 @@ class Query:
     schema: str = ""
     json: str = ""
     payload: str = ""
-    parameters: tuple[str, ...] = ()
     answered: Literal["at once", "loop"] = "at once"
     timeout_s: float = 1.0
     errors: tuple[str, ...] = ()

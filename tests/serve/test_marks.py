@@ -14,11 +14,9 @@ import pytest
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.serve import messages
-from fasaco_edge.serve.digest import Way
 from fasaco_edge.serve.guard import Guard, is_same_origin, read_tokens
 from fasaco_edge.serve.messages import message_text
-from fasaco_edge.wire.documents.settings import MapSettings, RobotSettings
-from fasaco_edge.wire.documents.status import DriveReport
+from fasaco_edge.wire.documents.settings import MapSettings
 from fasaco_edge.wire.messages.grids import GridOctets
 from fasaco_edge.wire.messages.maps import CoverageValue
 
@@ -84,18 +82,6 @@ def test_a_map_too_large_for_a_phone_keeps_its_walls(monkeypatch):
     step = round(head["pixel"] / 0.05)
     assert (head["x"], head["y"], head["yaw"]) == (1.0, 2.0, 0.5)
     assert (body.reshape(head["rows"], -1)[:, 41 // step] & 2).all()
-
-
-def test_the_rest_of_a_path_takes_its_way_and_its_turns():
-    way = Way([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0)])
-    robot, drive = RobotSettings(speed_m_s=0.5), DriveReport(planned_quarter_turn_s=3.0)
-    assert way.left_s(0, robot, drive) == pytest.approx(6.0 / 0.5 + 2 * 3.0)
-    assert way.left_s(1, robot, drive) == pytest.approx(4.0 / 0.5 + 3.0)
-    assert way.left_s(4, robot, drive) == 0.0
-    assert Way([(1.0, 1.0)]).left_s(0, robot, drive) == 0.0
-    assert way.left_s(0, RobotSettings(), DriveReport()) is None
-    measured = DriveReport(speed_m_s=1.0, quarter_turn_s=1.0, planned_quarter_turn_s=3.0)
-    assert way.left_s(0, robot, measured) == pytest.approx(8.0)
 
 
 def test_a_guard_knows_its_names_and_tokens():
