@@ -131,9 +131,7 @@ def test_a_viewer_sees_the_mission(covering, page):
         marks = np.frombuffer(grid["body"], np.uint8).reshape(rows, cols)
         assert (marks == np.where(HALL == 100, 2, 1)).all()
         # Status and path come each on its own.
-        state = looker.wait(
-            "state", lambda state: state.get("state") == "covering" and state["to_go_s"] > 10
-        )
+        state = looker.wait("state", lambda state: state.get("state") == "covering")
         assert state["absent"] == ""
         path = looker.wait("path")
         points = array("f", path["body"])
