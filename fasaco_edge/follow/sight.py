@@ -21,8 +21,8 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.follow.supervision import Reason, State
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.motion import stopping_rate
+from fasaco_edge.wire.messages.base import LaserScan, decode_scan
 from fasaco_edge.wire.messages.grids import GridOctets, read_grid, with_update
-from fasaco_edge.wire.messages.scans import LaserScan, decode_scan
 
 # Largest distance of points from the sensor; others are ignored [m].
 REACH_M = 3.0

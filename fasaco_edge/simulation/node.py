@@ -17,11 +17,11 @@ from fasaco_edge.host.processes import stop_event
 from fasaco_edge.simulation.world import Emission, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.base import decode_velocity
 from fasaco_edge.wire.messages.battery import BatteryState, Power, encode_battery
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
-from fasaco_edge.wire.messages.twists import decode_velocity
 
 log = logging.getLogger(__name__)
 

@@ -14,8 +14,8 @@ from fasaco_edge.follow.estimate import Command
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.host.processes import cpu_seconds, own_mb
 from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire.messages.base import decode_velocity
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from fasaco_edge.wire.messages.twists import decode_velocity
 from tests.campaigns import stop_tries
 from tests.campaigns.raw_messages import transform
 from tests.follow.seeing import Disc, plain_map, scan_at
