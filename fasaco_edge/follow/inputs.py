@@ -144,8 +144,6 @@ class Inputs:
         self._publisher.log()
         if news.path is not None:
             follower.take_path(news.path.payload, news.speed_m_s)
-        if news.unnamed is not None:
-            follower.take_unnamed_path(news.unnamed.payload)
 
     def _pose_taker(self, source: PoseSource) -> Callable[[Sample], None]:
         def take(sample: Sample) -> None:

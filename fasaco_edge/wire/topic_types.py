@@ -26,11 +26,10 @@ EVERY = 0
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """Quality of service of a publisher.
+    """Quality of service of a publisher; all are reliable.
 
     Attributes:
         priority: order of sending on a busy link.
-        reliability: whether a lossy link sends a sample again.
         congestion: ``drop``: a slow receiver loses the sample; ``block``: the sender waits
             for it.
         express: whether it is sent at once, never batched with others into one packet.
@@ -39,7 +38,6 @@ class Qos:
     """
 
     priority: Priority = "data"
-    reliability: Literal["reliable", "best_effort"] = "reliable"
     congestion: Literal["drop", "block"] = "drop"
     express: bool = False
     cache: int = 0

@@ -91,7 +91,7 @@ def qos_entry(topic: Topic) -> dict[str, Any]:
     qos = QOS[topic.name]
     blocked = f"the {topic.speaker}, 5 s; the daemon takes each sample in at once"
     return {
-        "reliability": qos.reliability,
+        "reliability": "reliable",
         "congestion": qos.congestion,
         "priority": qos.priority,
         "express": qos.express,
