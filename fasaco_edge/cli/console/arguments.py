@@ -248,7 +248,7 @@ def naming(place: Path) -> Iterator[None]:
 
 @contextmanager
 def writing(file: Path) -> Iterator[Path]:
-    """Yield a temporary name under which to write ``file``, see ``host.outputs.whole``.
+    """Yield a temporary name under which to write ``file``, see ``host.durable.whole``.
 
     Raises:
         BadConfiguration: the file cannot be written.
