@@ -14,8 +14,14 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.bench.processes import DaemonProcess, warm_kernels
-from fasaco_edge.bench.robot import MapSource, building, robot_pose, with_crate
+from fasaco_edge.bench.processes import (
+    DaemonProcess,
+    MapSource,
+    building,
+    robot_pose,
+    warm_kernels,
+    with_crate,
+)
 from fasaco_edge.drawing.spread import Spread, document, median, percentile, text
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import cpu_seconds, own_mb, peak_mb, resident_mb

@@ -81,7 +81,7 @@ class LatchedSubscription(Subscription):
         # Reentrant: a cache of the same session replies on the querying thread.
         self._lock = threading.RLock()
         self._publishers = AskedPublishers()
-        self._order = SampleOrder(depth, self._publishers, receive, asker.wake)
+        self._order = SampleOrder(depth, self._publishers, receive)
         self._tokens = f"{key}/@adv/pub/**"
         self._query_tokens_at = 0.0
         self._awaits_tokens = False
@@ -99,7 +99,6 @@ class LatchedSubscription(Subscription):
         """Send due queries, on the asker's thread; return when the next is due [s, monotonic]."""
         self._query_tokens(now)
         with self._lock:
-            self._order.deliver_due(now)
             questions: list[tuple[str, AskedPublisher | None]] = []
             asks_all, again = self._publishers.take_all(now)
             if asks_all:
@@ -108,7 +107,7 @@ class LatchedSubscription(Subscription):
                 # Zenoh remembers each key: a single publisher is queried by the key of all.
                 key = self._caches if len(self._publishers) == 1 else publisher.key
                 questions.append((f"{key}?{self._order.missing(publisher.name)}", publisher))
-            next_at = min(self._query_tokens_at, self._publishers.next_at, self._order.next_at)
+            next_at = min(self._query_tokens_at, self._publishers.next_at)
         for selector, asked in questions:
             self._put(selector, asked, again=again)
         return next_at

@@ -5,12 +5,17 @@ session has ended. So a map, pose or mask does not alternate between publishers,
 program is accepted again.
 
 A publisher is identified by the Zenoh id of its session, see ``arrival.Sample.sender``. A sample of
-unknown origin always counts.
+unknown origin always counts; two publishers of such maps are noticed, as their maps alternate.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+import zlib
+from collections import deque
+from typing import TYPE_CHECKING, Protocol
+
+if TYPE_CHECKING:
+    from fasaco_edge.grid.occupancy import OccupancyGrid
 
 # A second publisher is reported for at least this long after its last sample [s].
 SHOWN_S = 10.0
@@ -96,3 +101,41 @@ class OnePublisher:
     def _is_over(self, now: float) -> bool:
         is_gone = self._was_linked and not self._sessions.is_linked(self._first)
         return is_gone or now - self._received_at > self._silent_s
+
+
+# Number of maps within PERIOD_S [s], each equal to the last but one, that shows two publishers. A
+# door that opens and shuts is slower.
+RETURNS, PERIOD_S = 3, 10.0
+# Least difference of the two maps, above flickering pixels: free pixels along this length [m].
+LEAST_WALL_M = 0.5
+
+# Frame, geometry and checksum of the pixels; and the number of free pixels.
+_Seen = tuple[tuple[object, ...], int]
+
+
+class ReturningMaps:
+    """Detects maps that alternate."""
+
+    def __init__(self) -> None:
+        self._last: _Seen | None = None
+        self._before: _Seen | None = None
+        self._returned = deque[float](maxlen=RETURNS)
+
+    def note(self, grid: OccupancyGrid, now: float) -> None:
+        """Note a map that arrived at ``now`` [s, monotonic]."""
+        pixels = grid.cells.tobytes()
+        seen = (grid.frame, grid.geometry, zlib.crc32(pixels)), pixels.count(0)
+        last, before = self._last, self._before
+        if last is None or seen == last:
+            self._last = seen
+            return
+        is_large = abs(seen[1] - last[1]) * grid.geometry.resolution >= LEAST_WALL_M
+        if seen == before and (is_large or seen[0][1] != last[0][1]):
+            self._returned.append(now)
+        self._before, self._last = last, seen
+
+    def conflict(self, now: float) -> str:
+        """Return the text of a conflict; "" for none."""
+        if len(self._returned) < RETURNS or now - self._returned[0] > PERIOD_S:
+            return ""
+        return "maps alternate, as from two publishers"

@@ -35,7 +35,7 @@ class Publisher:
     def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:
         options: dict[str, Any] = {
             "encoding": encoding_of(schema),
-            "reliability": getattr(zenoh.Reliability, qos.reliability.upper()),
+            "reliability": zenoh.Reliability.RELIABLE,
             "congestion_control": getattr(zenoh.CongestionControl, qos.congestion.upper()),
             "priority": getattr(zenoh.Priority, qos.priority.upper()),
             "express": qos.express,

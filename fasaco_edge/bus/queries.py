@@ -10,8 +10,8 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import zenoh
@@ -131,13 +131,14 @@ class Request:
 
     Attributes:
         key: the key expression of the query; it may have wildcards.
-        parameters: parameters after ``?``, without Zenoh's own, which begin with ``_``.
+        parameters: names of the parameters after ``?``, without Zenoh's own, which begin with
+            ``_``.
         payload: payload of the query, or b"".
         attachment: attachment of the query, or b"".
     """
 
     key: str
-    parameters: Mapping[str, str] = field(default_factory=dict)
+    parameters: tuple[str, ...] = ()
     payload: bytes = b""
     attachment: bytes = b""
 
@@ -171,8 +172,7 @@ def matches(key: str, other: str) -> bool:
 def request_of(query: zenoh.Query) -> Request:
     """Return the content of a query."""
     listed: Any = query.parameters  # the stubs declare no mapping
-    parameters = {str(name): str(value) for name, value in listed}
-    own = {name: value for name, value in parameters.items() if not name.startswith("_")}
+    own = tuple(str(name) for name, _ in listed if not str(name).startswith("_"))
     payload = query.payload.to_bytes() if query.payload is not None else b""
     beside = query.attachment.to_bytes() if query.attachment is not None else b""
     return Request(str(query.key_expr), own, payload, beside)

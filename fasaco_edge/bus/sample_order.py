@@ -1,8 +1,9 @@
 """Delivery order of the samples of a latched key: in order for each publisher, none twice.
 
 Samples arrive as they are published, and as replies to queries. A reply may overtake published
-samples: it has a higher priority, and samples are delivered by another thread. So a reply that
-leaves a gap waits a moment for the missing samples.
+samples: it has a higher priority, and samples are delivered by another thread. Samples that a reply
+has overtaken are dropped as older. Where several samples of a publisher count, all wait until the
+replies are complete.
 
 The cache of each publisher is queried at most once a second, and not while a reply is pending. Up
 to MOST_PUBLISHERS of a key are queried.
@@ -10,8 +11,6 @@ to MOST_PUBLISHERS of a key are queried.
 
 from __future__ import annotations
 
-import math
-import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -22,11 +21,9 @@ import zenoh
 ASK_PERIOD_S = 1.0
 # Largest number of publishers of a key that are queried; samples of the others are still received.
 MOST_PUBLISHERS = 16
-# Time that samples after a gap wait, counted from the last sample of their publisher [s].
-UNDER_WAY_S = 0.5
 # Largest number of publishers whose last sample is remembered.
 MOST_REMEMBERED = 64
-# Largest size of the samples that wait for earlier ones, in case a publisher does not reply.
+# Largest size of the samples that wait for replies, in case a publisher does not reply.
 HELD_BYTES = 8_000_000
 _SEQUENCE_NUMBERS = 1 << 32
 
@@ -76,10 +73,6 @@ class AskedPublishers:
     def ask_all(self) -> None:
         """Query all publishers at the next poll, also for samples received already."""
         self._wants_all = self._wants_again = True
-
-    def ask_soon(self, name: str) -> None:
-        """Query a publisher at the next poll."""
-        self._publishers[name].ask_at = 0.0
 
     def take_all(self, now: float) -> tuple[bool, bool]:
         """Return whether to query all publishers, and whether also for samples received already."""
@@ -140,18 +133,12 @@ class SampleOrder:
         depth: number of last samples of a publisher that count.
         publishers: the publishers that are queried.
         receive: called with each sample, in order.
-        wake: called when a query, or ``deliver_due``, becomes due earlier.
     """
 
     def __init__(
-        self,
-        depth: int,
-        publishers: AskedPublishers,
-        receive: Callable[[zenoh.Sample], None],
-        wake: Callable[[], None],
+        self, depth: int, publishers: AskedPublishers, receive: Callable[[zenoh.Sample], None]
     ) -> None:
-        self._depth, self._publishers = depth, publishers
-        self._receive, self._wake = receive, wake
+        self._depth, self._publishers, self._receive = depth, publishers, receive
         # For each publisher its mark: the sequence number or timestamp of its last sample.
         self._last_mark = OrderedDict[str, int]()
         # When that sample was published, by the publisher's clock; 0 if unknown.
@@ -159,11 +146,9 @@ class SampleOrder:
         # The marks of publishers without a token. They only serve to drop replies received already:
         # without a token, a reset of the publisher's clock goes unnoticed.
         self._unconfirmed = OrderedDict[str, int]()
-        # Samples that wait for earlier ones.
+        # Samples that wait for replies.
         self._held: list[tuple[str, int, zenoh.Sample]] = []
         self._held_bytes = 0
-        # Until when samples after a gap wait [s, monotonic]; infinite without such samples.
-        self._gap_until = math.inf
 
     def missing(self, name: str) -> str:
         """Return the query for the samples after a publisher's last one."""
@@ -181,16 +166,6 @@ class SampleOrder:
         if name in self._unconfirmed:
             _remember(self._last_mark, name, self._unconfirmed.pop(name))
 
-    @property
-    def next_at(self) -> float:
-        """Time when ``deliver_due`` is due [s, monotonic]."""
-        return self._gap_until
-
-    def deliver_due(self, now: float) -> None:
-        """Deliver the samples that have waited long enough for earlier ones."""
-        if now >= self._gap_until:
-            self.deliver_held(over_gaps=True)
-
     def take_published(self, sample: zenoh.Sample) -> None:
         """Take a published sample."""
         name, mark = _origin(sample)
@@ -207,57 +182,34 @@ class SampleOrder:
             # Number 0 and a newer stamp: the publisher was restarted under the same name.
             del self._last_mark[name]
             last = None
-        is_gap = name in self._publishers and _leaves_gap(name, mark, last)
-        if waits or (self._depth > 1 and is_gap):
+        if waits:
             self._hold(name, mark, sample)
         elif _is_newer(mark, last):
             self._deliver(name, mark, sample)
-            # A missing sample has arrived: more of them may follow.
-            if self._gap_until < math.inf and any(one[0] == name for one in self._held):
-                self._gap_until = time.monotonic() + UNDER_WAY_S
 
     def take_answer(self, sample: zenoh.Sample, *, again: bool) -> None:
         """Take a reply; with ``again``, deliver the last sample even if it was received already."""
         name, mark = _origin(sample)
         last = self._last_mark.get(name, self._unconfirmed.get(name))
-        if self._depth > 1 or (not again and _leaves_gap(name, mark, last)):
+        if self._depth > 1:
             self._hold(name, mark, sample)
         elif _is_newer(mark, last) or (again and mark == last):
             self._deliver(name, mark, sample)
 
-    def deliver_held(self, *, over_gaps: bool = False) -> None:
-        """Deliver waiting samples, once all replies have arrived.
-
-        Samples after a gap go on waiting for the missing ones, except with ``over_gaps``.
-        """
+    def deliver_held(self) -> None:
+        """Deliver waiting samples, once all replies have arrived."""
         held, self._held = sorted(self._held, key=lambda one: one[:2]), []
         self._held_bytes = 0
         for name, mark, sample in held:
-            last = self._last_mark.get(name, self._unconfirmed.get(name))
-            if not over_gaps and _leaves_gap(name, mark, last):
-                self._held.append((name, mark, sample))
-                self._held_bytes += len(sample.payload)
-            elif _is_newer(mark, last):
+            if _is_newer(mark, self._last_mark.get(name, self._unconfirmed.get(name))):
                 self._deliver(name, mark, sample)
-        if not self._held:
-            self._gap_until = math.inf
-        elif self._gap_until == math.inf:
-            self._gap_until = time.monotonic() + UNDER_WAY_S
-            self._wake()
 
     def _hold(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._held.append((name, mark, sample))
         self._held_bytes += len(sample.payload)
         is_full = len(self._held) > MOST_PUBLISHERS * self._depth
         if is_full or self._held_bytes > HELD_BYTES:
-            self.deliver_held(over_gaps=True)
-        elif (
-            not self._publishers.open_queries
-            and self._gap_until == math.inf
-            and name in self._publishers
-        ):
-            self._publishers.ask_soon(name)
-            self._wake()
+            self.deliver_held()
 
     def _deliver(self, name: str, mark: int, sample: zenoh.Sample) -> None:
         self._unconfirmed.pop(name, None)
@@ -294,8 +246,3 @@ def _is_newer(mark: int, last: int | None) -> bool:
     if last is None or last >= _SEQUENCE_NUMBERS:
         return last is None or mark > last
     return 0 < (mark - last) % _SEQUENCE_NUMBERS < _SEQUENCE_NUMBERS // 2
-
-
-def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
-    """Return whether samples before this one are missing."""
-    return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)

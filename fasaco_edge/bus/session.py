@@ -8,6 +8,7 @@ pass the sample on.
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -37,8 +38,12 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
 from fasaco_edge.wire.topics import IN_ORDER
 
+LOG = logging.getLogger(__name__)
+
 # Timeout for closing a session [s]: if a peer no longer reads, Zenoh would wait ten seconds.
 CLOSE_S = 1.2
+# Retry period while nothing listens at the endpoint [s].
+RETRY_S = 1.0
 
 
 @dataclass(slots=True)
@@ -186,7 +191,7 @@ class Bus:
                 )
 
     def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
-        """Query ``selector`` (a key, parameters after ``?``), with JSON or b"" as its payload.
+        """Query ``selector``, a key, with JSON or b"" as its payload.
 
         Returns all replies that arrive within ``timeout_s`` [s].
         """
@@ -255,17 +260,14 @@ class Bus:
         """
         return session == self.id or session in map(str, self._session.info.routers_zid())
 
-    def is_in_touch(self) -> bool:
-        """Return whether samples can arrive: a session is connected, or may connect at any time."""
-        info = self._session.info
-        return self._listens or bool(info.routers_zid() or info.peers_zid())
-
     def keep_in_touch(self, now: float) -> bool:
         """Return whether samples can arrive; take over the port of the joined process if it ended.
 
         To be polled; ``now`` is monotonic [s].
         """
-        in_touch = self.is_in_touch()
+        info = self._session.info
+        # A listener can be connected to at any time.
+        in_touch = self._listens or bool(info.routers_zid() or info.peers_zid())
         if self._stand_in is not None:
             self._stand_in.poll(now, is_alone=not in_touch)
         return in_touch
@@ -294,19 +296,16 @@ class Bus:
         for lent in self._lent:
             lent.release()
         self._lent.clear()
-        ending = threading.Thread(
-            target=_end, args=(self._session, self._stand_in), name="close", daemon=True
-        )
+        ending = threading.Thread(target=self._end, name="close", daemon=True)
         ending.start()
         ending.join(CLOSE_S)
 
-
-def _end(session: zenoh.Session, stand_in: StandIn | None) -> None:
-    endings: list[Any] = [session, stand_in]  # close() has no annotation
-    for ending in endings:
+    def _end(self) -> None:
+        session: Any = self._session  # close() has no annotation
         with contextlib.suppress(zenoh.ZError):  # it took too long
-            if ending is not None:
-                ending.close()
+            session.close()
+        if self._stand_in is not None:
+            self._stand_in.close()
 
 
 def open_bus(settings: BusSettings) -> Bus:
@@ -329,3 +328,24 @@ def open_bus(settings: BusSettings) -> Bus:
     except zenoh.ZError as error:
         raise BusUnavailable(first_line(error)) from error
     return Bus(session, stand_in=StandIn(session_config(settings)))
+
+
+def join(
+    settings: BusSettings, stop: threading.Event, waits: Callable[[bool], None] = lambda _: None
+) -> Bus | None:
+    """Open a session once a process listens at the endpoint; None if ``stop`` is set before.
+
+    ``waits`` is called before each retry; its argument is whether this is the first retry.
+    """
+    is_first = True
+    while not stop.is_set():
+        try:
+            return open_bus(settings)
+        except BusUnavailable as error:
+            if is_first:
+                there = ", ".join(settings.connect)
+                LOG.warning("waiting for the bus at %s: %s", there, error, extra={"event": "bus"})
+            waits(is_first)
+            is_first = False
+            stop.wait(RETRY_S)
+    return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import re
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
@@ -55,32 +54,17 @@ exit codes: 0 answered; 1 refused, or no answer; 2 usage error; 78 invalid robot
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("question", choices=RPC_NAMES, metavar="NAME", help=", ".join(RPC_NAMES))
-    parser.add_argument(
-        "--param",
-        type=_parameter,
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="parameter of the query; may be repeated",
-    )
     add_question(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Ask, and show the answer."""
-    reply = ask(args, args.question, ";".join(args.param))
+    reply = ask(args, args.question)
     if args.json:
         print_answer(reply)
     else:
         show(args.question, reply)
     return Exit.OK
-
-
-def _parameter(text: str) -> str:
-    # Special characters of a Zenoh selector would change the query.
-    if not re.fullmatch(r"\w+=[^;?#&|]*", text):
-        raise argparse.ArgumentTypeError(f"must be KEY=VALUE, got {text!r}")
-    return text
 
 
 TIMEOUT_S = 5.0
@@ -124,8 +108,8 @@ def add_question(parser: argparse.ArgumentParser) -> None:
     add_robot_on_bus(parser)
 
 
-def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: bytes = b"") -> Reply:
-    """Return the answer to a query; ``parameters``: text after ``?`` in the selector.
+def ask(args: argparse.Namespace, name: str, payload: bytes = b"") -> Reply:
+    """Return the answer to a query.
 
     Raises:
         RefusedError: the answer is an error; with ``--json`` it is printed first.
@@ -135,9 +119,8 @@ def ask(args: argparse.Namespace, name: str, parameters: str = "", payload: byte
     from fasaco_edge.bus.session import open_bus
 
     keys, settings, _ = robot_on_bus(args)
-    selector = keys.rpc(name) + (f"?{parameters}" if parameters else "")
     with open_bus(settings) as bus:
-        found = bus.get(selector, args.timeout, payload)
+        found = bus.get(keys.rpc(name), args.timeout, payload)
         if not found:
             alive = bus.alive(f"{keys.base}/@v1/*/alive")
             raise nobody_answers(keys.prefix, {key.split("/")[-2] for key in alive})

@@ -112,8 +112,8 @@ def run(args: argparse.Namespace) -> int:
         with _recording(args) as source_of:
             return _serve(Server(guard, source_of), args, address, guard)
     from fasaco_edge.client.feed import Feed
-    from fasaco_edge.serve.live import LiveServer
     from fasaco_edge.serve.served_view import ServedView
+    from fasaco_edge.serve.server import LiveServer
 
     here = robot_on_bus(args)
     with Feed(here.bus, here.keys, with_fleet=True) as feed:

@@ -127,7 +127,7 @@ class Feed(Joining):
         """Query the robot's daemon; return all replies.
 
         Args:
-            query: name of the query, parameters after ``?``.
+            query: name of the query.
             payload: its JSON payload.
             timeout_s: timeout of the replies [s].
 
@@ -138,8 +138,7 @@ class Feed(Joining):
             bus = self._bus
         if bus is None:
             raise BusUnavailable(self.trouble or "not joined yet")
-        name, mark, parameters = query.partition("?")
-        return bus.get(self._keys.rpc(name) + mark + parameters, timeout_s, payload)
+        return bus.get(self._keys.rpc(query), timeout_s, payload)
 
     def _request(self, bus: Bus) -> None:
         for topic in self._wanted - self._requested.keys():

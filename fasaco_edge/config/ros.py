@@ -12,7 +12,7 @@ from fasaco_edge.bus.access import Role, ros_rights
 from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
-from fasaco_edge.wire.messages.ros_services import TRIGGERED, Triggered
+from fasaco_edge.wire.messages.ros_node import TRIGGERED, Triggered
 from fasaco_edge.wire.ros_keys import TRIGGER, Release, RosTopic, graph_key
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
 from fasaco_edge.wire.topics import ROS_TOPICS, TF_STATIC

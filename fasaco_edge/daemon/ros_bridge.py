@@ -20,7 +20,7 @@ from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.messages.diagnostics import encode_diagnostics
+from fasaco_edge.wire.messages.ros_node import encode_diagnostics
 from fasaco_edge.wire.ros_keys import Endpoint, RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE, Topic
 

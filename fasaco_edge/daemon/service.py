@@ -11,13 +11,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.joining import join
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.session import Bus, join, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.cautions import log_cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.claim import NameClaim
-from fasaco_edge.daemon.compiling import KernelCompiler
 from fasaco_edge.daemon.fleet_wing import receiver_of, sender_of
 from fasaco_edge.daemon.ledger.rooms_file import RoomsFile, RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
@@ -39,6 +37,7 @@ from fasaco_edge.host.processes import (
     release_unused,
     return_soon,
 )
+from fasaco_edge.planners.compiling import REASON, STAGE, CompilerProcess
 from fasaco_edge.wire import topics
 
 if TYPE_CHECKING:
@@ -235,3 +234,56 @@ def _serve(
             recorder.close(RECORDER_STOP_S, RECORDER_LONGEST_S)
         rooms.close(LEDGER_LEAST_S)
         ledger.disk.close(max(stopped + LEDGER_STOP_S - time.monotonic(), LEDGER_LEAST_S))
+
+
+# Startup time requested for each stage; longer than any stage takes on a small computer [s].
+STAGE_S = 600.0
+# Period of checks whether compilation has ended [s].
+LOOK_S = 0.02
+
+
+class KernelCompiler:
+    """Compiles the kernels before the service reports that it is ready, in a separate process.
+
+    The first map must not wait minutes for compilation. The process is separate so that an idle
+    daemon stays small: it loads the kernels with the first map.
+    """
+
+    def __init__(self, manager: ServiceManager) -> None:
+        self._manager = manager
+        self._stages = 0
+        self._started = time.monotonic()
+        self._process = CompilerProcess.start()
+        if self._process is not None:
+            threading.Thread(target=self._listen, name="compiler", daemon=True).start()
+
+    def wait(self, stop: threading.Event) -> None:
+        """Wait until all kernels are compiled, or ``stop`` is set.
+
+        Raises:
+            ProcessEnded: the compiler failed, or was killed.
+        """
+        if self._process is None:
+            return
+        while not self._process.has_ended() and not stop.wait(LOOK_S):
+            pass
+        if stop.is_set():
+            return
+        self._process.check()
+        if self._stages:
+            LOG.info("kernels compiled in %.0f s", time.monotonic() - self._started)
+
+    def close(self) -> None:
+        """End the process; the stages that it has compiled stay."""
+        if self._process is not None:
+            self._process.close()
+
+    def _listen(self) -> None:
+        assert self._process is not None
+        for word, text in self._process.lines():
+            if word == REASON:
+                LOG.info("compiling the kernels, which takes minutes: %s", text)
+            elif word == STAGE:
+                self._stages += 1
+                self._manager.extend(STAGE_S)
+                self._manager.status(f"compiling kernels: {text}")

@@ -10,17 +10,17 @@ from pathlib import Path
 from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.reload import read_config
-from fasaco_edge.doctor import installation, machine, security, session
+from fasaco_edge.doctor import computer, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, fail, find_unit, ok, warn
 from fasaco_edge.errors import BadConfiguration, FasacoError
 
 CHECKS = (
-    Check("platform", machine.system, of_machine=True),
-    Check("memory", machine.memory, of_machine=True),
-    Check("clock", machine.clock, of_machine=True),
-    Check("kernels", installation.kernels, of_machine=True),
-    Check("disk", installation.disk),
-    Check("permissions", installation.permissions),
+    Check("platform", computer.system, of_machine=True),
+    Check("memory", computer.memory, of_machine=True),
+    Check("clock", computer.clock, of_machine=True),
+    Check("kernels", computer.kernels, of_machine=True),
+    Check("disk", computer.disk),
+    Check("permissions", computer.permissions),
     Check("session", session.session),
     Check("peers", session.peers),
     Check("endpoints", security.endpoints),

@@ -17,11 +17,11 @@ from typing import Any, Protocol, TypeVar
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.messages.docking import DockEnding
-from fasaco_edge.wire.messages.follow_path import (
+from fasaco_edge.wire.messages.nav2_goals import (
     ENDED_BEFORE,
     NO_SUCH_GOAL,
     TAKEN,
+    DockEnding,
     Ending,
     decode_accepted,
     decode_cancel,

@@ -53,7 +53,6 @@ class News:
         path: its newest path; None without a new path.
         revision: revision of its newest path; 0 if unknown.
         speed_m_s: speed limit on its newest path [m/s]; infinity without a limit.
-        unnamed: newest path without a daemon's id; None without a new one.
     """
 
     planner: str = ""
@@ -62,7 +61,6 @@ class News:
     path: Sample | None = None
     revision: int = 0
     speed_m_s: float = math.inf
-    unnamed: Sample | None = None
 
 
 class Daemons:
@@ -75,7 +73,6 @@ class Daemons:
         self._lock = threading.Lock()
         self._planners: set[str] = set()
         self._daemons: dict[str, News] = {}
-        self._unnamed: Sample | None = None
 
     def take_claim(self, key: str, is_there: bool) -> None:
         """Take in that the token of a claim appeared or disappeared."""
@@ -103,24 +100,23 @@ class Daemons:
             daemon.status_at, daemon.state = now, state if isinstance(state, str) else ""
 
     def take_path(self, sample: Sample) -> None:
-        """Take in a path."""
+        """Take in a path; one that does not name its daemon is ignored."""
         attachment = _object(sample.attachment)
         own, revision = attachment.get("daemon"), attachment.get("revision")
+        if not _is_id(own):
+            return
         speed = attachment.get("speed_m_s")
         with self._lock:
-            if _is_id(own):
-                daemon = self._daemon(own)
-                daemon.path, daemon.revision = sample, revision if _is_count(revision) else 0
-                daemon.speed_m_s = speed if _is_speed(speed) else math.inf
-            else:
-                self._unnamed = sample
+            daemon = self._daemon(own)
+            daemon.path, daemon.revision = sample, revision if _is_count(revision) else 0
+            daemon.speed_m_s = speed if _is_speed(speed) else math.inf
 
     def news(self) -> News:
         """Return the newest samples of the daemon that plans; each status and path once."""
         with self._lock:
             kept = self._daemons.get(self._planner) or News(self._planner)
-            news = replace(kept, unnamed=self._unnamed)
-            kept.status_at = kept.path = self._unnamed = None
+            news = replace(kept)
+            kept.status_at = kept.path = None
             return news
 
     @property

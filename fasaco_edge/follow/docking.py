@@ -31,15 +31,16 @@ from fasaco_edge.follow.actions import (
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.supervision import Supervision
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.messages.docking import (
-    ERRORS,
+from fasaco_edge.wire.messages.nav2_goals import (
+    DOCK_ERRORS,
+    GOAL_ID_BYTES,
+    UNKNOWN,
     DockEnding,
     decode_dock_ending,
     decode_undock_ending,
     encode_dock,
     encode_undock,
 )
-from fasaco_edge.wire.messages.follow_path import GOAL_ID_BYTES, UNKNOWN
 from fasaco_edge.wire.ros_keys import DOCK_ROBOT, UNDOCK_ROBOT
 
 # Distance from the dock's pose within which the robot is in its dock [m].
@@ -163,7 +164,7 @@ class Docking:
         elif ending.status == UNKNOWN:
             self._fail("the docking server does not know the goal: was it restarted?", now)
         else:
-            self._fail(goal_error(ending, ERRORS, "no code"), now)
+            self._fail(goal_error(ending, DOCK_ERRORS, "no code"), now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Do nothing: ``step`` queries the result again."""

@@ -19,9 +19,8 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.follow.daemons import Daemons, News
 from fasaco_edge.follow.follower import Follower
-from fasaco_edge.follow.scanner import Mount
 from fasaco_edge.follow.settings import FollowSettings, PoseSource
-from fasaco_edge.follow.sight import Sight
+from fasaco_edge.follow.sight import Mount, Sight
 from fasaco_edge.follow.supervision import Supervision
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -145,8 +144,6 @@ class Inputs:
         self._publisher.log()
         if news.path is not None:
             follower.take_path(news.path.payload, news.speed_m_s)
-        if news.unnamed is not None:
-            follower.take_unnamed_path(news.unnamed.payload)
 
     def _pose_taker(self, source: PoseSource) -> Callable[[Sample], None]:
         def take(sample: Sample) -> None:

@@ -29,7 +29,7 @@ from fasaco_edge.follow.pieces import (
 from fasaco_edge.follow.standstill import Tries, floor_ahead
 from fasaco_edge.follow.supervision import Patience, Reason, State, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D
-from fasaco_edge.wire.messages.follow_path import (
+from fasaco_edge.wire.messages.nav2_goals import (
     ABORTED,
     CANCELED,
     ERRORS,

@@ -11,7 +11,7 @@ from fasaco_edge.follow.actions import ActionClient, Request
 from fasaco_edge.follow.nav2 import Nav2Follower, SendPiece
 from fasaco_edge.follow.node import Node, patience_of
 from fasaco_edge.follow.settings import FollowSettings
-from fasaco_edge.wire.messages.follow_path import GOAL_ID_BYTES, decode_ending, encode_goal
+from fasaco_edge.wire.messages.nav2_goals import GOAL_ID_BYTES, decode_ending, encode_goal
 from fasaco_edge.wire.ros_keys import FOLLOW_PATH, RELEASES, Release, RosNode, release_of
 
 

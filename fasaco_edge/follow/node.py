@@ -10,9 +10,8 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.publisher import Publisher, RosPublisher
-from fasaco_edge.bus.session import Bus
+from fasaco_edge.bus.session import Bus, join
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.daemons import BaseClaim
 from fasaco_edge.follow.estimate import STAND, Command
@@ -24,7 +23,7 @@ from fasaco_edge.follow.supervision import LINK_S, Patience, State, Supervision
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
+from fasaco_edge.wire.messages.base import Velocity, encode_velocity
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE
 

@@ -135,14 +135,6 @@ class Supervision:
         self.has_path, self.path_frame = True, points.frame
         self._have(points)
 
-    def take_unnamed_path(self, payload: bytes) -> None:
-        """Stop at a path of an unknown daemon: it may be the planner's, but is not driven."""
-        self.take_path(payload)
-        if self.has_path:
-            self._have_none(
-                State.BAD_PATH, "it does not name its daemon: is that an older release?"
-            )
-
     def take_planner(self, planner: str) -> None:
         """Note which daemon plans, "" without one; a path of the previous one is dropped."""
         if planner == self._planner:

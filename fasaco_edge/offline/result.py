@@ -16,7 +16,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.drawing.pictures import draw_walk
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.drawing.trail import draw_trail
-from fasaco_edge.host.outputs import whole
+from fasaco_edge.host.durable import whole
 from fasaco_edge.judge.floor import FloorFigures, JudgedFloor
 from fasaco_edge.offline.figures import (
     above_bound,

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
-from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms
+from fasaco_edge.daemon.ledger.rooms_file import decode_rooms
 from fasaco_edge.daemon.loop.inbox import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import (
     EMBEDDED,

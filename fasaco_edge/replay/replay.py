@@ -31,9 +31,8 @@ from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import AnyOf, WorkLimit, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep
-from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.documents.json_text import Settings, decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
-from fasaco_edge.wire.documents.settings import Settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.topics import COMMAND, RECORDED_INPUTS, TURNS
 

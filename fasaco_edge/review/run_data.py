@@ -24,11 +24,11 @@ from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.recording.read.robot_clock import RobotClock
-from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
+from fasaco_edge.wire.documents.json_text import Settings, decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport
 from fasaco_edge.wire.documents.rooms import Rooms
-from fasaco_edge.wire.documents.settings import Settings, known_settings
+from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.poses import PoseDecoder

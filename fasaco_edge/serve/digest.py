@@ -1,23 +1,24 @@
-"""The page's documents about a robot: state, progress, areas and events."""
+"""The page's documents about a robot: state, progress, areas, rooms and events."""
 
 from __future__ import annotations
 
-import math
 import time
-from array import array
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from itertools import islice
 from typing import Any
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.events import EventLog
 from fasaco_edge.client.robot_state import RobotState
-from fasaco_edge.grid.geometry import Point
+from fasaco_edge.grid.geometry import Bounds, Polygon
+from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.json_text import Corners
 from fasaco_edge.wire.documents.replies import FloorReport, MissionReport
-from fasaco_edge.wire.documents.settings import KnownSettings, RobotSettings
-from fasaco_edge.wire.documents.status import DriveReport, FleetReport, Status
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
+from fasaco_edge.wire.documents.settings import KnownSettings
+from fasaco_edge.wire.documents.status import FleetReport, Status
 from fasaco_edge.wire.reasons import plain as plain_words
 
 Digest = dict[str, object]
@@ -33,46 +34,8 @@ MOST_M = 1e6
 UNDERWAY = ("planning", "covering", "returning", "degraded", "paused", "charging")
 
 
-class Way:
-    """The remaining distance and turns from each point of a path.
-
-    Args:
-        xy: points (x, y) of the path [m].
-    """
-
-    def __init__(self, xy: Sequence[Point] = ()) -> None:
-        way_m, turns, heading = 0.0, 0.0, None
-        lengths, quarters = array("d"), array("d")
-        for here, there in zip(xy[-2::-1], xy[:0:-1], strict=True):
-            way_m += math.dist(here, there)
-            towards = math.atan2(there[1] - here[1], there[0] - here[0])
-            if heading is not None:
-                turns += abs(math.remainder(heading - towards, math.tau)) / (math.pi / 2)
-            heading = towards
-            lengths.append(way_m)
-            quarters.append(turns)
-        self._is_known = len(xy) > 0
-        self._lengths, self._quarters = lengths[::-1], quarters[::-1]
-
-    def left_s(
-        self, at: int, robot: RobotSettings, drive: DriveReport, beyond_m: float = 0.0
-    ) -> float | None:
-        """Return the remaining time [s] from a place ``beyond_m`` [m] after point ``at``.
-
-        None if speed or path is unknown.
-        """
-        speed_m_s = drive.speed_m_s or robot.speed_m_s
-        if not speed_m_s > 0.0 or not self._is_known:
-            return None
-        if not 0 <= at < len(self._lengths):
-            return 0.0
-        turn_s = drive.quarter_turn_s or drive.planned_quarter_turn_s
-        return max(self._lengths[at] - beyond_m, 0.0) / speed_m_s + self._quarters[at] * turn_s
-
-
 def state(
     view: RobotState,
-    way: Way,
     now: float,
     ordered: Status | None = None,
     order: dict[str, Any] | None = None,
@@ -81,7 +44,6 @@ def state(
 
     Args:
         view: state of the robot.
-        way: path of the robot.
         now: time by the clock of ``view`` [s].
         ordered: the newest status with an order.
         order: the newest order given by command; None if unknown.
@@ -92,7 +54,7 @@ def state(
     found: Digest = {"robot": view.robot, "absent": absent, "others": others, "bus": view.trouble}
     if status is None:
         return found
-    mission, floor = status.mission, status.floor
+    mission, floor, battery = status.mission, status.floor, status.battery
     if order is None and ordered is not None:
         order = _order_of(view, ordered.mission)
     return found | {
@@ -107,13 +69,13 @@ def state(
         "reason": _reason(status),
         "cells": status.coverage.fraction if status.coverage else None,
         "floor": _floor(floor) if floor else None,
-        "to_go_s": _to_go_s(view, status, way),
+        "to_go_s": _to_go_s(view, status),
         "grows": view.grows(now),
         "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
         "mission": _mission(mission),
         "again": _again(order),
-        "battery": _battery(status),
+        "battery": battery and {"level": battery.level, "power": battery.power},
         "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
         "fleet": _fleet(status.fleet) if status.fleet else None,
@@ -152,19 +114,14 @@ def _floor(floor: FloorReport) -> Digest:
     }
 
 
-def _to_go_s(view: RobotState, status: Status, way: Way) -> int | None:
-    if status.state not in UNDERWAY or view.gone_since is not None:
-        return None
+def _to_go_s(view: RobotState, status: Status) -> int | None:
     path = status.path
-    if path is None:  # the daemon has not planned since its start
+    if status.state not in UNDERWAY or view.gone_since is not None or path is None:
         return None
-    left_s = way.left_s(view.walk.at, view.settings.robot, status.drive, view.walk.beyond_m)
-    if not path.steps:
-        # A paused robot will continue on its last path. If this server does not have that path, as
-        # after its restart, the daemon's time counts. In any other state the robot does not drive.
-        is_paused = status.state == "paused"
-        left_s = (left_s or path.line_s or None) if is_paused else None
-    return None if left_s is None or left_s > MOST_TO_GO_S else round(left_s)
+    # Without steps only a paused robot will go on with its line.
+    is_driven = path.steps or status.state == "paused"
+    left_s = path.line_s if is_driven else None
+    return None if not left_s or left_s > MOST_TO_GO_S else round(left_s)
 
 
 def _mission(mission: MissionReport) -> Digest:
@@ -259,13 +216,6 @@ def _again(order: dict[str, Any] | None) -> Digest | None:
     return {} if is_usual else order | {"zones": zones, "keep_covered": False}
 
 
-def _battery(status: Status) -> Digest | None:
-    battery = status.battery
-    if battery is None:
-        return None
-    return {"level": battery.level, "power": battery.power}
-
-
 def _faults(status: Status) -> Iterator[str]:
     """Yield troubles and faults as text for engineers."""
     for what, to_do in phrases.troubles(status):
@@ -328,3 +278,77 @@ def lately(events: EventLog) -> list[Digest]:
         {"at_s": round(entry.at_s + offset, 1), "text": entry.text, "tone": entry.tone}
         for entry in reversed(entries)
     ]
+
+
+# Limit on the rooms shown.
+MOST_ROOMS = 250
+# Number of tints in the style sheet; distance up to which two rooms get different tints [m].
+TINTS, NEAR_M = 6, 0.4
+
+
+def rooms(found: Rooms) -> Digest:
+    """Return the document of rooms: outlines, settings, tints, and places of labels.
+
+    Swept shares have a document of their own, as they change while the robot drives.
+    """
+    shown = [each for each in found.outlined[:MOST_ROOMS] if len(each.outline) <= MOST_CORNERS]
+    tints = _tints(shown)
+    return {"rooms": [_room(each, tints[each.id]) for each in shown]}
+
+
+def shares(found: Rooms) -> Digest:
+    """Return the swept share of each room by its number; None if it has no floor to sweep."""
+    share = {
+        str(each.id): None if each.swept is None else round(each.swept, 2)
+        for each in found.rooms[:MOST_ROOMS]
+    }
+    return {"swept": share}
+
+
+def _room(room: RoomReport, tint: int) -> Digest:
+    label = _label(room.outline)
+    return {
+        "id": room.id,
+        "name": room.name,
+        "title": room.title,
+        "outline": [[round(x, 2), round(y, 2)] for x, y in room.outline],
+        "neighbours": room.neighbours,
+        "encloses": room.encloses,
+        "m2": round(room.area_m2, 1),
+        "passes": room.passes,
+        "skip": room.skip,
+        "priority": room.priority,
+        "tint": tint,
+        "label": label and [round(value, 2) for value in label],
+    }
+
+
+# The cache helps because most rooms stay unchanged.
+_label = lru_cache(MOST_ROOMS)(label_place)
+
+
+def _tints(found: Sequence[RoomReport]) -> dict[int, int]:
+    """Return a tint for each room by its number; rooms near to each other differ if possible.
+
+    Rooms are tinted in order of number, so that a new room does not change the tints of others.
+    """
+    bounds = {room.id: _bounds(room.outline) for room in found}
+    tints: dict[int, int] = {}
+    for room in sorted(found, key=lambda room: room.id):
+        near = (other for other in tints if _are_near(bounds[room.id], bounds[other]))
+        taken = {tints[other] for other in near}
+        order = [(room.id - 1 + index) % TINTS for index in range(TINTS)]
+        tints[room.id] = next((tint for tint in order if tint not in taken), order[0])
+    return tints
+
+
+def _bounds(outline: Polygon) -> Bounds:
+    xs, ys = [x for x, _ in outline], [y for _, y in outline]
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _are_near(one: Bounds, other: Bounds) -> bool:
+    return all(
+        one[axis] < other[axis + 2] + NEAR_M and other[axis] < one[axis + 2] + NEAR_M
+        for axis in (0, 1)
+    )

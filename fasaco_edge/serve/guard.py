@@ -19,9 +19,8 @@ from typing import get_args
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.addresses import Address
-from fasaco_edge.host.durable import write_through
+from fasaco_edge.host.durable import whole, write_through
 from fasaco_edge.host.files import FileTooLongError, read_own
-from fasaco_edge.host.outputs import whole
 from fasaco_edge.serve.messages import Role
 
 # Largest file of tokens: about forty tokens.

@@ -97,7 +97,7 @@ MARKS = {
     "not planned yet": BESIDE,
     "on the path": 32,
 }
-"""The mark of each reason for unswept floor, see ``serve.marks.UNSWEPT_MARKS``."""
+"""The mark of each reason for unswept floor, see ``serve.messages.UNSWEPT_MARKS``."""
 REST = 64
 """The mark of other unswept floor, which is part of no order any more."""
 # Reasons of unreached cells that are no free floor, so that figures of floor lack them.

@@ -58,10 +58,6 @@ class RecordedView(ServedView):
         """Arrival of the newest status, since the epoch [s]."""
         return self._reported_at
 
-    def _source(self, kind: str, now: float) -> object:
-        # The remaining time depends on the progress along the path, too.
-        return super()._source(kind, now), (self.walk.revision, self.walk.at, self.walk.beyond_m)
-
     def has(self) -> list[str]:
         """Return the kinds of messages that have content."""
         made = {"path": self._path, "pose": self.pose} | self._grids

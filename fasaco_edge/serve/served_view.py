@@ -6,21 +6,22 @@ import sys
 import zlib
 from array import array
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import PathProgress, RobotState
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.serve.digest import Way, areas, lately, state
-from fasaco_edge.serve.marks import (
+from fasaco_edge.serve.digest import areas, lately, rooms, shares, state
+from fasaco_edge.serve.messages import (
     COVERAGE_MARKS,
     FIELD_MARKS,
     FLOOR_MARKS,
     UNSWEPT_MARKS,
+    framed,
     grid_message,
     map_marks,
+    message_text,
 )
-from fasaco_edge.serve.messages import framed, message_text
-from fasaco_edge.serve.rooms import rooms, shares
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment
@@ -35,6 +36,8 @@ MOST_POINTS = 20_000
 # Limit on the number of other robots shown, and on the age of their positions [s]; each robot
 # publishes once a second.
 MOST_OTHERS, OTHER_LASTS_S = 50, 10.0
+# Topics of occupancy grids.
+GRIDS = ("map", "coverage", "floor", "unswept")
 # Least period of each message [s]; unchanged messages are not sent again.
 PERIODS_S = {
     "pose": 0.1,
@@ -57,7 +60,6 @@ class ServedView(RobotState):
 
     Attributes:
         periods_s: least period of each message [s].
-        lacks_path: whether the robot is paused, and the path before the pause is unknown.
     """
 
     periods_s: Mapping[str, float] = PERIODS_S
@@ -72,16 +74,11 @@ class ServedView(RobotState):
         self._path: Sample | None = None
         # The newest path that is not empty: a paused robot continues on it.
         self._to_drive: Sample | None = None
-        self._way = Way()
-        self.lacks_path = False
         # The newest status with an order: unswept floor is shown after the order's end, too.
         self._ordered: Status | None = None
         self._readers |= {
-            "map": self._read_map,
+            **{kind: partial(self._read_grid, kind) for kind in GRIDS},
             "map_update": self._read_map_update,
-            "coverage": self._read_coverage,
-            "floor": self._read_floor,
-            "unswept": self._read_unswept,
             "pheromone": self._read_field,
             "path": self._read_path,
             "fleet": self._read_fleet,
@@ -91,7 +88,7 @@ class ServedView(RobotState):
             "path": self._path_message,
             "pose": lambda _: self._pose_message(),
             "state": lambda now: message_text(
-                "state", **state(self, self._way, now, self._ordered, self._last_order)
+                "state", **state(self, now, self._ordered, self._last_order)
             ),
             "areas": lambda _: message_text("areas", **areas(self.settings, self._mission)),
             "rooms": lambda _: message_text("rooms", **rooms(self.rooms)),
@@ -152,30 +149,17 @@ class ServedView(RobotState):
         return self.status.mission if self.status else MissionReport()
 
     def _read_status(self, sample: Sample, now: float) -> None:
-        before = self.status
         super()._read_status(sample, now)
         if self.status is not None and self.status.mission.ordered is not None:
             self._ordered = self.status
-        if self.status is not None and self.status.state == "paused":
-            is_new = before is None or before.state != "paused"
-            self.lacks_path = self._to_drive is None and (is_new or self.lacks_path)
 
-    def _read_map(self, sample: Sample, _: float) -> None:
-        self._grids["map"] = read_grid(sample.payload)
+    def _read_grid(self, kind: str, sample: Sample, _: float) -> None:
+        self._grids[kind] = read_grid(sample.payload)
 
     def _read_map_update(self, sample: Sample, _: float) -> None:
         # An update without its map is of no use: the map came before this process started.
         if "map" in self._grids:
             self._grids["map"] = with_update(self._grids["map"], sample.payload)
-
-    def _read_coverage(self, sample: Sample, _: float) -> None:
-        self._grids["coverage"] = read_grid(sample.payload)
-
-    def _read_floor(self, sample: Sample, _: float) -> None:
-        self._grids["floor"] = read_grid(sample.payload)
-
-    def _read_unswept(self, sample: Sample, _: float) -> None:
-        self._grids["unswept"] = read_grid(sample.payload)
 
     def _read_field(self, sample: Sample, _: float) -> None:
         self._grids["field"] = read_field(sample.payload)
@@ -196,14 +180,6 @@ class ServedView(RobotState):
             self._to_drive = sample
         elif not about.revision:  # the daemon has restarted, and has no path to continue on
             self._to_drive = None
-
-    def take_path_before(self, sample: Sample, now: float) -> None:
-        """Take in the path before a pause."""
-        try:
-            if PathPoints(sample.payload).left:
-                self._to_drive = sample
-        except FasacoError as error:
-            self.note_unreadable("path", error, now)
 
     def _read_fleet(self, sample: Sample, now: float) -> None:
         robot = self._keys.robot_of(sample.key)
@@ -244,7 +220,7 @@ class ServedView(RobotState):
         except FasacoError as error:
             self.note_unreadable("path", error, now)
             return None
-        self.walk, self._way = PathProgress(xy, about.revision), Way(xy)
+        self.walk = PathProgress(xy, about.revision)
         if self.pose is not None:
             self.walk.join(self.pose)
         # Relative to the first point, as float32 does not resolve centimetres far from 0.

@@ -1,14 +1,20 @@
-"""The server of the page: HTTP for the page, a WebSocket for each viewer."""
+"""Server of the page: HTTP for the page, a WebSocket for each viewer.
+
+The page is one file, which loads nothing from other servers.
+"""
 
 from __future__ import annotations
 
 import asyncio
+import base64
+import hashlib
 import logging
 import signal
 import ssl
 import threading
 from collections.abc import Callable
 from http import HTTPStatus
+from importlib.resources import files
 
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.datastructures import Headers
@@ -16,12 +22,52 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
+from fasaco_edge.bus.queries import Reply
+from fasaco_edge.client.feed import Feed
+from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.host.addresses import Address
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.serve.guard import Guard, is_same_origin
 from fasaco_edge.serve.messages import Role
-from fasaco_edge.serve.page import load_page
+from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.serve.viewer import Source, Viewer, closing_on_error
+from fasaco_edge.wire.topics import FLOOR, PHEROMONE, UNSWEPT
+
+# Files of the page's script, which are concatenated in this order.
+SCRIPTS = (
+    "model.js",
+    "view.js",
+    "picture.js",
+    "drawing.js",
+    "panel.js",
+    "rooms.js",
+    "orders.js",
+    "timeline.js",
+    "link.js",
+)
+
+
+def load_page() -> tuple[bytes, str]:
+    """Return the page's HTML with style and script, and its Content-Security-Policy.
+
+    The policy lacks connect-src.
+    """
+    folder = files("fasaco_edge.serve").joinpath("page")
+    style = folder.joinpath("style.css").read_text(encoding="utf-8")
+    parts = (folder.joinpath(name).read_text(encoding="utf-8") for name in SCRIPTS)
+    script = '"use strict";\n' + "\n".join(parts)
+    html = folder.joinpath("page.html").read_text(encoding="utf-8")
+    html = html.replace("/* style */", style).replace("/* script */", script)
+    policy = (
+        f"default-src 'none'; script-src '{_digest(script)}'; style-src '{_digest(style)}'; "
+        "img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    return html.encode(), policy
+
+
+def _digest(text: str) -> str:
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
 
 LOG = logging.getLogger(__name__)
 
@@ -48,7 +94,7 @@ class Server:
     def __init__(self, guard: Guard, source_of: Callable[[], Source]) -> None:
         self._guard = guard
         self._source_of = source_of
-        self._page = load_page()
+        self._page, self._policy = load_page()
         self._viewers: set[Viewer] = set()
         # Unauthenticated connections, in order of arrival.
         self._strangers: dict[Viewer, ServerConnection] = {}
@@ -108,7 +154,7 @@ class Server:
             return self._response(HTTPStatus.MISDIRECTED_REQUEST, why)
         place = request.path.partition("?")[0]
         if place == "/":
-            return self._response(HTTPStatus.OK, self._page.body, host)
+            return self._response(HTTPStatus.OK, self._page, host)
         if place != "/live":
             return self._response(HTTPStatus.NOT_FOUND, "the page is at /")
         if not is_same_origin(request.headers.get_all("Origin"), host):
@@ -122,7 +168,7 @@ class Server:
         is_page = isinstance(body, bytes)
         content = body if isinstance(body, bytes) else f"{body}\n".encode()
         # In old browsers 'self' does not include WebSockets.
-        policy = f"{self._page.policy}; connect-src 'self' ws://{host} wss://{host}"
+        policy = f"{self._policy}; connect-src 'self' ws://{host} wss://{host}"
         headers = {
             "Content-Type": "text/html; charset=utf-8" if is_page else "text/plain; charset=utf-8",
             "Content-Length": str(len(content)),
@@ -165,3 +211,58 @@ class Server:
             await socket.close(CloseCode.TRY_AGAIN_LATER)
             return None
         return role
+
+
+# Least period of messages to viewers, and longest wait for samples [s].
+FRAME_S, IDLE_S = 0.1, 0.2
+
+
+class LiveServer(Server):
+    """Serves the page of a robot on the bus; it is the source of all its viewers.
+
+    Args:
+        feed: samples of the robot.
+        view: makes messages from the samples.
+        guard: decides the rights of clients.
+    """
+
+    def __init__(self, feed: Feed, view: ServedView, guard: Guard) -> None:
+        super().__init__(guard, lambda: self)
+        self._feed = feed
+        self._view = view
+        self._newest: dict[str, tuple[int, str | bytes]] = {}
+
+    def newest(self) -> list[tuple[str, int, str | bytes]]:
+        """Return kind, number and content of the newest messages."""
+        return [(kind, number, message) for kind, (number, message) in self._newest.items()]
+
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+        """Ask the daemon; blocks."""
+        return self._feed.ask(query, payload, timeout_s)
+
+    def at(self, _: float) -> list[str | bytes]:
+        """Return nothing: only recordings have other times than the present."""
+        return []
+
+    def _work(self) -> None:
+        """Take in samples; make messages while there are viewers."""
+        while not self._ended.is_set():
+            items = self._feed.take(IDLE_S)
+            now = steady_now()
+            for topic, item in items:
+                self._view.take(topic, item, now)
+            self._view.trouble = self._feed.trouble
+            viewers = tuple(self._viewers)
+            self._feed.want(FLOOR, bool(viewers))
+            self._feed.want(UNSWEPT, any(viewer.wants_unswept for viewer in viewers))
+            self._feed.want(PHEROMONE, any(viewer.wants_field for viewer in viewers))
+            if viewers and (news := self._view.news(now)) and self._loop is not None:
+                self._loop.call_soon_threadsafe(self._publish, news)
+            self._ended.wait(max(FRAME_S - (steady_now() - now), 0.0))
+
+    def _publish(self, news: dict[str, str | bytes]) -> None:
+        for kind, message in news.items():
+            number, _ = self._newest.get(kind, (0, b""))
+            self._newest[kind] = number + 1, message
+        for viewer in self._viewers:
+            viewer.news.set()

@@ -9,20 +9,19 @@ from contextlib import ExitStack
 from typing import Literal, NamedTuple
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.joining import join
 from fasaco_edge.bus.mailbox import LatestSlot
-from fasaco_edge.bus.session import Bus, open_bus
+from fasaco_edge.bus.session import Bus, join, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BadConfiguration, MalformedMessage, WrongFrame
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.simulation.world import Emission, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.base import decode_velocity
 from fasaco_edge.wire.messages.battery import BatteryState, Power, encode_battery
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
-from fasaco_edge.wire.messages.twists import decode_velocity
 
 log = logging.getLogger(__name__)
 

@@ -26,11 +26,10 @@ EVERY = 0
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """Quality of service of a publisher.
+    """Quality of service of a publisher; all are reliable.
 
     Attributes:
         priority: order of sending on a busy link.
-        reliability: whether a lossy link sends a sample again.
         congestion: ``drop``: a slow receiver loses the sample; ``block``: the sender waits
             for it.
         express: whether it is sent at once, never batched with others into one packet.
@@ -39,7 +38,6 @@ class Qos:
     """
 
     priority: Priority = "data"
-    reliability: Literal["reliable", "best_effort"] = "reliable"
     congestion: Literal["drop", "block"] = "drop"
     express: bool = False
     cache: int = 0
@@ -144,7 +142,6 @@ class Query:
         schema: message type of the reply; "" for JSON.
         json: JSON Schema of the reply; "" for none.
         payload: JSON Schema of the query's payload; "" for none.
-        parameters: allowed parameters after ``?``.
         answered: ``at once``: with the newest sample; ``loop``: by the loop, with its decision.
         timeout_s: timeout of the reply [s].
         errors: codes of its errors, besides ``bad_query``.
@@ -155,7 +152,6 @@ class Query:
     schema: str = ""
     json: str = ""
     payload: str = ""
-    parameters: tuple[str, ...] = ()
     answered: Literal["at once", "loop"] = "at once"
     timeout_s: float = 1.0
     errors: tuple[str, ...] = ()

@@ -339,13 +339,7 @@ IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
 QUERIES = (
-    Query(
-        "path",
-        ("viewer",),
-        schema=schemas.PATH,
-        parameters=("before_stop",),
-        errors=("not_yet",),
-    ),
+    Query("path", ("viewer",), schema=schemas.PATH, errors=("not_yet",)),
     Query("status", ("viewer",), json="status.json"),
     Query("coverage", ("viewer",), schema=schemas.OCCUPANCY_GRID, errors=("not_yet",)),
     Query("pheromone", ("viewer",), schema=schemas.PHEROMONE_GRID, errors=("not_yet",)),

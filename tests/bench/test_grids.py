@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from fasaco_edge.bench.robot import building, robot_pose, with_crate
+from fasaco_edge.bench.processes import building, robot_pose, with_crate
 from fasaco_edge.errors import MapFileError, NothingToCover
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.lattice.reach import reachable_from

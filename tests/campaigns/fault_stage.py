@@ -22,8 +22,8 @@ import yaml
 import zenoh
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.wire.messages.base import decode_velocity
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from fasaco_edge.wire.messages.twists import decode_velocity
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.campaigns.fault_links import Link
 from tests.support.forked import Forked

@@ -22,7 +22,7 @@ import numpy as np
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
-from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms, encode_rooms
+from fasaco_edge.daemon.ledger.rooms_file import decode_rooms, encode_rooms
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.daemon.loop.mission_reports import mission_report, unswept
 from fasaco_edge.daemon.loop.outbox import headings

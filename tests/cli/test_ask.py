@@ -73,14 +73,14 @@ def test_no_room_is_swept_whole_before_it_is(capsys):
 
 
 def test_a_wrong_query_is_an_error_with_its_cause(endpoint, capsys):
-    words = ("pheromone", "--param", "cohort=77", "--json")
+    words = ("replan", "--json")
     assert main(["ask", *words, "--connect", endpoint]) == 1
     told = capsys.readouterr()
-    assert json.loads(told.out)["code"] == "bad_query"
-    assert "cohort" in told.err
+    assert json.loads(told.out)["code"] == "not_now"
+    assert "planned anew" in told.err
     assert main(["ask", "status", "--robot", "other", "--connect", endpoint]) == 1
     assert "robots on this bus: robot; choose one by --robot" in capsys.readouterr().err
-    for words in (("ask", "colour"), ("ask", "path", "--param", "colour"), ("ask",)):
+    for words in (("ask", "colour"), ("ask", "path", "colour"), ("ask",)):
         with pytest.raises(SystemExit, match="2"):
             main([*words])
 

@@ -12,8 +12,13 @@ import numpy as np
 import pytest
 
 from fasaco_edge.daemon.ledger import rooms_file
-from fasaco_edge.daemon.ledger.rooms_codec import decode_rooms, encode_rooms
-from fasaco_edge.daemon.ledger.rooms_file import PERIOD_S, RoomsFile, RoomsKeeper
+from fasaco_edge.daemon.ledger.rooms_file import (
+    PERIOD_S,
+    RoomsFile,
+    RoomsKeeper,
+    decode_rooms,
+    encode_rooms,
+)
 from fasaco_edge.errors import RoomsFileError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.rooms import FoundRooms

@@ -14,7 +14,7 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import BusConfig, DaemonConfig, MetricsConfig, MissionSettings
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.doctor import installation, machine, report, security, session
+from fasaco_edge.doctor import computer, report, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels import manifest
 from fasaco_edge.kernels.folder import wanted_folder
@@ -33,7 +33,7 @@ MEMINFO = "MemTotal:        3884328 kB\nMemFree: 100000 kB\nMemAvailable:    {} 
 V1_OFF = "#subsys_name\thierarchy\tnum_cgroups\tenabled\nmemory\t0\t70\t0\n"
 
 
-def computer(root: Path, **files: str) -> CheckContext:
+def with_files(root: Path, **files: str) -> CheckContext:
     """Return a computer whose root folder holds these files, / written as __ in their names."""
     for name, text in files.items():
         file = root / name.replace("__", "/")
@@ -70,15 +70,15 @@ def test_a_pi_without_a_memory_controller_gets_instructions(tmp_path):
         "proc__cgroups": V1_OFF,
         "boot__firmware__cmdline.txt": "console=tty1 root=PARTUUID=1 rootwait\n",
     }
-    pi = computer(tmp_path, **files)
-    found = machine.memory(pi)
+    pi = with_files(tmp_path, **files)
+    found = computer.memory(pi)
     assert found.level is Level.WARN
     assert found.found.startswith("3072 MB of 3978 MB free; the memory controller is off")
     assert found.to_do == (
         "add cgroup_enable=memory to the one line of /boot/firmware/cmdline.txt, and reboot"
     )
     limited = CheckContext(pi.config, unit=Unit({"MemoryMax": "536870912"}), root=tmp_path)
-    assert "limits of the unit are not enforced" in machine.memory(limited).found
+    assert "limits of the unit are not enforced" in computer.memory(limited).found
 
 
 @pytest.mark.parametrize(
@@ -97,8 +97,8 @@ def test_a_pi_without_a_memory_controller_gets_instructions(tmp_path):
     ],
 )
 def test_both_versions_of_control_groups_are_known(tmp_path, files, version):
-    computer(tmp_path, **files)
-    assert machine.controller(tmp_path) == version
+    with_files(tmp_path, **files)
+    assert computer.controller(tmp_path) == version
 
 
 @pytest.mark.parametrize(
@@ -110,8 +110,8 @@ def test_memory_is_short_or_limited(tmp_path, free_kb, limit, level):
         "sys__fs__cgroup__cgroup.controllers": "memory",
         "proc__meminfo": MEMINFO.format(free_kb),
     }
-    pc = computer(tmp_path, **files)
-    found = machine.memory(CheckContext(pc.config, unit=Unit({"MemoryMax": limit}), root=tmp_path))
+    pc = with_files(tmp_path, **files)
+    found = computer.memory(CheckContext(pc.config, unit=Unit({"MemoryMax": limit}), root=tmp_path))
     assert found.level == level
     assert bool(found.to_do) == (level == "warn")
 
@@ -121,20 +121,20 @@ def test_a_board_is_called_by_its_name(tmp_path):
         "proc__device-tree__model": "Raspberry Pi 4 Model B Rev 1.4\0",
         "etc__os-release": 'PRETTY_NAME="Debian GNU/Linux 12 (bookworm)"\nID=debian\n',
     }
-    found = machine.system(computer(tmp_path, **files))
+    found = computer.system(with_files(tmp_path, **files))
     assert found.found.startswith("Raspberry Pi 4 Model B Rev 1.4, ")
     assert found.details[0].startswith("Debian GNU/Linux 12 (bookworm), kernel ")
 
 
 def test_this_computer_has_a_clock():
-    is_synchronised, error_s = machine.kernel_clock()
+    is_synchronised, error_s = computer.kernel_clock()
     assert isinstance(is_synchronised, bool)
     assert error_s >= 0.0
 
 
 def test_a_reset_clock_fails_the_check(monkeypatch):
     monkeypatch.setattr(time, "time", lambda: 4.0)
-    found = machine.clock(CheckContext(DaemonConfig()))
+    found = computer.clock(CheckContext(DaemonConfig()))
     assert found.level is Level.FAIL
     assert "the clock was reset" in found.found
 
@@ -165,21 +165,21 @@ def test_folders_and_who_may_write_there(tmp_path):
         bus=BusConfig(connect=("tcp/127.0.0.1:1#key=secret",)),
     )
     context = CheckContext(config, file, recordings=tmp_path / "later" / "recordings")
-    disk = installation.disk(context)
+    disk = computer.disk(context)
     assert disk.level is Level.OK
     assert [line.partition(":")[0] for line in disk.details] == [
         "state",
         "kernel cache",
         "recordings",
     ]
-    assert installation.permissions(context).level is Level.WARN
-    assert "secret" not in installation.permissions(context).found
+    assert computer.permissions(context).level is Level.WARN
+    assert "secret" not in computer.permissions(context).found
     file.chmod(0o640)
-    assert installation.permissions(context).level is Level.OK
+    assert computer.permissions(context).level is Level.OK
     state.chmod(0o777)
-    assert installation.permissions(context).to_do == f"chmod o-w {state}"
+    assert computer.permissions(context).to_do == f"chmod o-w {state}"
     file.chmod(0o666)
-    both = installation.permissions(context)
+    both = computer.permissions(context)
     assert both.level is Level.FAIL
     assert len(both.details) == 2
     # Nothing was made.
@@ -196,19 +196,19 @@ def test_a_read_only_disk_fails_the_check(tmp_path):
         ),
         None,
     )
-    assert installation.disk(CheckContext(config)).level is not Level.OK
+    assert computer.disk(CheckContext(config)).level is not Level.OK
     if read_only is None:
         pytest.skip("nothing is mounted read-only here")
     config = DaemonConfig(mission=MissionSettings(state_dir=f"{read_only}/x"))
-    assert "read-only" in installation.disk(CheckContext(config)).found
+    assert "read-only" in computer.disk(CheckContext(config)).found
 
 
 def test_a_link_in_place_of_the_lock_fails_the_check(tmp_path):
     config = DaemonConfig(mission=MissionSettings(state_dir=str(tmp_path)))
-    assert installation.disk(CheckContext(config)).level is Level.OK
+    assert computer.disk(CheckContext(config)).level is Level.OK
     lock = tmp_path / "robot.ledger.lock"
     lock.symlink_to("nowhere")
-    found = installation.disk(CheckContext(config))
+    found = computer.disk(CheckContext(config))
     assert found.level is Level.FAIL
     assert found.found == f"no progress is written: a link lies in place of {lock}"
     assert found.to_do == f"remove {lock}"
@@ -217,7 +217,7 @@ def test_a_link_in_place_of_the_lock_fails_the_check(tmp_path):
 def test_missing_or_foreign_kernels_are_reported(tmp_path, monkeypatch):
     told = {"Environment": f"NUMBA_CACHE_DIR={tmp_path}", "DynamicUser": "yes"}
     context = CheckContext(DaemonConfig(), unit=Unit(told | {"CacheDirectory": "fasaco-edge"}))
-    found = installation.kernels(context)
+    found = computer.kernels(context)
     assert found.level is Level.WARN
     assert found.found.startswith("not compiled for this version")
     # As root it would make a folder that the daemon does not trust.
@@ -229,16 +229,16 @@ def test_missing_or_foreign_kernels_are_reported(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     folder = wanted_folder()
     folder.mkdir(0o700)
-    assert "never compiled" in installation.kernels(context).found
+    assert "never compiled" in computer.kernels(context).found
     folder.chmod(0o770)
-    found = installation.kernels(CheckContext(DaemonConfig()))
+    found = computer.kernels(CheckContext(DaemonConfig()))
     assert found.level is Level.WARN
     assert found.found.startswith(f"{folder} may be written by its group: the daemon takes no")
     folder.chmod(0o700)
     if os.geteuid() != 0:
         return
     os.chown(folder, 4242, 4242)
-    found = installation.kernels(CheckContext(DaemonConfig()))
+    found = computer.kernels(CheckContext(DaemonConfig()))
     assert found.found.startswith(f"{folder} belongs to user 4242: the daemon takes no")
 
 
@@ -246,16 +246,16 @@ def test_kernels_that_are_damaged(tmp_path, monkeypatch):
     folder = fill_with(tmp_path, 3, stages=STAGES)
     file = folder / "1.nbc"
     before = file.read_bytes()
-    monkeypatch.setattr(installation, "wanted_folder", lambda environ: folder)
+    monkeypatch.setattr(computer, "wanted_folder", lambda environ: folder)
     for harm in HARMS.values():
         monkeypatch.setattr(manifest, "_COMPARED", {})
         harm(file)
-        found = installation.kernels(CheckContext(DaemonConfig()))
+        found = computer.kernels(CheckContext(DaemonConfig()))
         assert found.level is Level.WARN
         assert found.found.startswith(f"{file.name} ")
         assert found.to_do == "fasaco-edge warmup"
         file.write_bytes(before)
-    assert installation.kernels(CheckContext(DaemonConfig())).level is Level.OK
+    assert computer.kernels(CheckContext(DaemonConfig())).level is Level.OK
 
 
 def test_an_empty_bus_is_reported():

@@ -9,13 +9,12 @@ import numpy as np
 
 from fasaco_edge.follow.estimate import STAND, moved
 from fasaco_edge.follow.follower import Follower
-from fasaco_edge.follow.scanner import Mount
-from fasaco_edge.follow.sight import Sight
+from fasaco_edge.follow.sight import Mount, Sight
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.motion import limited
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.wire.messages.base import LaserScan, encode_scan
 from fasaco_edge.wire.messages.maps import encode_occupancy_grid
-from fasaco_edge.wire.messages.scans import LaserScan, encode_scan
 from tests.follow.closed_loop import LIMITS, PERIOD_S, path_message
 
 RADIUS_M = 0.18

@@ -3,7 +3,7 @@
 import pytest
 
 from fasaco_edge.follow.actions import MOST_CANCELLED, Cancellations
-from fasaco_edge.wire.messages.follow_path import ENDED_BEFORE, NO_SUCH_GOAL, REJECTED, TAKEN
+from fasaco_edge.wire.messages.nav2_goals import ENDED_BEFORE, NO_SUCH_GOAL, REJECTED, TAKEN
 
 
 @pytest.fixture

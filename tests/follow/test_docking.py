@@ -7,8 +7,7 @@ import pytest
 from fasaco_edge.follow.actions import AskResult, CancelGoal, SendGoal
 from fasaco_edge.follow.docking import GIVE_UP_S, RESULT_EVERY_S, RETRY_S, Docking, Move
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.messages.docking import DockEnding
-from fasaco_edge.wire.messages.follow_path import ABORTED, CANCELED, SUCCEEDED, UNKNOWN
+from fasaco_edge.wire.messages.nav2_goals import ABORTED, CANCELED, SUCCEEDED, UNKNOWN, DockEnding
 
 DOCK, BEFORE, AWAY = Pose2D(2.0, 0.0), Pose2D(1.5, 0.0), Pose2D(-3.0, 0.0)
 DONE = DockEnding(SUCCEEDED, success=True)

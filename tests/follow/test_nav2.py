@@ -19,7 +19,7 @@ from fasaco_edge.follow.nav2 import (
 from fasaco_edge.follow.pieces import TIP_M
 from fasaco_edge.follow.supervision import Patience, State
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.wire.messages.follow_path import (
+from fasaco_edge.wire.messages.nav2_goals import (
     ABORTED,
     CANCELED,
     ERRORS,

@@ -5,21 +5,22 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.scanner import (
+from fasaco_edge.follow.sight import (
     KNOWN_M,
     MARGIN_M,
+    STANDS_S,
     STOP_M,
     Mount,
+    Sight,
     Thing,
     first_met,
     points_of,
 )
-from fasaco_edge.follow.sight import STANDS_S, Sight
 from fasaco_edge.follow.supervision import State
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.wire.messages.base import LaserScan, encode_scan
 from fasaco_edge.wire.messages.maps import encode_map_update, encode_occupancy_grid
-from fasaco_edge.wire.messages.scans import LaserScan, encode_scan
 from tests.follow.closed_loop import LIMITS
 from tests.follow.seeing import RADIUS_M, Disc, Seeing, plain_map, scan_at
 

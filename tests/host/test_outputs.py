@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fasaco_edge.host.outputs import whole
+from fasaco_edge.host.durable import whole
 
 
 def break_off(file: Path, error: BaseException) -> None:

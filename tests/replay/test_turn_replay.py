@@ -12,8 +12,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli import main
-from fasaco_edge.daemon.ledger.rooms_codec import encode_rooms
-from fasaco_edge.daemon.ledger.rooms_file import RoomsFile
+from fasaco_edge.daemon.ledger.rooms_file import RoomsFile, encode_rooms
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid

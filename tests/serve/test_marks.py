@@ -13,12 +13,10 @@ import pytest
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.serve import marks
-from fasaco_edge.serve.digest import Way
+from fasaco_edge.serve import messages
 from fasaco_edge.serve.guard import Guard, is_same_origin, read_tokens
 from fasaco_edge.serve.messages import message_text
-from fasaco_edge.wire.documents.settings import MapSettings, RobotSettings
-from fasaco_edge.wire.documents.status import DriveReport
+from fasaco_edge.wire.documents.settings import MapSettings
 from fasaco_edge.wire.messages.grids import GridOctets
 from fasaco_edge.wire.messages.maps import CoverageValue
 
@@ -33,17 +31,24 @@ def test_merged_marks_have_all_bits_of_theirs(shape, step):
         for starts in [range(0, cols, step)]
         for r in range(0, rows, step)
     ]
-    assert marks.merged(pixels.tobytes(), cols, step) == np.array(expected, np.uint8).tobytes()
+    assert messages.merged(pixels.tobytes(), cols, step) == np.array(expected, np.uint8).tobytes()
 
 
 def test_levels_hold_all_lower_ones():
-    assert [marks.FLOOR_MARKS[value] for value in (0, 1, 14, 15, 86, 100)] == [0, 1, 1, 3, 127, 127]
-    assert marks.FIELD_MARKS[255] == 127
-    assert marks.FIELD_MARKS[1] == 1
+    assert [messages.FLOOR_MARKS[value] for value in (0, 1, 14, 15, 86, 100)] == [
+        0,
+        1,
+        1,
+        3,
+        127,
+        127,
+    ]
+    assert messages.FIELD_MARKS[255] == 127
+    assert messages.FIELD_MARKS[1] == 1
 
 
 def test_free_pixels_follow_the_daemons_thresholds():
-    table = marks.map_marks(MapSettings(free_at_most=10, occupied_at_least=90))
+    table = messages.map_marks(MapSettings(free_at_most=10, occupied_at_least=90))
     assert [table[value] for value in (0, 10, 11, 89, 90, 100, 101, 255)] == [
         1,
         1,
@@ -54,22 +59,22 @@ def test_free_pixels_follow_the_daemons_thresholds():
         0,
         0,
     ]
-    assert marks.map_marks(MapSettings())[25] == 1
+    assert messages.map_marks(MapSettings())[25] == 1
 
 
 def test_a_coverage_grid_stands_in_for_a_map():
     names = ("UNKNOWN", "TO_COVER", "COVERED", "RECOVERED", "BLOCKED")
-    found = [marks.COVERAGE_MARKS[CoverageValue[name] & 255] for name in names]
+    found = [messages.COVERAGE_MARKS[CoverageValue[name] & 255] for name in names]
     assert found == [0, 1, 1, 1, 2]
 
 
 def test_a_map_too_large_for_a_phone_keeps_its_walls(monkeypatch):
-    monkeypatch.setattr(marks, "MOST_PIXELS", 1000)
+    monkeypatch.setattr(messages, "MOST_PIXELS", 1000)
     pixels = np.zeros((100, 90), np.int8)
     pixels[:, 41] = 100
     geometry = GridGeometry(100, 90, 0.05, Pose2D(1.0, 2.0, 0.5))
     grid = GridOctets(geometry, memoryview(pixels.tobytes()), "map")
-    message = marks.grid_message("map", grid, marks.map_marks(MapSettings()))
+    message = messages.grid_message("map", grid, messages.map_marks(MapSettings()))
     (length,) = struct.unpack_from("<I", message)
     head = json.loads(message[4 : 4 + length])
     body = np.frombuffer(zlib.decompress(message[4 + length :]), np.uint8)
@@ -77,18 +82,6 @@ def test_a_map_too_large_for_a_phone_keeps_its_walls(monkeypatch):
     step = round(head["pixel"] / 0.05)
     assert (head["x"], head["y"], head["yaw"]) == (1.0, 2.0, 0.5)
     assert (body.reshape(head["rows"], -1)[:, 41 // step] & 2).all()
-
-
-def test_the_rest_of_a_path_takes_its_way_and_its_turns():
-    way = Way([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (2.0, 2.0), (0.0, 2.0)])
-    robot, drive = RobotSettings(speed_m_s=0.5), DriveReport(planned_quarter_turn_s=3.0)
-    assert way.left_s(0, robot, drive) == pytest.approx(6.0 / 0.5 + 2 * 3.0)
-    assert way.left_s(1, robot, drive) == pytest.approx(4.0 / 0.5 + 3.0)
-    assert way.left_s(4, robot, drive) == 0.0
-    assert Way([(1.0, 1.0)]).left_s(0, robot, drive) == 0.0
-    assert way.left_s(0, RobotSettings(), DriveReport()) is None
-    measured = DriveReport(speed_m_s=1.0, quarter_turn_s=1.0, planned_quarter_turn_s=3.0)
-    assert way.left_s(0, robot, measured) == pytest.approx(8.0)
 
 
 def test_a_guard_knows_its_names_and_tokens():

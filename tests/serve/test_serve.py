@@ -31,10 +31,9 @@ from fasaco_edge.host.addresses import Address, read_address
 from fasaco_edge.host.processes import own_mb
 from fasaco_edge.serve import viewer
 from fasaco_edge.serve.guard import Guard, guard_for
-from fasaco_edge.serve.live import LiveServer
 from fasaco_edge.serve.messages import message_text
 from fasaco_edge.serve.served_view import ServedView
-from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS
+from fasaco_edge.serve.server import MOST_STRANGERS, MOST_VIEWERS, LiveServer
 from fasaco_edge.wire.keys import Keys
 from tests.serve.serving import Served, listens, looking, served
 from tests.support.outsider import TIMEOUT_S, Outsider
@@ -132,9 +131,7 @@ def test_a_viewer_sees_the_mission(covering, page):
         marks = np.frombuffer(grid["body"], np.uint8).reshape(rows, cols)
         assert (marks == np.where(HALL == 100, 2, 1)).all()
         # Status and path come each on its own.
-        state = looker.wait(
-            "state", lambda state: state.get("state") == "covering" and state["to_go_s"] > 10
-        )
+        state = looker.wait("state", lambda state: state.get("state") == "covering")
         assert state["absent"] == ""
         path = looker.wait("path")
         points = array("f", path["body"])

@@ -24,10 +24,10 @@ from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.base import Velocity, encode_velocity
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import decode_pose
-from fasaco_edge.wire.messages.twists import Velocity, encode_velocity
 from tests.simulation.rooms import building, centres, distances_to, serpentine
 from tests.support.forked import ENVIRONMENT
 from tests.support.processes import PROGRAM, free_endpoint

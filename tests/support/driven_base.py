@@ -29,9 +29,9 @@ from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.status import ClaimReport, Status
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.messages.base import decode_velocity
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from fasaco_edge.wire.messages.twists import decode_velocity
 from fasaco_edge.wire.schemas import TWIST
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
 from tests.support.waiting import until

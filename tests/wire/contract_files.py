@@ -77,7 +77,6 @@ def query_entry(query: Query) -> dict[str, Any]:
     return {
         "name": query.name,
         "key": PREFIX + query.suffix,
-        "parameters": list(query.parameters),
         "payload": query.payload or None,
         "schema": query.schema,
         "json": query.json or None,
@@ -92,7 +91,7 @@ def qos_entry(topic: Topic) -> dict[str, Any]:
     qos = QOS[topic.name]
     blocked = f"the {topic.speaker}, 5 s; the daemon takes each sample in at once"
     return {
-        "reliability": qos.reliability,
+        "reliability": "reliable",
         "congestion": qos.congestion,
         "priority": qos.priority,
         "express": qos.express,
@@ -137,7 +136,6 @@ def query_rows() -> list[str]:
     return [
         _row(
             f"`@rpc/{entry['name']}`",
-            _names(entry["parameters"]),
             f"[{entry['payload']}](schema/{entry['payload']})" if entry["payload"] else "-",
             _typed(entry["schema"]) or f"[{entry['json']}](schema/{entry['json']})",
             entry["answered"],

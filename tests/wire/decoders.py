@@ -6,13 +6,12 @@ from collections.abc import Callable
 from functools import partial
 
 from fasaco_edge.wire import schemas
+from fasaco_edge.wire.messages.base import decode_scan, decode_velocity
 from fasaco_edge.wire.messages.battery import decode_battery
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.messages.poses import Transform, decode_pose, decode_transforms
-from fasaco_edge.wire.messages.scans import decode_scan
-from fasaco_edge.wire.messages.twists import decode_velocity
 from fasaco_edge.wire.schemas import POSE_SCHEMAS, TWIST_SCHEMAS
 
 

@@ -12,13 +12,12 @@ from typing import Any
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire import schemas
+from fasaco_edge.wire.messages.base import encode_scan, encode_velocity
 from fasaco_edge.wire.messages.battery import encode_battery
 from fasaco_edge.wire.messages.maps import encode_map_update, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import PathMessage, encode_path
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage, encode_pheromone
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from fasaco_edge.wire.messages.scans import encode_scan
-from fasaco_edge.wire.messages.twists import encode_velocity
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
 
 

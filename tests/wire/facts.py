@@ -9,11 +9,10 @@ import numpy as np
 
 from fasaco_edge.grid.geometry import GridGeometry, StampedPose
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.wire.messages.base import LaserScan, Velocity
 from fasaco_edge.wire.messages.battery import BatteryState
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
-from fasaco_edge.wire.messages.scans import LaserScan
-from fasaco_edge.wire.messages.twists import Velocity
 
 
 def placed(geometry: GridGeometry) -> dict[str, Any]:

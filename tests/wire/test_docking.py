@@ -6,14 +6,16 @@ import pytest
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.messages.docking import (
+from fasaco_edge.wire.messages.nav2_goals import (
+    ABORTED,
+    CANCELED,
+    SUCCEEDED,
     DockEnding,
     decode_dock_ending,
     decode_undock_ending,
     encode_dock,
     encode_undock,
 )
-from fasaco_edge.wire.messages.follow_path import ABORTED, CANCELED, SUCCEEDED
 from fasaco_edge.wire.ros_keys import CALLS, DOCK_ROBOT, UNDOCK_ROBOT, served_keys
 from tests.support.dock_server import CANCEL_HASH, HASHES, dock_store
 from tests.wire.test_ros_actions import GOAL, Definitions, base, named

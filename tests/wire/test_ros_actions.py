@@ -9,7 +9,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.messages.follow_path import (
+from fasaco_edge.wire.messages.nav2_goals import (
     ABORTED,
     SUCCEEDED,
     TAKEN,

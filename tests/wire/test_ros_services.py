@@ -16,17 +16,15 @@ from fasaco_edge.wire.documents.status import (
     SupervisedRecorder,
     TroubleReport,
 )
-from fasaco_edge.wire.messages.diagnostics import (
+from fasaco_edge.wire.messages.ros_node import (
     ERROR,
     OK,
     STALE,
     WARN,
-    encode_diagnostics,
-    level_of,
-)
-from fasaco_edge.wire.messages.ros_services import (
     check_request,
+    encode_diagnostics,
     encode_response,
+    level_of,
     response_attachment,
 )
 from fasaco_edge.wire.ros_keys import attachment, attachment_of

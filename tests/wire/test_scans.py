@@ -7,7 +7,7 @@ import pytest
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.limits import MAX_SCAN_BEAMS
-from fasaco_edge.wire.messages.scans import LaserScan, decode_scan, encode_scan
+from fasaco_edge.wire.messages.base import LaserScan, decode_scan, encode_scan
 from tests.wire import oracle
 
 

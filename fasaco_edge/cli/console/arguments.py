@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.outputs import whole
+from fasaco_edge.host.durable import whole
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
@@ -248,7 +248,7 @@ def naming(place: Path) -> Iterator[None]:
 
 @contextmanager
 def writing(file: Path) -> Iterator[Path]:
-    """Yield a temporary name under which to write ``file``, see ``host.outputs.whole``.
+    """Yield a temporary name under which to write ``file``, see ``host.durable.whole``.
 
     Raises:
         BadConfiguration: the file cannot be written.

@@ -26,12 +26,11 @@ from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.order import Command
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents import replies
-from fasaco_edge.wire.documents.json_text import decode_json, encode_json
+from fasaco_edge.wire.documents.json_text import Settings, decode_json, encode_json
 from fasaco_edge.wire.documents.replies import Version, encode_error
-from fasaco_edge.wire.documents.settings import Settings
 from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES
-from fasaco_edge.wire.messages.ros_services import (
+from fasaco_edge.wire.messages.ros_node import (
     Triggered,
     check_request,
     encode_response,
@@ -64,17 +63,15 @@ def answering(answer: Callable[[Request], AnyReply]) -> Callable[[Request], AnyR
     return answered
 
 
-def check(request: Request, *parameters: str, payload: bool = False) -> None:
-    """Check that a query has no other parameters, and a payload only if it takes one.
+def check(request: Request, *, payload: bool = False) -> None:
+    """Check that a query has no parameters, and a payload only if it takes one.
 
     Raises:
-        BadQuery: the query does not take a parameter or payload; the text names it.
+        BadQuery: the query has a parameter or payload; the text names it.
     """
     name = request.key.rpartition("/")[2]
-    takes = ", ".join(parameters) or "none"
     for parameter in request.parameters:
-        if parameter not in parameters:
-            raise BadQuery(f"{name}: unknown parameter {parameter!r}, it takes {takes}")
+        raise BadQuery(f"{name} takes no parameters, got {parameter!r}")
     if request.payload and not payload:
         raise BadQuery(f"{name} takes no payload, got one of {len(request.payload)} bytes")
 

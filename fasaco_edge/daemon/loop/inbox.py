@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Spacing
-from fasaco_edge.bus.one_publisher import OnePublisher
+from fasaco_edge.bus.one_publisher import OnePublisher, ReturningMaps
 from fasaco_edge.bus.queries import Question
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.daemon.loop.answers import error_reply
-from fasaco_edge.daemon.loop.returning_maps import ReturningMaps
 from fasaco_edge.daemon.memory import most_bytes, queues
 from fasaco_edge.errors import CommandError, FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.grid.occupancy import OccupancyGrid

@@ -6,7 +6,6 @@ Periodic messages are made in ``daemon.loop.periodic``.
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -48,8 +47,6 @@ SENT_TOPICS = tuple(
     for topic in topics.TOPICS
     if topic.direction == "out" and topic not in (topics.TURNS, topics.FLEET)
 )
-# Parameter of the query for a path, and the name of its kept reply.
-BEFORE_STOP = "before_stop"
 
 
 class Outbox:
@@ -67,7 +64,6 @@ class Outbox:
         self._ros = ros
         self._publishers = {topic.name: bus.advertise(keys, topic) for topic in SENT_TOPICS}
         self._ros_publishers = {} if ros is None else ros.publishers
-        self._lock = threading.Lock()
         self._kept: dict[str, Callable[[], AnyReply]] = {}
         for topic in SENT_TOPICS:
             if topic.name in topics.RPC_NAMES:
@@ -93,13 +89,11 @@ class Outbox:
 
     def keep(self, name: str, reply: Callable[[], AnyReply]) -> None:
         """Set the function that makes the reply to queries of a name, on a Zenoh thread."""
-        with self._lock:
-            self._kept[name] = reply
+        self._kept[name] = reply
 
     def _answer(self, name: str, request: Request) -> AnyReply:
-        check(request, *((BEFORE_STOP,) if name == topics.PATH.name else ()))
-        with self._lock:
-            kept = self._kept.get(BEFORE_STOP if BEFORE_STOP in request.parameters else name)
+        check(request)
+        kept = self._kept.get(name)
         if kept is None:
             what = "are no rooms" if name == topics.ROOMS.name else f"is no {name}"
             raise NotYet(f"there {what} yet")
@@ -124,9 +118,6 @@ class Outbox:
         attachment = encode_json(structs.replace(path_attachment(path), daemon=self._id))
         payload = encode_path(path.xy, yaw, path.frame, path.map_stamp_ns)
         self.send(topics.PATH, payload, attachment)
-        if not path.stops:
-            with self._lock:
-                self._kept[BEFORE_STOP] = self._kept[topics.PATH.name]
 
     def status(self, status: Status) -> None:
         """Publish the status, under ROS 2 as diagnostics."""

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.text import duration, one_line
-from fasaco_edge.wire.documents.settings import Settings, known_settings
+from fasaco_edge.wire.documents.json_text import Settings
+from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.reasons import plain
 

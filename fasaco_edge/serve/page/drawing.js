@@ -88,8 +88,8 @@ function showBars() {
     taken = taken || Boolean(wanted);
   }
   if (model.left) {
-    const byMarks = model.left.marks && !model.recording, isOld = !model.unswept && Date.now() - model.leftAt > OLD_MS;
-    const why = model.left.places.length || model.left.marks === REST ? "" : !byMarks ? " (where is not known)" : isOld ? " (the robot's program is too old to say where)" : "";
+    const byMarks = model.left.marks && !model.recording;
+    const why = model.left.places.length || model.left.marks === REST ? "" : byMarks ? "" : " (where is not known)";
     document.getElementById("leftname").textContent = model.left.reason + why;
   }
   redraw();

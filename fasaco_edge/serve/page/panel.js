@@ -107,12 +107,8 @@ function showLeft(state) {
   if (model.left) { model.left = shown || null; showBars(); if (!shown) wants(); }
 }
 
-// Time to wait for unswept floor [ms]: daemons of earlier releases do not send it.
-const OLD_MS = 6000;
 function showOnMap(part) {
   model.left = part;
-  model.leftAt = Date.now();
-  setTimeout(showBars, OLD_MS + 100);
   picked = "";
   Object.assign(view, { fitted: true, follows: false });
   showTools();

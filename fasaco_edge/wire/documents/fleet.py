@@ -12,7 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import FleetError, MalformedMessage
-from fasaco_edge.wire.documents.json_text import OF_JSON, Coordinate, Document, Text
+from fasaco_edge.wire.documents.json_text import OF_JSON, Angle, Coordinate, Document, Text
 from fasaco_edge.wire.limits import (
     MAX_FLEET_INDEX,
     MAX_FLEET_PARTS,
@@ -30,7 +30,6 @@ TILE_BYTES: Final = TILE * TILE // 8
 MOST_TILE_INDEX: Final = MAX_FLEET_INDEX // TILE
 
 Point = tuple[Coordinate, Coordinate]
-Angle = Annotated[float, Meta(ge=-360, le=360)]
 Named = Annotated[str, Meta(min_length=1, max_length=256)]
 Whole = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Pace = Annotated[float, Meta(ge=1e-3, le=3600)]

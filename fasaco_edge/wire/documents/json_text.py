@@ -51,7 +51,10 @@ Name = Annotated[str, allowed(minLength=1)]
 Text = Annotated[str, Meta(max_length=MAX_STRING_BYTES)]
 ZenohId = Annotated[str, allowed(pattern="^[0-9a-f]{1,32}$")]
 Coordinate = Annotated[float, Meta(ge=-MAX_COORDINATE_M, le=MAX_COORDINATE_M)]
+Angle = Annotated[float, Meta(ge=-360, le=360)]
 Corners = Annotated[tuple[tuple[float, float], ...], allowed(maxItems=1000)]
+Settings = dict[str, object]
+"""The configuration in force, without secrets, by sections."""
 
 
 class Document(msgspec.Struct, frozen=True):

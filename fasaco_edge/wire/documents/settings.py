@@ -1,12 +1,15 @@
-"""Settings published by a daemon: those in force, and those that readers of a status use."""
+"""Settings that readers of a daemon's status use."""
 
 from __future__ import annotations
 
-from fasaco_edge.wire.documents.fleet import Angle
-from fasaco_edge.wire.documents.json_text import Coordinate, Corners, Document, tolerant
-
-Settings = dict[str, object]
-"""The configuration in force, without secrets, by sections."""
+from fasaco_edge.wire.documents.json_text import (
+    Angle,
+    Coordinate,
+    Corners,
+    Document,
+    Settings,
+    tolerant,
+)
 
 
 class RobotSettings(Document, frozen=True):

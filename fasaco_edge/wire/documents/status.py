@@ -17,6 +17,7 @@ from fasaco_edge.wire.documents.json_text import (
     Document,
     Name,
     Ordinal,
+    Settings,
     ZenohId,
     allowed,
 )
@@ -30,7 +31,6 @@ from fasaco_edge.wire.documents.replies import (
     State,
     TroubleReport,
 )
-from fasaco_edge.wire.documents.settings import Settings
 
 RECORDER_STATES: Final = ("recording", "disk full", "stalled", "stopping")
 SUPERVISED_STATES: Final = ("starting", *RECORDER_STATES, "silent", "restarting")

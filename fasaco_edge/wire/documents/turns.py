@@ -10,7 +10,7 @@ from __future__ import annotations
 import msgspec
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.wire.documents.settings import Settings
+from fasaco_edge.wire.documents.json_text import Settings
 
 
 class LogStart(msgspec.Struct, frozen=True):

@@ -25,8 +25,7 @@ from fasaco_edge.daemon.loop.periodic import MOST_SQUARES
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
 from fasaco_edge.follow.estimate import Command
 from fasaco_edge.follow.follower import Follower
-from fasaco_edge.follow.scanner import Mount
-from fasaco_edge.follow.sight import Sight
+from fasaco_edge.follow.sight import Mount, Sight
 from fasaco_edge.follow.standstill import Standstill
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -35,10 +34,10 @@ from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.path_exit import PublishedPath
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.messages.base import LaserScan, encode_scan
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from fasaco_edge.wire.messages.scans import LaserScan, encode_scan
 from fasaco_edge.wire.schemas import POSE_STAMPED
 from tests.campaigns.lab.planning import LockStepPlanning
 from tests.campaigns.lab.settings import LEAST_RANGE_M, MOST_RANGE_M, stamp_ns

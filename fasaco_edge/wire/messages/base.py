@@ -1,7 +1,9 @@
-"""The robot's laser scan: ranges and angles of sensor_msgs/LaserScan, by a small reader.
+"""Messages of the robot's base, for a small program: laser scans in, velocities out.
 
-As REP 117 has it, a range may be infinite (nothing in reach), minus infinite (too near to measure)
-or NaN (the measurement failed): these are no faults of a message. Intensities are not used.
+A scan is ranges and angles of sensor_msgs/LaserScan. As REP 117 has it, a range may be infinite
+(nothing in reach), minus infinite (too near to measure) or NaN (the measurement failed): these are
+no faults of a message. Intensities are not used. A velocity is a geometry_msgs/Twist, or a
+TwistStamped.
 """
 
 from __future__ import annotations
@@ -10,9 +12,10 @@ import math
 import struct
 from dataclasses import dataclass
 
+from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_SCAN_BEAMS, MAX_SCAN_SPAN_RAD
 from fasaco_edge.wire.messages.cdr import CdrReader, CdrWriter, read_header, refuse, write_header
-from fasaco_edge.wire.schemas import LASER_SCAN
+from fasaco_edge.wire.schemas import LASER_SCAN, TWIST, TWIST_SCHEMAS, TWIST_STAMPED
 
 _FLOATS = struct.Struct("<7f")
 _NAMES = (
@@ -99,3 +102,63 @@ def _check(floats: tuple[float, ...], count: int) -> None:
     if not 0.0 <= floats[_LEAST] < floats[_MOST]:
         expected = f"at least 0 and below range_max, {floats[_MOST]:g}"
         refuse(LASER_SCAN, "range_min", expected, floats[_LEAST])
+
+
+_TWIST = struct.Struct("<6d")
+_TWIST_NAMES = tuple(f"{part}.{axis}" for part in ("linear", "angular") for axis in "xyz")
+
+
+@dataclass(frozen=True, slots=True)
+class Velocity:
+    """Velocity of a differential-drive base; the other four numbers of a twist are 0.
+
+    Attributes:
+        speed_m_s: forward [m/s].
+        turn_rad_s: counter-clockwise [rad/s].
+        frame: of a TwistStamped, the robot's own; "" for a Twist.
+        stamp_ns: of a TwistStamped [ns]; 0 for a Twist.
+    """
+
+    speed_m_s: float
+    turn_rad_s: float
+    frame: str = ""
+    stamp_ns: int = 0
+
+
+def encode_velocity(velocity: Velocity, schema: str = TWIST) -> bytes:
+    """Return ``velocity`` as a message of type ``schema``, one of ``TWIST_SCHEMAS``."""
+    _check_schema(schema)
+    writer = CdrWriter(schema)
+    if schema == TWIST_STAMPED:
+        write_header(writer, velocity.frame, velocity.stamp_ns)
+    numbers = (velocity.speed_m_s, 0.0, 0.0, 0.0, 0.0, velocity.turn_rad_s)
+    _check_numbers(numbers, schema)
+    writer.doubles(_TWIST, *numbers)
+    return writer.payload()
+
+
+def decode_velocity(payload: bytes, schema: str = TWIST) -> Velocity:
+    """Return the velocity in a message of type ``schema``, one of ``TWIST_SCHEMAS``."""
+    _check_schema(schema)
+    reader = CdrReader(payload, schema)
+    frame, stamp_ns = read_header(reader) if schema == TWIST_STAMPED else ("", 0)
+    numbers = reader.doubles(_TWIST, "twist")
+    reader.end()
+    _check_numbers(numbers, schema)
+    return Velocity(numbers[0], numbers[5], frame, stamp_ns)
+
+
+def _check_schema(schema: str) -> None:
+    if schema not in TWIST_SCHEMAS:
+        known = " or ".join(TWIST_SCHEMAS)
+        raise MalformedMessage(
+            f"a velocity must come as {known}, got {schema!r}",
+            hint="publish one of these types, and name it in the encoding",
+        )
+
+
+def _check_numbers(numbers: tuple[float, ...], schema: str) -> None:
+    before = "twist." if schema == TWIST_STAMPED else ""
+    for name, value in zip(_TWIST_NAMES, numbers, strict=True):
+        if not math.isfinite(value):
+            refuse(schema, before + name, "a finite number", value)
