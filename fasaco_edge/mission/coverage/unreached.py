@@ -127,7 +127,7 @@ class OrderReach:
         # The same before the map moved; and whether cells have moved since the newest area.
         self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
         self._have_moved = False
-        # Cells that keep-outs drawn since then cut off: no wait opens them again.
+        # Cells that keep-outs drawn since then cut off.
         self._cut_off: tuple[Window, NDArray[np.bool_]] | None = None
         self._found: tuple[object, Unreached] = (None, Unreached())
 
@@ -216,6 +216,14 @@ class OrderReach:
         if self._map.free is not None:
             known &= ~(self._map.free.coverable & ~lattice.coverable)
         return known
+
+    def lost(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells were reachable and may be again, bool (rows, cols) of an area.
+
+        Cells that keep-outs close or cut off are left out.
+        """
+        known = self.known(area.lattice) & ~area.reachable
+        return known & ~_on(area.lattice.window, self._cut_off)
 
     def _note_failure(self, why: str) -> None:
         """Note that a path left cells over, and why."""
@@ -309,11 +317,8 @@ class OrderReach:
         order, area = self.order_state.order, self._map.area
         if order is None or area is None:
             return set()
-        assert self._map.free is not None
         window = area.lattice.window
-        kept_out = self._map.free.coverable & ~area.lattice.coverable
-        closed = self._uncovered(order, area) & self._once_on(window) & ~area.reachable
-        closed &= ~(kept_out | _on(window, self._cut_off))
+        closed = self._uncovered(order, area) & self.lost(area)
         found = viewpoints(closed, area.reachable)
         return {(row + window.row0, col + window.col0) for row, col in found}
 
