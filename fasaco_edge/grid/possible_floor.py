@@ -71,4 +71,6 @@ def possible_m2(
 def _keep_in(pixels: Bits, floor: FloorMap, cells: NDArray[np.bool_]) -> None:
     """Keep only the pixels, uint64 (rows, words) of a floor, in cells, bool (rows, cols)."""
     window = floor.stands.lattice.window
+    # The kernel is compiled for cells that may be written to.
+    cells = np.require(cells, requirements="W")
     keep_in_cells(pixels, floor.placement, cells, (window.row0, window.col0), (0, 0))

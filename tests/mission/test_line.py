@@ -303,6 +303,19 @@ def test_the_line_avoids_a_new_keep_out_at_once():
     assert robot.mission.coverage().remaining == 0
 
 
+def test_floor_behind_a_new_keep_out_is_not_hidden_by_thick_walls():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(4.8, 2.4)))
+    robot.drive(5)
+    fence = KeepOut("fence", ((4.4, 0.0), (4.5, 0.0), (4.5, 9.0), (4.4, 9.0)))
+    robot.tell(CommandReceived(1, "keep_out_add", keep_out=fence))
+    robot.finish()
+    told = floor_report(robot.mission)
+    assert sum(left.m2 for left in told.out_of_reach) > 2.0
+    assert told.possible_m2 - told.reachable_m2 < 1.0
+    assert "not reached: closed off by a keep-out zone" in robot.mission.reason
+
+
 def test_unreachable_floor_follows_map_growth_and_zone_orders():
     whole = room(4.8, 2.4)
     cells = whole.cells.copy()

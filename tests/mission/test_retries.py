@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
+from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.coverage.unreached import viewpoints
 from fasaco_edge.mission.orders.keep_outs import KeepOut
@@ -218,3 +220,49 @@ def test_cells_beside_a_keep_out_are_not_blamed_on_an_obstacle():
     drive.run(State.DONE)
     said = {reason for _, reason in reasons(drive)}
     assert said == {"in a keep-out zone", "no longer free on the map"}
+
+
+SMALL = replace(RETRIES, footprint=Footprint(CELL, CELL / 4))
+FENCE = KeepOut("fence", tuple(map(tuple, rectangle(0, 3, 1, 5))))
+
+
+def two_rooms(*doors):
+    """Two rooms of 4 x 4 cells; in the wall between, thinner than a cell, doors in some rows."""
+    cells = np.zeros((32, 64), np.int8)
+    cells[:, 31] = 100
+    for row in doors:
+        cells[8 * row : 8 * (row + 1), 31] = 0
+    return OccupancyGrid(GridGeometry(32, 64, CELL / 8, Pose2D(0.0, 0.0)), cells, "map")
+
+
+def between_rooms(*doors):
+    drive = Drive((0, 0), MapReceived(two_rooms(*doors)), pose_at(0, 0), config=SMALL)
+    drive.plan()
+    return drive
+
+
+def test_a_room_behind_a_keep_out_is_named_and_not_waited_for():
+    """No obstacle is there that could leave."""
+    drive = between_rooms(0)
+    drive.command("keep_out_add", keep_out=FENCE)
+    drive.run(State.DONE)
+    assert drive.now < 10.0
+    assert (15, "closed off by a keep-out zone") in reasons(drive)
+    assert "closed off by a keep-out zone (0.9 m2)" in drive.mission.reason
+
+
+def test_a_keep_out_in_one_way_leaves_the_wait_for_the_other():
+    drive = between_rooms(0, 3)
+    drive.command("keep_out_add", keep_out=FENCE)
+    drive.tell(MapReceived(two_rooms(0)))
+    drive.run(State.BLOCKED)
+    assert "tried again after 30 s (1 of 2)" in drive.mission.reason
+
+
+def test_a_door_behind_a_keep_out_that_was_removed_is_waited_for():
+    drive = between_rooms(0)
+    drive.command("keep_out_add", keep_out=FENCE)
+    drive.command("keep_out_remove", keep_out=KeepOut("fence"))
+    drive.tell(MapReceived(two_rooms()))
+    drive.run(State.BLOCKED)
+    assert "tried again after 30 s (1 of 2)" in drive.mission.reason

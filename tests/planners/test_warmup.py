@@ -17,8 +17,16 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.kernels.folder import KERNEL_SOURCES, kernel_module
 from fasaco_edge.kernels.manifest import chosen_folder
 from fasaco_edge.mission.config import Sweeping
-from fasaco_edge.mission.core.events import MapReceived, PatchReceived, PlanReady, PoseReceived
+from fasaco_edge.mission.core.events import (
+    CommandReceived,
+    MapReceived,
+    PatchReceived,
+    PlanReady,
+    PoseReceived,
+    State,
+)
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.compiling import compile_missing, warm_up
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
@@ -33,6 +41,7 @@ from fasaco_edge.wire.messages.maps import (
     encode_map_update,
     encode_occupancy_grid,
 )
+from tests.mission.line_robot import LineRobot
 from tests.support.processes import ENVIRONMENT
 
 # Kernels that take less than half a second to compile for a constant, too.
@@ -108,6 +117,21 @@ def test_a_mission_with_decoded_maps_compiles_nothing_new(turn_s, sweeping):
         assert mission.step([event, pose], 1.0).faults == ()
         assert mission.coverage() is not None
 
+    assert compiled_signatures() == before
+
+
+def test_an_order_of_a_zone_compiles_nothing_new_up_to_its_end():
+    """The masks of zones are read-only, which is another type of array to numba."""
+    warm_up(lambda stage: None)
+    before = compiled_signatures()
+    pixels = np.zeros((40, 60), np.int8)
+    pixels[[0, -1]], pixels[:, [0, -1]] = 100, 100
+    robot = LineRobot(pixels, (1.0, 1.0))
+    corners = [[0.5, 0.5], [1.6, 0.5], [1.6, 1.6], [0.5, 1.6]]
+    order = read_order({"zones": [{"name": "rug", "polygon": corners, "passes": ["edge", "rest"]}]})
+    robot.step(CommandReceived(1, "start", order, discard=True))
+    assert robot.wait(300.0, lambda robot: robot.mission.state is State.DONE)
+    assert "of the zones is covered" in robot.mission.reason
     assert compiled_signatures() == before
 
 

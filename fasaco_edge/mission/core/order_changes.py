@@ -160,9 +160,11 @@ class OrderChanges:
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
         """Apply changed keep-outs to the same order; stop a robot inside one of them."""
+        before = self.map.area
         self._keep_out(order)
         self.route.forget_failure()
         self.update_area()
+        self.orders.note_keep_outs(before)
         if not self.map.is_kept_out:
             return None
         # From near the border the robot may continue, but not along this path.

@@ -100,6 +100,13 @@ def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return widened
 
 
+def _on(window: Window, cells: tuple[Window, NDArray[np.bool_]] | None) -> NDArray[np.bool_]:
+    """Return a copy of cells, given with their window, on another one; without any, none."""
+    if cells is None:
+        return np.zeros((window.rows, window.cols), bool)
+    return carried_copy(cells[1], cells[0], window)
+
+
 class OrderReach:
     """Remembers which cells were reachable since an order began; finds those that stay uncovered.
 
@@ -120,13 +127,15 @@ class OrderReach:
         # The same before the map moved; and whether cells have moved since the newest area.
         self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
         self._have_moved = False
+        # Cells that keep-outs drawn since then cut off.
+        self._cut_off: tuple[Window, NDArray[np.bool_]] | None = None
         self._found: tuple[object, Unreached] = (None, Unreached())
 
     def _begin_reach(self, reached: ReachedCells | None) -> None:
         """Start another order, or continue one with the cells reached before a restart."""
         self._failures, self._why_left, self._newest = 0, "", None
         self._once = None if reached is None else (reached.window, reached.mask)
-        self._before_motion = None
+        self._before_motion = self._cut_off = None
         self._have_moved = reached is not None and reached.have_moved
         self.note_area()
 
@@ -134,6 +143,7 @@ class OrderReach:
         """Take over the reach of another mission with the same order on the same cells."""
         self._failures, self._why_left = before._failures, before._why_left
         self._newest, self._once = before._newest, before._once
+        self._cut_off = before._cut_off
 
     @property
     def reached(self) -> ReachedCells | None:
@@ -158,6 +168,16 @@ class OrderReach:
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
             self._once, self._newest, self._have_moved = (window, once), area, False
+            if self._cut_off is not None:
+                window = area.lattice.window
+                self._cut_off = window, _on(window, self._cut_off) & ~area.reachable
+
+    def note_keep_outs(self, before: ReachableArea | None) -> None:
+        """Note that keep-outs have changed; ``before``: the area until then."""
+        if before is not None and (area := self._map.area) is not None:
+            window = area.lattice.window
+            lost = _on(window, (before.lattice.window, before.reachable)) & ~area.reachable
+            self._cut_off = window, lost | _on(window, self._cut_off)
 
     def note_map_motion(self) -> None:
         """Note that the newest map has moved; ``move_reached`` follows with the motion."""
@@ -170,14 +190,14 @@ class OrderReach:
             lattice = self._map.lattice
             assert lattice is not None
             self._once = moved_mask(*before, motion, lattice.cell_m)
-            self._newest, self._have_moved = None, True
+            self._newest, self._have_moved, self._cut_off = None, True, None
             self.note_area()
 
     def shift_reached(self, motion: Motion) -> None:
         """Move the cells with the newest map, whose area is not known yet."""
         if self._once is not None and self._map.lattice is not None:
             self._once = moved_mask(*self._once, motion, self._map.lattice.cell_m)
-            self._have_moved = True
+            self._have_moved, self._cut_off = True, None
 
     def _around(self, window: Window) -> Window:
         """Return the window around all maps received; around the newest alone if too large."""
@@ -196,6 +216,14 @@ class OrderReach:
         if self._map.free is not None:
             known &= ~(self._map.free.coverable & ~lattice.coverable)
         return known
+
+    def lost(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells were reachable and may be again, bool (rows, cols) of an area.
+
+        Cells that keep-outs close or cut off are left out.
+        """
+        known = self.known(area.lattice) & ~area.reachable
+        return known & ~_on(area.lattice.window, self._cut_off)
 
     def _note_failure(self, why: str) -> None:
         """Note that a path left cells over, and why."""
@@ -289,10 +317,8 @@ class OrderReach:
         order, area = self.order_state.order, self._map.area
         if order is None or area is None:
             return set()
-        assert self._map.free is not None
         window = area.lattice.window
-        kept_out = self._map.free.coverable & ~area.lattice.coverable
-        closed = self._uncovered(order, area) & self._once_on(window) & ~area.reachable & ~kept_out
+        closed = self._uncovered(order, area) & self.lost(area)
         found = viewpoints(closed, area.reachable)
         return {(row + window.row0, col + window.col0) for row, col in found}
 
@@ -341,6 +367,4 @@ class OrderReach:
 
     def _once_on(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window have ever been reachable."""
-        if self._once is None:
-            return np.zeros((window.rows, window.cols), bool)
-        return carried_copy(self._once[1], self._once[0], window)
+        return _on(window, self._once)

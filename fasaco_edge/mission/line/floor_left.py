@@ -135,12 +135,12 @@ class FloorLeft:
         if floor is None or grid is None or stamped is None or self._map.area is None:
             return ""
         asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
-        cut_off = self._orders.known(self._map.area.lattice) & ~self._map.area.reachable
+        lost = self._orders.lost(self._map.area)
         if self._tally is not None:
             # For the whole order, not only for its last part.
             self.update()
         thinner_m = grid.geometry.resolution
-        self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, cut_off)
+        self._possible_m2 = possible_m2(floor, thinner_m, (pose.x, pose.y), asked, lost)
         found = self.areas
         if found is None:
             return ""
