@@ -6,13 +6,15 @@ have to agree on that. Polygons are closed, their outlines counter-clockwise.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import TypeGuard
 
-from fasaco_edge.errors import OrderError
+from fasaco_edge.errors import OrderError, joined
 from fasaco_edge.grid.geometry import Point
-from fasaco_edge.text import nearest
+from fasaco_edge.host.documents import inspected
+from fasaco_edge.mission.orders.order import OrderDocument
+from fasaco_edge.text import nearest, shown
 from fasaco_edge.wire.documents.rooms import Rooms
 
 SUFFIX = ".geojson"
@@ -26,7 +28,7 @@ OF_FEATURES, OF_COLLECTIONS = ("keep_out", "skip"), ("type", "features", "name",
 # Least similarity of an unknown member to a known one that counts as a misspelling.
 ALIKE = 0.8
 
-Feature = dict[str, object]
+Members = dict[str, object]
 
 
 def lines_collection(
@@ -58,7 +60,7 @@ def rooms_collection(rooms: Rooms) -> dict[str, object]:
     return {"type": "FeatureCollection", "frame": rooms.frame, "features": features}
 
 
-def _feature(kind: str, coordinates: object, properties: dict[str, object]) -> Feature:
+def _feature(kind: str, coordinates: object, properties: dict[str, object]) -> Members:
     """Return a feature of one geometry."""
     geometry = {"type": kind, "coordinates": coordinates}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
@@ -77,79 +79,102 @@ def is_geojson(document: object) -> TypeGuard[dict[str, object]]:
     return isinstance(document, dict) and "type" in document
 
 
-def order_of(document: dict[str, object]) -> tuple[dict[str, object], dict[str, str]]:
-    """Return the order in a collection of polygons, and the feature of each zone and keep-out.
+def drawn_order(document: dict[str, object]) -> tuple[OrderDocument, list[OrderError]]:
+    """Return the order in a collection of polygons, and all faults, with keys of the collection.
 
     A polygon is a zone, whose members are its properties ``OF_ZONES``; with ``"keep_out": true`` it
     is a keep-out. A feature with the number of a room orders that room, whatever its outline. With
     ``"skip": true`` a feature is ignored. The members ``OF_ORDERS`` of the collection are those of
     the order.
-
-    Raises:
-        OrderError: there is no feature, a feature is no polygon or has holes, or a property is
-            probably misspelt.
     """
     zones: list[dict[str, object]] = []
     keep_out: list[object] = []
+    # The feature of each zone and keep-out, and the name of each feature.
     origins: dict[str, str] = {}
+    names: dict[str, object] = {}
+    faults = list(_misspelt(document, OF_ORDERS))
     features = document.get("features")
-    _check_spelling(document, OF_ORDERS, "the collection")
     if (kind := document["type"]) != "FeatureCollection":
-        raise OrderError(f"type: must be FeatureCollection, got {kind!r:.80}", hint=HINT)
-    if not isinstance(features, list) or not features:
-        raise OrderError("features: there is none", hint=HINT)
-    for number, each in enumerate(features):
-        where, members = f"features[{number}]", each if isinstance(each, dict) else {}
+        faults.append(OrderError(f"must be FeatureCollection, got {shown(kind)}", key="type"))
+    elif not isinstance(features, list) or not features:
+        faults.append(OrderError("there is none", key="features"))
+    for index, each in enumerate(features if isinstance(features, list) else ()):
+        key, members = f"features[{index}]", each if isinstance(each, dict) else {}
         properties = members.get("properties") or {}
         if not isinstance(properties, dict):
-            raise OrderError(f"{where}: properties must be an object", hint=HINT)
-        name = properties.get("name") or members.get("id")
-        where += "" if name is None else f" {name!r:.80}"
-        geometry = members.get("geometry")
-        if _is_set(properties, "keep_out", where):
-            origins[f"keep_out[{len(keep_out)}]"] = where
-            keep_out.append(_corners(geometry, where))
-        elif not _is_set(properties, "skip", where):
-            own = {name: properties[name] for name in OF_ZONES if properties.get(name) is not None}
-            named = {"name": f"zone {number + 1}"} | own
-            placed = {} if "room" in own else {"polygon": _corners(geometry, where)}
-            origins[f"zones[{len(zones)}]"] = where
-            zones.append(named | placed)
-        _check_spelling(properties, (*OF_ZONES, *OF_FEATURES), where)
+            faults.append(OrderError("expected object", key=f"{key}.properties"))
+            continue
+        faults += _misspelt(properties, (*OF_ZONES, *OF_FEATURES), f"{key}.properties")
+        faults += _flags(properties, f"{key}.properties")
+        names[key] = properties.get("name") or members.get("id")
+        is_kept_out = properties.get("keep_out") is True
+        if properties.get("skip") is True and not is_kept_out:
+            continue
+        own = {name: properties[name] for name in OF_ZONES if properties.get(name) is not None}
+        corners = None
+        if is_kept_out or "room" not in own:
+            corners = _corners(members.get("geometry"), f"{key}.geometry", faults)
+        if not is_kept_out:
+            origins[f"zones[{len(zones)}]"] = key
+            zones.append({"name": f"zone {index + 1}", "polygon": corners} | own)
+        elif corners is not None:
+            origins[f"keep_out[{len(keep_out)}]"] = key
+            keep_out.append(corners)
     order = {name: document[name] for name in OF_ORDERS if name in document}
-    return order | {"zones": zones, "keep_out": keep_out}, origins
+    read, found = inspected(
+        OrderDocument, order | {"zones": zones, "keep_out": keep_out}, OrderError
+    )
+    for fault in found:
+        place = fault.key[: fault.key.find("]") + 1]
+        if place in origins:
+            rest = fault.key.removeprefix(place)
+            is_corner = place.startswith("keep_out") or rest.startswith(".polygon")
+            part = ".geometry.coordinates[0]" if is_corner else ".properties"
+            fault.key = f"{origins[place]}{part}{rest.removeprefix('.polygon')}"
+    for fault in (faults := faults + found):
+        # A file may be one line, so that its number says nothing.
+        if name := names.get(fault.key[: fault.key.find("]") + 1]):
+            fault.what += f" (feature {name!r:.80})"
+        fault.hint = HINT if fault.hint == OrderError.hint else fault.hint
+    return read, faults
 
 
-def _check_spelling(members: dict[str, object], known: Sequence[str], where: str) -> None:
-    """Check that no member is a misspelling; other unknown members may come from any program."""
+def _misspelt(members: Members, known: Sequence[str], key: str = "") -> Iterator[OrderError]:
+    """Yield members that are probably misspelt; other unknown ones may come from any program."""
     for name in (each for each in members if each not in (*known, *OF_COLLECTIONS)):
         if near := nearest(name, known, ALIKE):
-            raise OrderError(f"{where}: unknown member {name}; did you mean {near[0]}?", hint=HINT)
+            text = f"unknown key; did you mean {joined(key, near[0])}?"
+            yield OrderError(text, key=joined(key, name))
 
 
-def _is_set(properties: dict[str, object], name: str, where: str) -> bool:
-    """Return a boolean property; False if it is missing."""
-    value = properties.get(name)
-    if value is not None and not isinstance(value, bool):
-        raise OrderError(f"{where}: {name}: must be true or false, is {value!r}", hint=HINT)
-    return bool(value)
+def _flags(properties: Members, key: str) -> Iterator[OrderError]:
+    for name in OF_FEATURES:
+        if properties.get(name) not in (None, True, False):
+            text = f"must be true or false, got {shown(properties[name])}"
+            yield OrderError(text, key=f"{key}.{name}")
 
 
-def _corners(geometry: object, where: str) -> list[object]:
-    """Return the corners of a polygon without holes."""
+def _corners(geometry: object, key: str, faults: list[OrderError]) -> list[object] | None:
+    """Return the corners of a polygon without holes; None, and a fault, for another geometry."""
     members = geometry if isinstance(geometry, dict) else {}
     rings, kind = members.get("coordinates"), members.get("type")
-    if kind != "Polygon" or not isinstance(rings, list) or not rings:
-        raise OrderError(f"{where}: must be a Polygon, is {kind or 'none'}", hint=HINT)
-    if len(rings) > 1:
-        raise OrderError(
-            f"{where}: the polygon must have one ring, got {len(rings)}: rings after the first are "
-            "holes in it, and an order takes no holes",
-            hint="delete the holes; to keep the robot out of one, draw it as a Polygon of its own, "
-            'with the property "keep_out": true',
+    rings = rings if isinstance(rings, list) else []
+    hint, place = HINT, f"{key}.coordinates"
+    if kind != "Polygon" or not rings:
+        text, place = f"must be a Polygon, got {shown(kind or geometry)}", key
+    elif len(rings) > 1:
+        text = (
+            f"the polygon must have one ring, got {len(rings)}: rings after the first are holes "
+            "in it, and an order takes no holes"
         )
-    ring = rings[0]
-    if not isinstance(ring, list) or len(ring) < 2 or ring[0] != ring[-1]:
-        raise OrderError(f"{where}: the last corner must be the first again", hint=HINT)
-    # Drawing programs add a height.
-    return [corner[:2] if isinstance(corner, list) else corner for corner in ring[:-1]]
+        hint = (
+            "delete the holes; to keep the robot out of one, draw it as a Polygon of its own, "
+            'with the property "keep_out": true'
+        )
+    elif not isinstance(ring := rings[0], list) or len(ring) < 2 or ring[0] != ring[-1]:
+        text, place = "the last corner must be the first again", f"{place}[0]"
+    else:
+        # Drawing programs add a height.
+        return [corner[:2] if isinstance(corner, list) else corner for corner in ring[:-1]]
+    faults.append(OrderError(text, hint=hint, key=place))
+    return None

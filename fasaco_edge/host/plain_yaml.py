@@ -1,4 +1,4 @@
-"""Plain YAML: a document written by a user, of bounded size and depth.
+"""Plain YAML: a document written by a user, of bounded size and depth, with the line of each key.
 
 Aliases count with their expanded size: 500 bytes of aliases can expand to gigabytes. Tags, which
 turn a text into other types, are refused.
@@ -7,11 +7,17 @@ turn a text into other types, are refused.
 from __future__ import annotations
 
 import os
+import re
 import select
 import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import yaml
+
+from fasaco_edge.errors import DocumentError, together
 
 MOST_BYTES = 1_048_576
 MOST_VALUES = 50_000
@@ -62,6 +68,115 @@ def load(text: str) -> object:
         PlainYamlError: it is no YAML, or not plain.
     """
     return compose(text)[1]
+
+
+_Error = TypeVar("_Error", bound=DocumentError)
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """The content of a file.
+
+    Attributes:
+        file: the file.
+        values: plain values.
+        lines: line of each key, from 1.
+        twice: keys that occur more than once, with the lines of two; YAML would take the last.
+    """
+
+    file: Path
+    values: object
+    lines: dict[str, int]
+    twice: dict[str, tuple[int, int]]
+
+    def raise_faults(self, faults: Sequence[_Error]) -> None:
+        """Raise the first of some faults of the document, if any, with the others and lines."""
+        if located := self.located(faults):
+            raise together(located)
+
+    def located(self, faults: Sequence[_Error]) -> list[_Error]:
+        """Return faults of the document with file and line."""
+        for fault in faults:
+            fault.file, fault.line = self.file, fault.line or self._line_of(fault.key)
+        return list(faults)
+
+    def duplicates(self, error: type[_Error]) -> list[_Error]:
+        """Return a fault for each key that occurs more than once."""
+        found = []
+        for key, (first, again) in self.twice.items():
+            found.append(error(f"is given twice, in line {first} and in line {again}", key=key))
+            found[-1].line = again
+        return found
+
+    def _line_of(self, key: str) -> int | None:
+        """Return the line of a key, or of its section if it is missing; None if both are."""
+        while key:
+            if key in self.lines:
+                return self.lines[key]
+            key = key[: max(key.rfind("."), key.rfind("["), 0)]
+        return None
+
+
+def read_written(
+    path: Path,
+    error: type[DocumentError],
+    *,
+    missing: str,
+    broken: str = "correct the file at that place",
+    parse: Callable[[str], object] | None = None,
+) -> Written:
+    """Read a file.
+
+    Args:
+        path: the file.
+        error: kind of the errors.
+        missing: hint for a file that cannot be read.
+        broken: hint for a file that is no plain YAML.
+        parse: reads the values of a JSON file; None for YAML.
+
+    Raises:
+        DocumentError: ``error``, the file cannot be read, or is no plain YAML.
+    """
+    try:
+        text = read_bounded(path)
+        node, values = compose(text) if parse is None else (_node_of_json(text), parse(text))
+    except OSError as refused:
+        fault = error(str(refused.strerror or refused), hint=missing)
+        fault.file = path
+        raise fault from refused
+    except (ValueError, RecursionError) as refused:
+        fault = error(f"not plain {'JSON' if parse else 'YAML'}: {refused}", hint=broken)
+        fault.file = path
+        raise fault from refused
+    lines: dict[str, int] = {}
+    twice: dict[str, tuple[int, int]] = {}
+    for key, line in _keys_and_lines(node):
+        if key in lines:
+            twice[key] = lines[key], line
+        lines[key] = line
+    return Written(path, {} if values is None else values, lines, twice)
+
+
+def _node_of_json(text: str) -> yaml.Node | None:
+    """Return JSON, whose tabs YAML does not take, as nodes; None where YAML takes it in no way."""
+    try:
+        return compose(text.replace("\t", " "))[0]
+    except PlainYamlError:
+        return None
+
+
+def _keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:
+    """Yield each key and its line."""
+    if isinstance(node, yaml.MappingNode):
+        for name, value in node.value:
+            key = f"{before}.{name.value}" if before else str(name.value)
+            yield key, name.start_mark.line + 1
+            yield from _keys_and_lines(value, key)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            key = f"{before}[{index}]"
+            yield key, item.start_mark.line + 1
+            yield from _keys_and_lines(item, key)
 
 
 def compose(text: str) -> tuple[yaml.Node | None, object]:
@@ -137,3 +252,6 @@ class _Loader(yaml.SafeLoader):
 
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+# As in YAML 1.2: YAML 1.1 takes 1e-6 for a text.
+_EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))

@@ -364,9 +364,9 @@ def test_documents_are_read_as_they_were_written():
 @pytest.mark.parametrize(
     ("document", "said"),
     [
-        ({"command": "room_name"}, "room goes with room_name, room_split"),
-        ({"command": "pause", "room": {"id": 3}}, "room goes with room_name"),
-        ({"command": "room_name", "room": {}}, "room: missing member id"),
+        ({"command": "room_name"}, "room: goes with room_name, room_split"),
+        ({"command": "pause", "room": {"id": 3}}, "room: goes with room_name"),
+        ({"command": "room_name", "room": {}}, "room.id: missing"),
         ({"command": "room_name", "room": {"id": 0, "name": "a"}}, "room.id: expected"),
         ({"command": "room_name", "room": {"id": 3}}, "room.name: missing with room_name"),
         ({"command": "room_name", "room": {"id": 3, "skip": True}}, "room.skip: does not go with"),
@@ -383,7 +383,10 @@ def test_documents_are_read_as_they_were_written():
         ({"command": "room_set", "room": {"id": 3}}, "room.passes or priority or skip: missing"),
         ({"command": "room_set", "room": {"id": 3, "passes": 0}}, "room.passes: expected"),
         ({"command": "room_set", "room": {"id": 3, "passes": ["rest"]}}, "rest goes after an edge"),
-        ({"command": "start", "order": {"unknown": "ask"}}, "order.unknown: expected refuse, wait"),
+        (
+            {"command": "start", "order": {"unknown": "ask"}},
+            "order.unknown: expected refuse or wait",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_request_is_named(document, said):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.mission.map.room_raster import Cut, RoomRaster
-from fasaco_edge.mission.orders.keep_outs import check_name
+from fasaco_edge.mission.orders.keep_outs import name_faults
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
 from fasaco_edge.planners.passes import Pass
 
@@ -264,7 +264,8 @@ class RoomBook:
         Raises:
             OrderError: it is no valid name, or another room has it.
         """
-        check_name(where, name)
+        for fault in name_faults(name, where):
+            raise fault
         if LIKE_NUMBER.fullmatch(name):
             raise OrderError(
                 f"{where}: {name!r} would be read as the number of a room",
