@@ -53,8 +53,7 @@ def run(args: argparse.Namespace) -> int:
     def read_mask(config: DaemonConfig) -> None:
         with_mask(config, args.file, mask_bytes(config, memory_limit()))
 
-    config, found = inspect_config(args.file, read_mask)
-    faults = sorted(found, key=lambda fault: fault.line or 0)
+    config, faults = inspect_config(args.file, read_mask)
     if args.json:
         print_json(_document(args, config, faults))
     elif config is None:

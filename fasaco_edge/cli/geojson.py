@@ -8,26 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TypeGuard
+from typing import Annotated, Any, ClassVar, Literal, TypeGuard
 
-from fasaco_edge.errors import OrderError, joined
+from msgspec import UNSET, Meta, structs
+
+from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
-from fasaco_edge.host.documents import inspected
+from fasaco_edge.host.documents import Document, inspected
 from fasaco_edge.mission.orders.order import OrderDocument
-from fasaco_edge.text import nearest, shown
 from fasaco_edge.wire.documents.rooms import Rooms
 
 SUFFIX = ".geojson"
 HINT = "draw each zone as a Polygon; `rooms list --geojson` shows what one looks like"
-# Properties of a feature that become members of a zone.
-OF_ZONES = ("name", "passes", "room", "priority")
-# Members of the collection that become members of an order.
-OF_ORDERS = ("passes", "return_home", "keep_covered", "unknown", "until_min")
-# Other known properties of a feature, and other known members of a collection.
-OF_FEATURES, OF_COLLECTIONS = ("keep_out", "skip"), ("type", "features", "name", "crs", "bbox")
-# Least similarity of an unknown member to a known one that counts as a misspelling.
-ALIKE = 0.8
-
 Members = dict[str, object]
 
 
@@ -79,48 +71,117 @@ def is_geojson(document: object) -> TypeGuard[dict[str, object]]:
     return isinstance(document, dict) and "type" in document
 
 
-def drawn_order(document: dict[str, object]) -> tuple[OrderDocument, list[OrderError]]:
+class _Drawn(Document, frozen=True):
+    """An object of GeoJSON, which may have members of other programs."""
+
+    is_open: ClassVar[bool] = True
+
+
+class _Polygon(_Drawn, frozen=True):
+    coordinates: Annotated[list[Annotated[list[Any], Meta(min_length=4)]], Meta(min_length=1)]
+
+    def faults(self) -> Iterator[OrderError]:
+        rings = self.coordinates or []
+        if len(rings) > 1:
+            yield OrderError(
+                f"the polygon must have one ring, got {len(rings)}: rings after the first are "
+                "holes in it, and an order takes no holes",
+                hint="delete the holes; to keep the robot out of one, draw it as a Polygon of its "
+                'own, with the property "keep_out": true',
+                key="coordinates",
+            )
+        if rings and rings[0] and rings[0][0] != rings[0][-1]:
+            text = "the last corner must be the first again"
+            yield OrderError(text, key="coordinates[0]")
+
+    @property
+    def corners(self) -> list[Any]:
+        """Its corners (x, y) [m], without the height that drawing programs add."""
+        ring = self.coordinates[0][:-1] if self.coordinates else []
+        return [corner[:2] if isinstance(corner, list) else corner for corner in ring]
+
+
+class _Properties(_Drawn, frozen=True):
+    """Members of a zone, checked as those of an order; and whether it is another thing."""
+
+    name: Any = None
+    passes: Any = None
+    room: Any = None
+    priority: Any = None
+    keep_out: bool | None = None
+    skip: bool | None = None
+
+
+class _Feature(_Drawn, frozen=True):
+    geometry: Any = None
+    properties: _Properties | None = None
+    id: Any = None
+
+    @property
+    def known(self) -> _Properties:
+        """Its properties."""
+        return self.properties or _Properties()
+
+    def polygon(self) -> tuple[_Polygon, list[OrderError]]:
+        """Return its outline, and the faults of that, if it counts."""
+        known = self.known
+        if not known.keep_out and (known.skip or known.room is not None):
+            return _Polygon(coordinates=[]), []
+        kind = self.geometry.get("type") if isinstance(self.geometry, dict) else None
+        if kind != "Polygon":
+            return _Polygon(coordinates=[]), [OrderError(f"must be a Polygon, is {kind or 'none'}")]
+        return inspected(_Polygon, self.geometry, OrderError)
+
+    def faults(self) -> Iterator[OrderError]:
+        for fault in self.polygon()[1]:
+            yield fault.within("geometry", OrderError)
+
+
+class _Collection(_Drawn, frozen=True):
+    """Features, and members of an order, which are checked as those of one."""
+
+    type: Literal["FeatureCollection"]
+    features: Annotated[list[_Feature], Meta(min_length=1)]
+    passes: Any = UNSET
+    return_home: Any = UNSET
+    keep_covered: Any = UNSET
+    unknown: Any = UNSET
+    until_min: Any = UNSET
+
+
+OF_ORDERS = _Collection.__struct_fields__[2:]
+
+
+def drawn_order(document: Members) -> tuple[OrderDocument, list[OrderError]]:
     """Return the order in a collection of polygons, and all faults, with keys of the collection.
 
-    A polygon is a zone, whose members are its properties ``OF_ZONES``; with ``"keep_out": true`` it
-    is a keep-out. A feature with the number of a room orders that room, whatever its outline. With
-    ``"skip": true`` a feature is ignored. The members ``OF_ORDERS`` of the collection are those of
-    the order.
+    A polygon is a zone, whose members are its properties; with ``"keep_out": true`` it is a
+    keep-out. A feature with the number of a room orders that room, whatever its outline. With
+    ``"skip": true`` a feature is ignored.
     """
-    zones: list[dict[str, object]] = []
-    keep_out: list[object] = []
+    zones: list[Members] = []
+    keep_out: list[list[Any]] = []
     # The feature of each zone and keep-out, and the name of each feature.
     origins: dict[str, str] = {}
     names: dict[str, object] = {}
-    faults = list(_misspelt(document, OF_ORDERS))
-    features = document.get("features")
-    if (kind := document["type"]) != "FeatureCollection":
-        faults.append(OrderError(f"must be FeatureCollection, got {shown(kind)}", key="type"))
-    elif not isinstance(features, list) or not features:
-        faults.append(OrderError("there is none", key="features"))
-    for index, each in enumerate(features if isinstance(features, list) else ()):
-        key, members = f"features[{index}]", each if isinstance(each, dict) else {}
-        properties = members.get("properties") or {}
-        if not isinstance(properties, dict):
-            faults.append(OrderError("expected object", key=f"{key}.properties"))
+    drawn, faults = inspected(_Collection, document, OrderError)
+    for index, feature in enumerate(drawn.features or ()):
+        if not feature:
             continue
-        faults += _misspelt(properties, (*OF_ZONES, *OF_FEATURES), f"{key}.properties")
-        faults += _flags(properties, f"{key}.properties")
-        names[key] = properties.get("name") or members.get("id")
-        is_kept_out = properties.get("keep_out") is True
-        if properties.get("skip") is True and not is_kept_out:
-            continue
-        own = {name: properties[name] for name in OF_ZONES if properties.get(name) is not None}
-        corners = None
-        if is_kept_out or "room" not in own:
-            corners = _corners(members.get("geometry"), f"{key}.geometry", faults)
-        if not is_kept_out:
-            origins[f"zones[{len(zones)}]"] = key
-            zones.append({"name": f"zone {index + 1}", "polygon": corners} | own)
-        elif corners is not None:
+        key, known, (polygon, flaws) = f"features[{index}]", feature.known, feature.polygon()
+        names[key] = known.name or feature.id
+        corners = None if flaws else polygon.corners or None
+        if known.keep_out and corners:
             origins[f"keep_out[{len(keep_out)}]"] = key
             keep_out.append(corners)
-    order = {name: document[name] for name in OF_ORDERS if name in document}
+        elif not known.keep_out and not known.skip:
+            members = structs.asdict(known) | {"polygon": corners}
+            del members["keep_out"], members["skip"]
+            own = {name: value for name, value in members.items() if value is not None}
+            origins[f"zones[{len(zones)}]"] = key
+            zones.append({"name": f"zone {index + 1}"} | own)
+    given = structs.asdict(drawn).items()
+    order = {name: value for name, value in given if name in OF_ORDERS and value is not UNSET}
     read, found = inspected(
         OrderDocument, order | {"zones": zones, "keep_out": keep_out}, OrderError
     )
@@ -137,44 +198,3 @@ def drawn_order(document: dict[str, object]) -> tuple[OrderDocument, list[OrderE
             fault.what += f" (feature {name!r:.80})"
         fault.hint = HINT if fault.hint == OrderError.hint else fault.hint
     return read, faults
-
-
-def _misspelt(members: Members, known: Sequence[str], key: str = "") -> Iterator[OrderError]:
-    """Yield members that are probably misspelt; other unknown ones may come from any program."""
-    for name in (each for each in members if each not in (*known, *OF_COLLECTIONS)):
-        if near := nearest(name, known, ALIKE):
-            text = f"unknown key; did you mean {joined(key, near[0])}?"
-            yield OrderError(text, key=joined(key, name))
-
-
-def _flags(properties: Members, key: str) -> Iterator[OrderError]:
-    for name in OF_FEATURES:
-        if properties.get(name) not in (None, True, False):
-            text = f"must be true or false, got {shown(properties[name])}"
-            yield OrderError(text, key=f"{key}.{name}")
-
-
-def _corners(geometry: object, key: str, faults: list[OrderError]) -> list[object] | None:
-    """Return the corners of a polygon without holes; None, and a fault, for another geometry."""
-    members = geometry if isinstance(geometry, dict) else {}
-    rings, kind = members.get("coordinates"), members.get("type")
-    rings = rings if isinstance(rings, list) else []
-    hint, place = HINT, f"{key}.coordinates"
-    if kind != "Polygon" or not rings:
-        text, place = f"must be a Polygon, got {shown(kind or geometry)}", key
-    elif len(rings) > 1:
-        text = (
-            f"the polygon must have one ring, got {len(rings)}: rings after the first are holes "
-            "in it, and an order takes no holes"
-        )
-        hint = (
-            "delete the holes; to keep the robot out of one, draw it as a Polygon of its own, "
-            'with the property "keep_out": true'
-        )
-    elif not isinstance(ring := rings[0], list) or len(ring) < 2 or ring[0] != ring[-1]:
-        text, place = "the last corner must be the first again", f"{place}[0]"
-    else:
-        # Drawing programs add a height.
-        return [corner[:2] if isinstance(corner, list) else corner for corner in ring[:-1]]
-    faults.append(OrderError(text, hint=hint, key=place))
-    return None

@@ -26,5 +26,5 @@ def read_order_file(path: Path) -> MissionOrder:
         order, faults = drawn_order(text.values)
     else:
         order, faults = inspected(OrderDocument, text.values, OrderError)
-    text.raise_faults([*text.duplicates(OrderError), *faults])
+    text.check(faults)
     return order_of(order)

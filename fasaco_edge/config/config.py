@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from fasaco_edge.config.reading import refused
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import BusConfig
@@ -44,7 +45,6 @@ class MapConfig(Document, frozen=True):
     max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 600_000
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield thresholds that leave nothing unknown."""
         low, high = self.free_at_most, self.occupied_at_least
         if low >= high:
             text = f"must be below map.occupied_at_least, got {low} and {high}"
@@ -95,11 +95,7 @@ class PlannerConfig(Document, frozen=True):
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield velocities that cannot be read, and fewer ants than cohorts."""
-        try:
-            self.colony()
-        except BadConfiguration as error:
-            yield BadConfiguration(error.what, key=error.key, others=["ants", "velocities"])
+        yield from refused(self.colony, others=["ants", "velocities"])
 
     def colony(self) -> ColonyConfig:
         """Return the configuration of the colony.
@@ -129,7 +125,6 @@ class MissionSettings(Document, MissionPolicy, frozen=True, kw_only=True):
     state_dir: str = ""
 
     def faults(self) -> Iterator[DocumentError]:
-        """Yield faults of zones, keep-outs and mask, and a folder that no system allows."""
         if "\0" in self.state_dir:
             yield BadConfiguration("must be a path, got one with a NUL", key="state_dir")
         yield from place_faults(self.zones, self.keep_out)
@@ -139,10 +134,7 @@ class MissionSettings(Document, MissionPolicy, frozen=True, kw_only=True):
                 text = f"must be left out beside mission.keep_out_topic, got {mask!r}"
                 yield BadConfiguration(text, key="keep_out_mask", others=["keep_out_topic"])
             return
-        try:
-            mask_polygons(mask)
-        except BadConfiguration as error:
-            yield BadConfiguration(error.what, key="keep_out_mask")
+        yield from refused(lambda: mask_polygons(mask), key="keep_out_mask")
 
     def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
         """Return the folder of the coverage ledger.
@@ -184,7 +176,6 @@ class FleetConfig(Document, frozen=True):
     map_frame: Annotated[str, Meta(max_length=MAX_STRING_BYTES)] = ""
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield a place in a frame that has no name."""
         if self.frame:
             return
         if self.x_m or self.y_m or self.yaw_deg:
@@ -207,7 +198,6 @@ class BatteryConfig(Document, BatteryPolicy, frozen=True, kw_only=True):
     """When to charge; without the block ``battery`` the robot never charges by itself."""
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield a level to resume at that is too near the levels to charge at."""
         if self.enough < max(self.low, self.reserve) + 0.1:
             yield BadConfiguration(
                 "must be at least 0.1 above battery.low and battery.reserve, got "
@@ -246,7 +236,6 @@ class RecordingConfig(Document, frozen=True):
     least_free_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 200
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield a quota with no room for two files."""
         if 0 < self.quota_mb < (least := 2 * self.part_mb):
             text = f"must be 0 or at least twice recording.part_mb, {least}, got {self.quota_mb}"
             yield BadConfiguration(text, key="quota_mb", others=["part_mb"])
@@ -262,13 +251,7 @@ class MetricsConfig(Document, frozen=True):
     open_to_everyone: bool = False
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield a wrong address."""
-        try:
-            self.address()
-        except BadConfiguration as error:
-            yield BadConfiguration(
-                error.what, hint=error.hint, key="listen", others=["open_to_everyone"]
-            )
+        yield from refused(self.address, key="listen", others=["open_to_everyone"])
 
     def address(self) -> Address | None:
         """Return the address; None for none.
@@ -310,11 +293,7 @@ class DaemonConfig(Document, frozen=True):
     ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield what does not fit together in different sections."""
-        try:
-            Keys(robot=self.robot.name)
-        except BadConfiguration as error:
-            yield BadConfiguration(error.what, key="robot.name")
+        yield from refused(lambda: Keys(robot=self.robot.name), key="robot.name")
         if self.bus.security.roles.ros and not self.ros2:
             text = "without a block ros2 there is no such role"
             yield BadConfiguration(text, key="bus.security.roles.ros", others=["ros2"])

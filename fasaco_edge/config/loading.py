@@ -9,7 +9,7 @@ import msgspec
 from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.reading import removed_faults, with_credentials, without_removed
+from fasaco_edge.config.reading import refused, removed_faults, with_credentials, without_removed
 from fasaco_edge.errors import BadConfiguration, together
 from fasaco_edge.host.documents import inspected
 from fasaco_edge.host.plain_yaml import read_written
@@ -84,10 +84,7 @@ def inspect_config(
     if isinstance(document, dict):
         document = with_credentials(without_removed(document))
     config, faults = inspected(DaemonConfig, document, BadConfiguration)
-    found = [*text.duplicates(BadConfiguration), *removed_faults(text.values), *faults]
-    if isinstance(config, DaemonConfig):
-        try:
-            check(config)
-        except BadConfiguration as error:
-            found.append(error)
-    return None if found else config, text.located(found)
+    if config:
+        faults += [*removed_faults(text.values), *refused(lambda: check(config))]
+    faults = text.faults(faults)
+    return None if faults else config, faults

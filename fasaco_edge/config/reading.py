@@ -1,12 +1,11 @@
-"""Configurations of earlier releases, and of a service manager, as this release reads them."""
+"""Reading of configurations: keys of earlier releases, credentials, and checks that raise."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from fasaco_edge.errors import BadConfiguration, joined
-from fasaco_edge.host.documents import Document
 
 FOLDER = "CREDENTIALS_DIRECTORY"
 # Removed keys of earlier releases: why, and what to do. A removed key without a value is ignored,
@@ -24,8 +23,15 @@ REMOVED = {
 }
 
 
-Section = Document
-"""A section of a configuration."""
+def refused(
+    check: Callable[[], object], *, key: str = "", others: Sequence[str] = ()
+) -> Iterator[BadConfiguration]:
+    """Yield the error that a check raises, at ``key``, or else where it says itself."""
+    try:
+        check()
+    except BadConfiguration as error:
+        error.key, error.others = key or error.key, tuple(others)
+        yield error
 
 
 def removed_faults(document: object, key: str = "") -> Iterator[BadConfiguration]:

@@ -50,7 +50,6 @@ class FootprintConfig(Document, frozen=True):
         return max((math.hypot(x, y) for x, y in corners), default=0.0)
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield missing, duplicate and inconsistent values."""
         lengths, corners = (self.width_m, self.length_m), self.polygon
         if corners and any(length is not None for length in (*lengths, self.ahead_m)):
             yield BadConfiguration("must be a polygon, or width_m and length_m, not both")
@@ -117,7 +116,6 @@ class RobotConfig(Document, frozen=True):
         return f"Robot({', '.join(texts)})"
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield costs out of range, and two radii."""
         try:
             self.cost()
         except BadConfiguration as error:

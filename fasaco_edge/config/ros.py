@@ -61,7 +61,6 @@ class RosFrames(Document, frozen=True):
     robot: str = "base_link"
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield invalid and equal names."""
         for key, frame in msgspec.structs.asdict(self).items():
             # Unprintable characters may have no UTF-8, or be a NUL.
             printed = frame if frame.isprintable() else ""
@@ -97,7 +96,6 @@ class Nav2Config(Document, frozen=True):
     dock_type: str = ""
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield invalid names of actions and plugins."""
         usual = Nav2Config()
         for key in ("action", "dock_action", "undock_action"):
             if not _TOPIC.fullmatch(name := getattr(self, key)):
@@ -225,7 +223,6 @@ class RosConfig(Document, frozen=True):
         return [] if self.kind == "bridge" else [graph_key(self.domain)]
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield invalid or equal names, and settings of rmw_zenoh for a bridge."""
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
             yield _misfit("namespace", "/ or like /robot1", self.namespace)
         prefix = self._name(self.services)

@@ -20,6 +20,7 @@ from fasaco_edge.config.endpoints import (
     is_local,
     protocol_of,
 )
+from fasaco_edge.config.reading import refused
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
 from fasaco_edge.host.documents import Document, inspected
 from fasaco_edge.host.plain_yaml import read_bounded, read_written
@@ -197,11 +198,7 @@ class BusConfig(Document, frozen=True):
     security: SecurityConfig = SecurityConfig()
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield invalid names and endpoints, and endpoints that the security does not allow."""
-        try:
-            Keys(base=self.base)
-        except BadConfiguration as error:
-            yield error
+        yield from refused(lambda: Keys(base=self.base))
         if not (self.listen or self.connect):
             text = "must not be empty where bus.connect is"
             yield BadConfiguration(text, key="listen", others=["connect"])
@@ -315,7 +312,7 @@ def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
     """
     text = read_written(Path(file), BadConfiguration, missing="name the file of --security")
     security, faults = inspected(SecurityConfig, text.values, BadConfiguration)
-    text.raise_faults([*text.duplicates(BadConfiguration), *faults])
+    text.check(faults)
     for fault in security_faults(security, (), connect):
         raise BadConfiguration(
             f"--security, --connect: {fault.within('bus', BadConfiguration)}", hint=fault.hint

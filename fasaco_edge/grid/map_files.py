@@ -14,7 +14,7 @@ import os
 from collections.abc import Iterator
 from numbers import Real
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 import numpy as np
@@ -274,8 +274,10 @@ def _index() -> dict[str, _BuiltIn]:
     return msgspec.convert(text.values, dict[str, _BuiltIn])
 
 
-class MapKeys(Document, frozen=True, forbid_unknown_fields=False):
+class MapKeys(Document, frozen=True):
     """The keys of a map_server YAML file, which may have further keys of other programs."""
+
+    is_open: ClassVar[bool] = True
 
     image: Annotated[str, Meta(min_length=1)]
     resolution: Annotated[float, Meta(ge=MIN_RESOLUTION_M, le=MAX_RESOLUTION_M)]
@@ -286,7 +288,6 @@ class MapKeys(Document, frozen=True, forbid_unknown_fields=False):
     occupied_thresh: Annotated[float, Meta(ge=0, le=1)] = OCCUPIED_THRESH
 
     def faults(self) -> Iterator[MapFileError]:
-        """Yield thresholds that contradict each other."""
         free, occupied = self.free_thresh, self.occupied_thresh
         if free >= occupied:
             text = f"must be less than occupied_thresh, {occupied:g}, got {free:g}"
@@ -304,5 +305,5 @@ def _read_keys(path: Path) -> tuple[MapKeys, Path]:
             faults.append(MapFileError(f"no file {shown(str(image))}", key="image"))
     for fault in faults:
         fault.hint = _KEY_HINTS.get(fault.key.partition("[")[0], _YAML_HINT)
-    text.raise_faults([*text.duplicates(MapFileError), *faults])
+    text.check(faults)
     return keys, image

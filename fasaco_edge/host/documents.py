@@ -6,9 +6,19 @@ What types show comes first, then what structs say of themselves (``Document.fau
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import UnionType
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    TypeAlias,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+)
 
 import msgspec
 from msgspec import UNSET, structs
@@ -21,10 +31,18 @@ _Kind: TypeAlias = Any
 _Value: TypeAlias = Any
 # Faults of types after which no more are looked for.
 MOST_FAULTS = 50
+# Least similarity of an unknown key to a missing one that counts as a misspelling where unknown
+# keys are allowed.
+ALIKE = 0.8
 
 
 class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A document, or an object in one, in which unknown keys are errors."""
+    """A document, or an object in one, in which unknown keys are errors.
+
+    If it ``is_open`` it may have keys of other programs, and only misspelt ones are errors.
+    """
+
+    is_open: ClassVar[bool] = False
 
     def faults(self) -> Iterator[DocumentError]:
         """Yield what its types do not show, each under its key in this object.
@@ -113,50 +131,47 @@ class _Reader:
             read = self._members(struct, value, key)
         elif where and isinstance(value, list) and (of := _of_items(kind)):
             read = self._items(of, value, key)
-        if len(self.faults) == before:
-            self._add(key + where, f"{_expected(kind, expected)}, got {shown(misfit):.100}")
+        # Without a fault its unknown keys are those of other programs.
+        if len(self.faults) == before and not expected.startswith("object contains unknown"):
+            expected = _expected(kind, expected)
+            if isinstance(misfit, str) and re.fullmatch(r"-?\d+,\d+", misfit):
+                expected += " with a decimal point"
+            self._add(key + where, f"{expected}, got {shown(misfit):.100}")
         return read
 
     def _members(self, kind: type[msgspec.Struct], value: dict[Any, object], key: str) -> _Value:
         fields = {field.encode_name: field for field in structs.fields(kind)}
         if any(not isinstance(name, str) for name in value):
             self._add(key, f"expected str as key, got {shown(value)}")
-        unknown = [name for name in value if isinstance(name, str) and name not in fields]
-        is_open = not kind.__struct_config__.forbid_unknown_fields
-        for name in () if is_open else unknown:
-            meant = self._meant(name, key, list(fields))
-            self._add(joined(key, name), *_unknown(meant, [joined(key, each) for each in fields]))
+        is_open = getattr(kind, "is_open", False)
+        for name in (each for each in value if isinstance(each, str) and each not in fields):
+            if not is_open or nearest(name, fields.keys() - value.keys(), ALIKE):
+                self._add(joined(key, name), *self._unknown(name, key, list(fields)))
         members = {field.name: UNSET for field in fields.values() if field.required}
         for name, field in fields.items():
             if name in value:
                 read = self.read(field.type, value[name], joined(key, name))
                 members |= {} if read is UNSET else {field.name: read}
             elif field.required:
-                near = nearest(name, unknown) if is_open else []
-                meant = [f"; is {each} meant for it?" for each in near]
-                self._add(joined(key, name), "".join(["missing", *meant]))
+                self._add(joined(key, name), "missing")
         return kind(**members)
 
     def _items(self, kind: _Kind, value: list[object], key: str) -> _Value:
         items = [self.read(kind, item, f"{key}[{index}]") for index, item in enumerate(value)]
         return items if _struct(kind) or _of_items(kind) else UNSET
 
-    def _meant(self, name: str, key: str, names: list[str]) -> list[str]:
-        """Return the keys that were probably meant: beside it, or elsewhere in the document."""
-        if near := nearest(name, names):
-            return [joined(key, each) for each in near]
-        return [path for path in _paths(self._root) if path.rpartition(".")[2] == name]
+    def _unknown(self, name: str, key: str, known: list[str]) -> tuple[str, list[str]]:
+        """Return what is wrong with an unknown key, and the keys that it was meant for."""
+        meant = [joined(key, each) for each in nearest(name, known)]
+        # It may belong elsewhere in the document.
+        meant = meant or [path for path in _paths(self._root) if path.rpartition(".")[2] == name]
+        if meant:
+            return f"unknown key; did you mean {' or '.join(meant)}?", meant
+        return f"unknown key; there are {', '.join(known)}", []
 
-    def _add(self, key: str, what: str, others: tuple[str, ...] = ()) -> None:
+    def _add(self, key: str, what: str, others: Sequence[str] = ()) -> None:
         if len(self.faults) < MOST_FAULTS:
             self.faults.append(self._error(what, key=key, others=others))
-
-
-def _unknown(meant: list[str], known: list[str]) -> tuple[str, tuple[str, ...]]:
-    """Return what is wrong with an unknown key, and the keys that it was meant for."""
-    if meant:
-        return f"unknown key; did you mean {' or '.join(meant)}?", tuple(meant)
-    return f"unknown key; there are {', '.join(each.rpartition('.')[2] for each in known)}", ()
 
 
 def _touch(one: str, other: str) -> bool:

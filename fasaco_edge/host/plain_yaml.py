@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import yaml
 
@@ -61,52 +61,35 @@ def read_bounded(path: Path) -> str:
         raise PlainYamlError(str(error)) from error
 
 
-def load(text: str) -> object:
-    """Return the plain values of a document; None for an empty one.
-
-    Raises:
-        PlainYamlError: it is no YAML, or not plain.
-    """
-    return compose(text)[1]
-
-
 _Error = TypeVar("_Error", bound=DocumentError)
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class Written(Generic[_Error]):
     """The content of a file.
 
     Attributes:
         file: the file.
         values: plain values.
         lines: line of each key, from 1.
-        twice: keys that occur more than once, with the lines of two; YAML would take the last.
+        twice: a fault for each key that occurs more than once; YAML would take the last.
     """
 
     file: Path
     values: object
     lines: dict[str, int]
-    twice: dict[str, tuple[int, int]]
+    twice: tuple[_Error, ...]
 
-    def raise_faults(self, faults: Sequence[_Error]) -> None:
-        """Raise the first of some faults of the document, if any, with the others and lines."""
-        if located := self.located(faults):
-            raise together(located)
+    def faults(self, found: Sequence[_Error]) -> list[_Error]:
+        """Return all faults in the order of their lines: duplicate keys, and those ``found``."""
+        for fault in (faults := [*self.twice, *found]):
+            fault.file, fault.line = self.file, self._line_of(fault.key)
+        return sorted(faults, key=lambda fault: fault.line or 0)
 
-    def located(self, faults: Sequence[_Error]) -> list[_Error]:
-        """Return faults of the document with file and line."""
-        for fault in faults:
-            fault.file, fault.line = self.file, fault.line or self._line_of(fault.key)
-        return list(faults)
-
-    def duplicates(self, error: type[_Error]) -> list[_Error]:
-        """Return a fault for each key that occurs more than once."""
-        found = []
-        for key, (first, again) in self.twice.items():
-            found.append(error(f"is given twice, in line {first} and in line {again}", key=key))
-            found[-1].line = again
-        return found
+    def check(self, found: Sequence[_Error]) -> None:
+        """Raise the first of all faults, with the others as its rest; see ``faults``."""
+        if faults := self.faults(found):
+            raise together(faults)
 
     def _line_of(self, key: str) -> int | None:
         """Return the line of a key, or of its section if it is missing; None if both are."""
@@ -119,12 +102,12 @@ class Written:
 
 def read_written(
     path: Path,
-    error: type[DocumentError],
+    error: type[_Error],
     *,
     missing: str,
     broken: str = "correct the file at that place",
     parse: Callable[[str], object] | None = None,
-) -> Written:
+) -> Written[_Error]:
     """Read a file.
 
     Args:
@@ -140,21 +123,21 @@ def read_written(
     try:
         text = read_bounded(path)
         node, values = compose(text) if parse is None else (_node_of_json(text), parse(text))
-    except OSError as refused:
-        fault = error(str(refused.strerror or refused), hint=missing)
-        fault.file = path
-        raise fault from refused
-    except (ValueError, RecursionError) as refused:
-        fault = error(f"not plain {'JSON' if parse else 'YAML'}: {refused}", hint=broken)
+    except (OSError, ValueError, RecursionError) as refused:
+        if isinstance(refused, OSError):
+            fault = error(str(refused.strerror), hint=missing)
+        else:
+            fault = error(f"not plain {'JSON' if parse else 'YAML'}: {refused}", hint=broken)
         fault.file = path
         raise fault from refused
     lines: dict[str, int] = {}
-    twice: dict[str, tuple[int, int]] = {}
+    twice = []
     for key, line in _keys_and_lines(node):
         if key in lines:
-            twice[key] = lines[key], line
+            text = f"is given twice, in line {lines[key]} and in line {line}"
+            twice.append(error(text, key=key))
         lines[key] = line
-    return Written(path, {} if values is None else values, lines, twice)
+    return Written(path, {} if values is None else values, lines, tuple(twice))
 
 
 def _node_of_json(text: str) -> yaml.Node | None:

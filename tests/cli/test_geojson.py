@@ -96,7 +96,7 @@ def test_what_is_not_to_be_driven_is_never_floor_to_sweep():
     order = read(collection([*drawn, square(name="hall", priority=90)]))
     assert [(zone.name, zone.priority) for zone in order.zones] == [("hall", 90)]
     assert order.keep_out == (((0, 0), (4, 0), (4, 3), (0, 3)),)
-    with pytest.raises(OrderError, match="keep_out: must be true or false, got 'true'"):
+    with pytest.raises(OrderError, match="keep_out: expected bool"):
         read(collection([square(keep_out="true")]))
 
 
@@ -105,7 +105,7 @@ KEPT = ({"keep_out": True}, {"skip": True})
 
 @pytest.mark.parametrize("features", [{}, {"features": []}, {"features": {"0": 1}}])
 def test_a_file_without_features_is_no_order_for_everything(features):
-    with pytest.raises(OrderError, match="features: there is none"):
+    with pytest.raises(OrderError, match=r"^features: "):
         read({"type": "FeatureCollection"} | features)
 
 
@@ -119,7 +119,9 @@ def test_plan_writes_a_line_and_an_order_is_read_from_a_file(tmp_path, capsys):
     assert line["properties"] == {"pass": 1, "swept": pytest.approx(share, abs=1e-4)}
     # A line is no zone: that is said, with the file, without a daemon.
     assert main(["mission", "start", "--order", str(file)]) == 1
-    assert f"{file}, line 1: features[0].geometry: must be a Polygon, got" in screen(capsys)
+    assert f"{file}, line 1: features[0].geometry: must be a Polygon, is LineString" in screen(
+        capsys
+    )
 
 
 HOLE = [[1, 1], [2, 1], [2, 2], [1, 1]]
@@ -137,7 +139,7 @@ COLLECTION = {"type": "FeatureCollection"}
         ({"name": None, "id": 7, "passes": 0}, {}, 5, "properties.passes", "(feature 7)"),
         ({"stroke": "red"}, {"passes": 0}, 8, "passes", "expected int >= 1, got 0"),
         ({}, {"return-home": 1}, 8, "return-home", "did you mean return_home?"),
-        ({}, {"type": "Feature"}, 8, "type", "must be FeatureCollection, got 'Feature'"),
+        ({}, {"type": "Feature"}, 8, "type", "expected FeatureCollection, got 'Feature'"),
     ],
 )
 def test_faults_of_a_drawn_order_have_key_and_line_and_the_features_name(
@@ -178,8 +180,8 @@ BARE = {"type": "Feature", "properties": {}, "geometry": None}
             f"{HALL}    polygon: [[0, 0]]\n  - name: hall\n"
             "keep_out: [[[1, 1]], 7]\nuntil_min: -3\n",
             [
-                *((3, "zones[0].pases"), (4, "zones[0].polygon"), (6, "keep_out[0]")),
-                *((6, "keep_out[1]"), (7, "until_min"), (5, "zones[1].name")),
+                *((3, "zones[0].pases"), (4, "zones[0].polygon"), (5, "zones[1].name")),
+                *((6, "keep_out[0]"), (6, "keep_out[1]"), (7, "until_min")),
             ],
         ),
         (

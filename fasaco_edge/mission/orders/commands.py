@@ -44,7 +44,6 @@ class CommandDocument(Document, frozen=True):
     room: RoomRequest | None = None
 
     def faults(self) -> Iterator[OrderError]:
-        """Yield members that go with other commands, and those that are missing."""
         name, keep_out = self.command, self.keep_out
         if name not in get_args(CommandName):
             return

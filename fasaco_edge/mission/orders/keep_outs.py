@@ -38,7 +38,6 @@ class KeepOutDocument(Document, frozen=True):
     polygon: Corners | None = None
 
     def faults(self) -> Iterator[OrderError]:
-        """Yield a name and a polygon that cannot be."""
         yield from name_faults(self.name)
         yield from polygon_faults({"polygon": tuple(self.polygon)} if self.polygon else {})
 

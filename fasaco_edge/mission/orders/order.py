@@ -188,7 +188,6 @@ class ZoneDocument(Document, frozen=True):
     priority: Priority | None = None
 
     def faults(self) -> Iterator[DocumentError]:
-        """Yield passes that cannot follow each other."""
         yield from passes_faults(self.passes)
 
 
@@ -217,7 +216,6 @@ class OrderDocument(Document, frozen=True):
     until_min: Minutes | None = None
 
     def faults(self) -> Iterator[DocumentError]:
-        """Yield faults of zones and keep-outs, and passes that cannot follow each other."""
         yield from passes_faults(self.passes)
         yield from place_faults(self.zones, self.keep_out)
 

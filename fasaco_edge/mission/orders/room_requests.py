@@ -53,7 +53,6 @@ class RoomRequest(Document, frozen=True, omit_defaults=True):
     priority: Priority | None = None
 
     def faults(self) -> Iterator[DocumentError]:
-        """Yield a cut outside of any map, and passes that cannot follow each other."""
         if any(not math.hypot(x, y) <= FARTHEST_M for x, y in self.cut or ()):
             yield OrderError(f"must be finite and within {FARTHEST_M:g} m of 0", key="cut")
         yield from passes_faults(self.passes)
