@@ -144,15 +144,18 @@ class _Reader:
         if any(not isinstance(name, str) for name in value):
             self._add(key, f"expected str as key, got {shown(value)}")
         is_open = getattr(kind, "is_open", False)
+        misspelt: set[str] = set()
         for name in (each for each in value if isinstance(each, str) and each not in fields):
             if not is_open or nearest(name, fields.keys() - value.keys(), ALIKE):
-                self._add(joined(key, name), *self._unknown(name, key, list(fields)))
+                what, meant = self._unknown(name, key, list(fields))
+                self._add(joined(key, name), what, meant)
+                misspelt |= set(meant)
         members = {field.name: UNSET for field in fields.values() if field.required}
         for name, field in fields.items():
             if name in value:
                 read = self.read(field.type, value[name], joined(key, name))
                 members |= {} if read is UNSET else {field.name: read}
-            elif field.required:
+            elif field.required and joined(key, name) not in misspelt:
                 self._add(joined(key, name), "missing")
         return kind(**members)
 

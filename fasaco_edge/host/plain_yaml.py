@@ -183,6 +183,17 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
         raise PlainYamlError(str(error)) from error
 
 
+# What the parser says of frequent mistakes, and what that means.
+_PLAIN = {
+    "found character '\\t' that cannot start any token": "a tab: indent by spaces",
+    "expected <block end>, but found '<block mapping start>'": (
+        "indented otherwise than the lines before"
+    ),
+    "mapping values are not allowed here": "a key within a value: perhaps the line before lacks a "
+    "quote, or this one is indented too far",
+}
+
+
 def _described(error: yaml.MarkedYAMLError) -> str:
     """Return where a document is no YAML, and why, in one line."""
     mark, began = error.problem_mark or error.context_mark, error.context_mark
@@ -190,7 +201,9 @@ def _described(error: yaml.MarkedYAMLError) -> str:
     context = error.context or ""
     if began is not None and mark is not None and began.line != mark.line:
         context += f" that begins in line {began.line + 1}"
-    return where + ", ".join(filter(None, (error.problem, context)))
+    if (problem := error.problem or "") in _PLAIN:
+        return where + _PLAIN[problem]
+    return where + ", ".join(filter(None, (problem, context)))
 
 
 class _Loader(yaml.SafeLoader):

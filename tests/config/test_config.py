@@ -221,7 +221,9 @@ def test_a_removed_key_without_a_value_is_ignored(load):
             "not plain YAML: line 3, column 4: expected ',' or ']', but got ':', while parsing a "
             "flow sequence that begins in line 2",
         ),
-        ("robot:\n\tname: x", "not plain YAML"),
+        ("robot:\n\tname: x", "line 2, column 1: a tab: indent by spaces"),
+        ("robot:\n  name: a\n radius_m: 1", "line 3, column 2: indented otherwise than"),
+        ("robot: {name: a\nbus: {}", "line 2, column 4: expected ',' or '}'"),
         ("robot: 2020-13-45", "not plain YAML: month must be in 1..12"),
         ("[" * 5000, "not plain YAML: line 1: nested deeper than 32 levels"),
         ("--- {}\n--- {}", "not plain YAML"),

@@ -93,6 +93,7 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
         ([], "expected object, got []"),
         ({"zone": []}, "zone: unknown key; did you mean zones?"),
         ({"zones": [{"passes": 1}]}, "zones[0].name: missing"),
+        ({"zones": [{"nme": "a"}]}, "zones[0].nme: unknown key; did you mean zones[0].name?"),
         (
             {"zones": [{**KITCHEN, "pass": 1}]},
             "zones[0].pass: unknown key; did you mean zones[0].passes?",
@@ -155,6 +156,7 @@ def test_what_is_wrong_is_named(document, said):
     assert said in str(caught.value)
     assert len(str(caught.value)) < 300
     assert (caught.value.code, bool(caught.value.hint)) == ("bad_order", True)
+    assert caught.value.rest == ()
 
 
 def test_a_polygon_of_a_thousand_points_is_no_burden():

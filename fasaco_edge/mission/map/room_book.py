@@ -232,7 +232,8 @@ class RoomBook:
         room = self.find(called)
         if room is None:
             raise OrderError(
-                f"room.id: there is no room {called!r}; {self.listed()}",
+                f"there is no room {called!r}; {self.listed()}",
+                key="room.id",
                 hint="name one of those, or its number",
             )
         return room
@@ -268,14 +269,16 @@ class RoomBook:
             raise fault
         if LIKE_NUMBER.fullmatch(name):
             raise OrderError(
-                f"{where}: {name!r} would be read as the number of a room",
+                f"{name!r} would be read as the number of a room",
                 hint="choose a name that is more than a number",
+                key=where,
             )
         taken = self.find(name)
         if taken is not None and taken.id not in of:
             raise OrderError(
-                f"{where}: room {taken.id} is {name!r} already",
+                f"room {taken.id} is {name!r} already",
                 hint="choose another name, or give that room another one first",
+                key=where,
             )
 
     def set(self, called: str | int, settings: RoomSettings) -> None:

@@ -78,5 +78,8 @@ def room_faults(command: str, asked: RoomRequest | None) -> Iterator[OrderError]
         given = {name for name, value in members if value is not None and name != "id"}
         for other in sorted(given - takes):
             yield OrderError(f"does not go with {command}", key=f"room.{other}")
-        if missing := sorted(needs - given or (takes if not given else set())):
-            yield OrderError(f"missing with {command}", key=f"room.{' or '.join(missing)}")
+        for missing in sorted(needs - given):
+            yield OrderError(f"missing with {command}", key=f"room.{missing}")
+        if not (given or needs):
+            text = f"{' or '.join(sorted(takes))} is missing with {command}"
+            yield OrderError(text, key="room")
