@@ -9,7 +9,7 @@ import msgspec
 from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.reading import refused, removed_faults, with_credentials, without_removed
+from fasaco_edge.config.reading import refused, with_credentials, without_removed
 from fasaco_edge.errors import BadConfiguration, together
 from fasaco_edge.host.documents import inspected
 from fasaco_edge.host.plain_yaml import read_written
@@ -80,11 +80,9 @@ def inspect_config(
         )
     except BadConfiguration as error:
         return None, [error]
-    document = text.values
-    if isinstance(document, dict):
-        document = with_credentials(without_removed(document))
-    config, faults = inspected(DaemonConfig, document, BadConfiguration)
+    document, removed = without_removed(text.values)
+    config, faults = inspected(DaemonConfig, with_credentials(document), BadConfiguration)
     if config:
-        faults += [*removed_faults(text.values), *refused(lambda: check(config))]
+        faults += [*removed, *refused(lambda: check(config))]
     faults = text.faults(faults)
     return None if faults else config, faults

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 from fasaco_edge.errors import BadConfiguration, joined
 
@@ -34,25 +35,22 @@ def refused(
         yield error
 
 
-def removed_faults(document: object, key: str = "") -> Iterator[BadConfiguration]:
-    """Yield the keys of earlier releases that a document gives a value."""
-    for name, value in document.items() if isinstance(document, dict) else ():
-        path = joined(key, str(name))
-        if path not in REMOVED:
-            yield from removed_faults(value, path)
-        elif value not in (None, ""):
-            what, hint = REMOVED[path]
-            yield BadConfiguration(what, hint=hint, key=path)
-
-
-def without_removed(document: Mapping[str, object], key: str = "") -> dict[str, object]:
-    """Return a section ``key`` of an earlier release without the keys removed since."""
+def without_removed(document: object, key: str = "") -> tuple[Any, list[BadConfiguration]]:
+    """Return a section ``key`` without removed keys, and a fault for each that has a value."""
     kept: dict[str, object] = {}
+    faults: list[BadConfiguration] = []
+    if not isinstance(document, Mapping):
+        return document, faults
     for name, value in document.items():
         path = joined(key, str(name))
-        if path not in REMOVED:
-            kept[name] = without_removed(value, path) if isinstance(value, Mapping) else value
-    return kept
+        if path in REMOVED:
+            what, hint = REMOVED[path]
+            if value not in (None, ""):
+                faults.append(BadConfiguration(what, hint=hint, key=path))
+        else:
+            kept[name], found = without_removed(value, path)
+            faults += found
+    return kept, faults
 
 
 def renamed(config: Mapping[str, object]) -> dict[str, object]:

@@ -116,11 +116,6 @@ class RobotConfig(Document, frozen=True):
         return f"Robot({', '.join(texts)})"
 
     def faults(self) -> Iterator[BadConfiguration]:
-        try:
-            self.cost()
-        except BadConfiguration as error:
-            others = ("tool_width_m", "quarter_turn_s", "turn_deg_s", "turn_deg_s2")
-            yield BadConfiguration(error.said, key="speed_m_s", others=others)
         radius_m = self.footprint.radius() if self.footprint else self.radius_m
         if radius_m and abs(self.radius_m - radius_m) > 1e-6:
             yield BadConfiguration(

@@ -64,22 +64,14 @@ def inspected(
 
     With faults the struct is as ``Document.faults`` describes; UNSET if the document is no object.
     """
-    read, faults = fitted(kind, document, error)
-    faulty = [key for fault in faults for key in (fault.key, *fault.others)]
-    return read, faults + [
+    reader = _Reader(kind, error)
+    read: _Struct = reader.read(kind, document, "")
+    faulty = [key for fault in reader.faults for key in (fault.key, *fault.others)]
+    return read, reader.faults + [
         fault
         for fault in misfits(read, error)
         if not any(_touch(key, each) for key in (fault.key, *fault.others) for each in faulty)
     ]
-
-
-def fitted(
-    kind: type[_Struct], document: object, error: type[_Error]
-) -> tuple[_Struct, list[_Error]]:
-    """Return the same with what types show alone."""
-    reader = _Reader(kind, error)
-    read: _Struct = reader.read(kind, document, "")
-    return read, reader.faults
 
 
 def converted(kind: type[_Struct], document: object, error: type[_Error]) -> _Struct:

@@ -380,7 +380,7 @@ def test_documents_are_read_as_they_were_written():
             "room.cut: must be finite",
         ),
         ({"command": "room_merge", "room": {"id": 3, "name": "a"}}, "room.others: missing"),
-        ({"command": "room_set", "room": {"id": 3}}, "room.passes or priority or skip: missing"),
+        ({"command": "room_set", "room": {"id": 3}}, "room: passes or priority or skip is missing"),
         ({"command": "room_set", "room": {"id": 3, "passes": 0}}, "room.passes: expected"),
         ({"command": "room_set", "room": {"id": 3, "passes": ["rest"]}}, "rest goes after an edge"),
         (

@@ -17,7 +17,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.documents import fitted
+from fasaco_edge.host.documents import inspected
 from fasaco_edge.offline.settings import CELLS, LIKE_OWN, Search, default_line
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.planner import SearchProgress
@@ -119,7 +119,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     if config is None and line == CELLS:
         robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as in the paper
     changes = _given(args, ROBOT_OPTIONS)
-    for fault in fitted(RobotConfig, changes, BadConfiguration)[1]:
+    for fault in inspected(RobotConfig, changes, BadConfiguration)[1]:
         option = next(name for name, member in ROBOT_OPTIONS.items() if member == fault.key)
         raise BadConfiguration(fault.what, key=f"--{option.replace('_', '-')}")
     if args.turn_s is not None:
