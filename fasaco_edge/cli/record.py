@@ -12,7 +12,7 @@ import msgspec
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.documents import converted
+from fasaco_edge.host.documents import converted, inspected
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
@@ -110,10 +110,10 @@ def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettin
     from fasaco_edge.config.security import BusConfig
 
     keys, bus, _ = robot_on_bus(args)
-    try:
-        recording = msgspec.convert({"quota_mb": args.quota_mb}, RecordingConfig)
-    except msgspec.ValidationError as error:
-        raise BadConfiguration(f"disk space: {error}") from error
+    limits = {"quota_mb": args.quota_mb}
+    recording, faults = inspected(RecordingConfig, limits, BadConfiguration)
+    for fault in faults:
+        raise BadConfiguration(fault.what, key="--quota-mb")
     config = DaemonConfig(
         robot=RobotConfig(name=keys.robot),
         bus=BusConfig(base=keys.base),

@@ -116,8 +116,16 @@ def folder(tmp_path, monkeypatch):
         ("simulate office --connect office", 78, "'office': no protocol before the address"),
         (f"record --out . --connect {NOBODY}", 1, "Unable to connect to any of"),
         (f"record --out . --base /x --connect {NOBODY}", 78, "base: must be chunks"),
-        (f"record --out . --quota-mb -5 --connect {NOBODY}", 78, "disk space: Expected `int` >= 0"),
-        (f"record --out . --quota-mb 100 --connect {NOBODY}", 78, "at least two parts, 128 MB"),
+        (
+            f"record --out . --quota-mb -5 --connect {NOBODY}",
+            78,
+            "--quota-mb: expected int >= 0, got -5",
+        ),
+        (
+            f"record --out . --quota-mb 100 --connect {NOBODY}",
+            78,
+            "--quota-mb: must be 0 or at least twice recording.part_mb, 128",
+        ),
         (
             'record --out . --fleet hall --ros2 {"kind":"bridge"}',
             78,
