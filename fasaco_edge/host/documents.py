@@ -113,15 +113,20 @@ class _Reader:
         """Return a value as ``kind``; what does not fit is left out, and UNSET if nothing does."""
         try:
             return msgspec.convert(value, kind)
-        except msgspec.ValidationError as error:
-            message = str(error)
+        except (msgspec.ValidationError, UnicodeEncodeError) as error:
+            # The latter of a lone surrogate, without a place.
+            message = "Invalid text" if isinstance(error, UnicodeEncodeError) else str(error)
         before, read = len(self.faults), UNSET
         if before >= MOST_FAULTS:
             return UNSET
         where, expected, misfit = _misfit(message, value)
         if isinstance(value, dict) and (struct := _struct(kind)):
             read = self._members(struct, value, key)
-        elif where and isinstance(value, list) and (of := _of_items(kind)):
+        elif (
+            (where or message == "Invalid text")
+            and isinstance(value, list)
+            and (of := _of_items(kind))
+        ):
             read = self._items(of, value, key)
         # Without a fault its unknown keys are those of other programs.
         if len(self.faults) == before and not expected.startswith("object contains unknown"):

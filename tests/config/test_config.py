@@ -133,6 +133,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
             "bus: {base: /fasaco}",
             "bus.base: must be chunks of letters, digits, '_' and '-', got ''",
         ),
+        (r'bus: {mode: "\ud800"}', "bus.mode: expected peer, client or router, got"),
         ("bus: {mode: dealer}", "bus.mode: expected peer, client or router, got 'dealer'"),
         ("bus: {listen: 'tcp/0.0.0.0:1'}", "bus.listen: expected array, got 'tcp/0.0.0.0:1'"),
         ("bus: {listen: [7447]}", "bus.listen[0]: expected str, in quotes, got 7447"),
