@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.errors import DocumentError, OrderError
+from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point, Polygon
 from fasaco_edge.host.documents import Document, converted
 from fasaco_edge.mission.orders.keep_outs import (
@@ -187,7 +187,7 @@ class ZoneDocument(Document, frozen=True):
     room: RoomNumber | None = None
     priority: Priority | None = None
 
-    def faults(self) -> Iterator[DocumentError]:
+    def faults(self) -> Iterator[OrderError]:
         yield from passes_faults(self.passes)
 
 
@@ -215,7 +215,7 @@ class OrderDocument(Document, frozen=True):
     unknown: Unknown = "refuse"
     until_min: Minutes | None = None
 
-    def faults(self) -> Iterator[DocumentError]:
+    def faults(self) -> Iterator[OrderError]:
         yield from passes_faults(self.passes)
         yield from place_faults(self.zones, self.keep_out)
 

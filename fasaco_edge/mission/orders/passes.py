@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, OrderError
 from fasaco_edge.host.documents import Document
 from fasaco_edge.planners.passes import (
     MOST_ANGLE_DEG,
@@ -67,13 +67,13 @@ def _passes(document: list[PassWord | PassDocument]) -> tuple[Pass, ...]:
     )
 
 
-def passes_faults(document: Passes | None, key: str = "passes") -> Iterator[BadConfiguration]:
+def passes_faults(document: Passes | None, key: str = "passes") -> Iterator[OrderError]:
     """Yield why passes cannot follow each other."""
     if isinstance(document, list) and all(document):
         try:
             check_passes(_passes(document), key)
         except BadConfiguration as error:
-            yield error
+            yield error.within("", OrderError)
 
 
 def passes_document(number: int, passes: tuple[Pass, ...]) -> int | list[object]:

@@ -9,7 +9,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.errors import DocumentError, OrderError
+from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.host.documents import Document
 from fasaco_edge.mission.orders.keep_outs import LONGEST_NAME, PlaceName
@@ -52,7 +52,7 @@ class RoomRequest(Document, frozen=True, omit_defaults=True):
     skip: bool | None = None
     priority: Priority | None = None
 
-    def faults(self) -> Iterator[DocumentError]:
+    def faults(self) -> Iterator[OrderError]:
         if any(not math.hypot(x, y) <= FARTHEST_M for x, y in self.cut or ()):
             yield OrderError(f"must be finite and within {FARTHEST_M:g} m of 0", key="cut")
         yield from passes_faults(self.passes)
