@@ -4,6 +4,12 @@ A status, an error reply and ``--json`` of the command line carry the code. The 
 wrong and where. (``cli.ask`` repeats errors that a daemon has answered with.)
 """
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TypeVar
+
 
 class FasacoError(Exception):
     """Base of all errors meant for the users of this package."""
@@ -15,6 +21,64 @@ class FasacoError(Exception):
         super().__init__(message)
         if hint is not None:
             self.hint = hint
+
+
+class DocumentError(FasacoError):
+    """A fault of a document: of a configuration, an order, or the file of a map.
+
+    Attributes:
+        key: its place, such as ``bus.listen[0]``; "" for the whole document.
+        what: what is wrong there, and what is allowed.
+        others: further keys that the fault depends on.
+        file: the document's file; None if it has none.
+        line: line of the key in the file, from 1; None if there is none.
+        rest: further faults of the document.
+    """
+
+    file: Path | None = None
+    line: int | None = None
+    rest: tuple[DocumentError, ...] = ()
+
+    def __init__(
+        self, what: str, *, hint: str | None = None, key: str = "", others: Sequence[str] = ()
+    ) -> None:
+        super().__init__(what, hint=hint)
+        self.key, self.what, self.others = key, what, tuple(others)
+
+    @property
+    def said(self) -> str:
+        """Key and fault, without the file."""
+        return f"{self.key}: {self.what}" if self.key else self.what
+
+    def __str__(self) -> str:
+        """Return file, line, key and fault."""
+        line = "" if self.line is None else f", line {self.line}"
+        return self.said if self.file is None else f"{self.file}{line}: {self.said}"
+
+    def within(self, key: str, kind: type[_Fault]) -> _Fault:
+        """Return the fault of a document that has this one under ``key``, as an error ``kind``.
+
+        It keeps its kind if that is one of ``kind``, and else its hint if that is its own.
+        """
+        made: type[_Fault] = type(self) if isinstance(self, kind) else kind
+        hint = None if self.hint == type(self).hint else self.hint
+        places = [joined(key, each) for each in (self.key, *self.others)]
+        return made(self.what, hint=hint, key=places[0], others=places[1:])
+
+
+_Fault = TypeVar("_Fault", bound=DocumentError)
+
+
+def joined(key: str, below: str) -> str:
+    """Return the key of ``below``, a key or an index in brackets, in the object at ``key``."""
+    return f"{key}{'.' if key and below and below[0] != '[' else ''}{below}"
+
+
+def together(faults: Sequence[_Fault]) -> _Fault:
+    """Return the first fault of a document, with the others as its ``rest``."""
+    first, *rest = faults
+    first.rest = tuple(rest)
+    return first
 
 
 class MalformedMessage(FasacoError):
@@ -90,7 +154,7 @@ class MissionBroke(FasacoError):
     hint = "it restarts from the ledger; report it with the log"
 
 
-class MapFileError(FasacoError):
+class MapFileError(DocumentError):
     """A map file is missing or cannot be read as a map."""
 
     code = "map_file"
@@ -167,7 +231,7 @@ class UnknownQuery(FasacoError):
     hint = "use one of the names listed"
 
 
-class BadConfiguration(FasacoError):
+class BadConfiguration(DocumentError):
     """A configuration key is unknown or its value impossible."""
 
     code = "bad_configuration"
@@ -284,7 +348,7 @@ class FleetError(FasacoError):
     )
 
 
-class OrderError(FasacoError):
+class OrderError(DocumentError):
     """An order that cannot be carried out as it is written."""
 
     code = "bad_order"

@@ -11,9 +11,8 @@ from __future__ import annotations
 import json
 import re
 import reprlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from difflib import get_close_matches
-from typing import Any, get_args
 
 MOST = 2_000
 """What is shown of a text at most [characters]; longer texts are cut."""
@@ -91,23 +90,3 @@ def nearest(name: str, names: Collection[str], least: float = 0.6) -> list[str]:
     """Return the names that one was probably meant for: without its unit, or misspelt."""
     near = [each for each in names if each.startswith(f"{name}_")]
     return near or get_close_matches(name, names, 1, least)
-
-
-def objects_of(kind: object, depth: int = 3) -> Iterator[type[Any]]:
-    """Yield the structs that a value of this type is or holds, ``depth`` levels down."""
-    if isinstance(kind, type) and hasattr(kind, "__struct_fields__"):
-        yield kind
-    for part in get_args(kind) if depth else ():
-        yield from objects_of(part, depth - 1)
-
-
-def misfit(message: str, document: object) -> tuple[str, str, object]:
-    """Return where a parsed document does not fit, what was expected there, and what it has.
-
-    ``message``: of a ``msgspec.ValidationError``, as "Expected `int` >= 1 - at `$.passes[0]`".
-    """
-    what, _, where = message.replace("`", "").partition(" - at $")
-    value: Any = document
-    for name, index in re.findall(r"\.(\w+)|\[(\d+)\]", where):
-        value = value[name] if name else value[int(index)]
-    return where, what[0].lower() + what[1:].partition(", got ")[0], value

@@ -13,7 +13,6 @@ from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import inspect_config, with_mask
-from fasaco_edge.config.reading import Fault
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import memory_limit
 
@@ -55,8 +54,7 @@ def run(args: argparse.Namespace) -> int:
     def read_mask(config: DaemonConfig) -> None:
         with_mask(config, args.file, mask_bytes(config, memory_limit()))
 
-    config, found = inspect_config(args.file, read_mask)
-    faults = sorted(found, key=lambda fault: fault.line or 0)
+    config, faults = inspect_config(args.file, read_mask)
     if args.json:
         print_json(_document(args, config, faults))
     elif config is None:
@@ -71,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _document(
-    args: argparse.Namespace, config: DaemonConfig | None, faults: list[Fault]
+    args: argparse.Namespace, config: DaemonConfig | None, faults: list[BadConfiguration]
 ) -> dict[str, object]:
     document: dict[str, object] = {
         "file": str(args.file),
@@ -80,9 +78,9 @@ def _document(
             {
                 "key": fault.key,
                 "line": fault.line,
-                "code": fault.error.code,
-                "said": str(fault.error),
-                "hint": fault.error.hint,
+                "code": fault.code,
+                "said": fault.said,
+                "hint": fault.hint,
             }
             for fault in faults
         ],
@@ -93,14 +91,14 @@ def _document(
     return document
 
 
-def _print(file: Path, faults: list[Fault]) -> None:
+def _print(file: Path, faults: list[BadConfiguration]) -> None:
     """Print each fault as ``file:line: text``, and its hint unless that is the general one."""
     console = out()
     for fault in faults:
         where = f"{file}:{fault.line}" if fault.line else str(file)
-        console.print(f"{where}: {fault.error}", soft_wrap=True)
-        if fault.error.hint != BadConfiguration.hint:
-            console.print(f"  -> {fault.error.hint}", soft_wrap=True)
+        console.print(f"{where}: {fault.said}", soft_wrap=True)
+        if fault.hint != BadConfiguration.hint:
+            console.print(f"  -> {fault.hint}", soft_wrap=True)
 
 
 COMMAND = Command(

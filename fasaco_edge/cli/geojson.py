@@ -6,27 +6,21 @@ have to agree on that. Polygons are closed, their outlines counter-clockwise.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import TypeGuard
+from typing import Annotated, Any, ClassVar, Literal, TypeGuard
+
+from msgspec import UNSET, Meta, structs
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
-from fasaco_edge.text import nearest
+from fasaco_edge.host.documents import Document, inspected
+from fasaco_edge.mission.orders.order import OrderDocument
 from fasaco_edge.wire.documents.rooms import Rooms
 
 SUFFIX = ".geojson"
 HINT = "draw each zone as a Polygon; `rooms list --geojson` shows what one looks like"
-# Properties of a feature that become members of a zone.
-OF_ZONES = ("name", "passes", "room", "priority")
-# Members of the collection that become members of an order.
-OF_ORDERS = ("passes", "return_home", "keep_covered", "unknown", "until_min")
-# Other known properties of a feature, and other known members of a collection.
-OF_FEATURES, OF_COLLECTIONS = ("keep_out", "skip"), ("type", "features", "name", "crs", "bbox")
-# Least similarity of an unknown member to a known one that counts as a misspelling.
-ALIKE = 0.8
-
-Feature = dict[str, object]
+Members = dict[str, object]
 
 
 def lines_collection(
@@ -58,7 +52,7 @@ def rooms_collection(rooms: Rooms) -> dict[str, object]:
     return {"type": "FeatureCollection", "frame": rooms.frame, "features": features}
 
 
-def _feature(kind: str, coordinates: object, properties: dict[str, object]) -> Feature:
+def _feature(kind: str, coordinates: object, properties: dict[str, object]) -> Members:
     """Return a feature of one geometry."""
     geometry = {"type": kind, "coordinates": coordinates}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
@@ -77,79 +71,130 @@ def is_geojson(document: object) -> TypeGuard[dict[str, object]]:
     return isinstance(document, dict) and "type" in document
 
 
-def order_of(document: dict[str, object]) -> tuple[dict[str, object], dict[str, str]]:
-    """Return the order in a collection of polygons, and the feature of each zone and keep-out.
+class _Drawn(Document, frozen=True):
+    """An object of GeoJSON, which may have members of other programs."""
 
-    A polygon is a zone, whose members are its properties ``OF_ZONES``; with ``"keep_out": true`` it
-    is a keep-out. A feature with the number of a room orders that room, whatever its outline. With
-    ``"skip": true`` a feature is ignored. The members ``OF_ORDERS`` of the collection are those of
-    the order.
+    is_open: ClassVar[bool] = True
 
-    Raises:
-        OrderError: there is no feature, a feature is no polygon or has holes, or a property is
-            probably misspelt.
+
+class _Polygon(_Drawn, frozen=True):
+    coordinates: Annotated[list[Annotated[list[Any], Meta(min_length=4)]], Meta(min_length=1)]
+
+    def faults(self) -> Iterator[OrderError]:
+        rings = self.coordinates or []
+        if len(rings) > 1:
+            yield OrderError(
+                f"the polygon must have one ring, got {len(rings)}: rings after the first are "
+                "holes in it, and an order takes no holes",
+                hint="delete the holes; to keep the robot out of one, draw it as a Polygon of its "
+                'own, with the property "keep_out": true',
+                key="coordinates",
+            )
+        if rings and rings[0] and rings[0][0] != rings[0][-1]:
+            text = "the last corner must be the first again"
+            yield OrderError(text, key="coordinates[0]")
+
+    @property
+    def corners(self) -> list[Any]:
+        """Its corners (x, y) [m], without the height that drawing programs add."""
+        ring = self.coordinates[0][:-1] if self.coordinates else []
+        return [corner[:2] if isinstance(corner, list) else corner for corner in ring]
+
+
+class _Properties(_Drawn, frozen=True):
+    """Members of a zone, checked as those of an order; and whether it is another thing."""
+
+    name: Any = None
+    passes: Any = None
+    room: Any = None
+    priority: Any = None
+    keep_out: bool | None = None
+    skip: bool | None = None
+
+
+class _Feature(_Drawn, frozen=True):
+    geometry: Any = None
+    properties: _Properties | None = None
+    id: Any = None
+
+    @property
+    def known(self) -> _Properties:
+        """Its properties."""
+        return self.properties or _Properties()
+
+    def polygon(self) -> tuple[_Polygon, list[OrderError]]:
+        """Return its outline, and the faults of that, if it counts."""
+        known = self.known
+        if not known.keep_out and (known.skip or known.room is not None):
+            return _Polygon(coordinates=[]), []
+        kind = self.geometry.get("type") if isinstance(self.geometry, dict) else None
+        if kind != "Polygon":
+            return _Polygon(coordinates=[]), [OrderError(f"must be a Polygon, is {kind or 'none'}")]
+        return inspected(_Polygon, self.geometry, OrderError)
+
+    def faults(self) -> Iterator[OrderError]:
+        for fault in self.polygon()[1]:
+            yield fault.within("geometry", OrderError)
+
+
+class _Collection(_Drawn, frozen=True):
+    """Features, and members of an order, which are checked as those of one."""
+
+    type: Literal["FeatureCollection"]
+    features: Annotated[list[_Feature], Meta(min_length=1)]
+    passes: Any = UNSET
+    return_home: Any = UNSET
+    keep_covered: Any = UNSET
+    unknown: Any = UNSET
+    until_min: Any = UNSET
+
+
+OF_ORDERS = _Collection.__struct_fields__[2:]
+
+
+def drawn_order(document: Members) -> tuple[OrderDocument, list[OrderError]]:
+    """Return the order in a collection of polygons, and all faults, with keys of the collection.
+
+    A polygon is a zone, whose members are its properties; with ``"keep_out": true`` it is a
+    keep-out. A feature with the number of a room orders that room, whatever its outline. With
+    ``"skip": true`` a feature is ignored.
     """
-    zones: list[dict[str, object]] = []
-    keep_out: list[object] = []
+    zones: list[Members] = []
+    keep_out: list[list[Any]] = []
+    # The feature of each zone and keep-out, and the name of each feature.
     origins: dict[str, str] = {}
-    features = document.get("features")
-    _check_spelling(document, OF_ORDERS, "the collection")
-    if (kind := document["type"]) != "FeatureCollection":
-        raise OrderError(f"type: must be FeatureCollection, got {kind!r:.80}", hint=HINT)
-    if not isinstance(features, list) or not features:
-        raise OrderError("features: there is none", hint=HINT)
-    for number, each in enumerate(features):
-        where, members = f"features[{number}]", each if isinstance(each, dict) else {}
-        properties = members.get("properties") or {}
-        if not isinstance(properties, dict):
-            raise OrderError(f"{where}: properties must be an object", hint=HINT)
-        name = properties.get("name") or members.get("id")
-        where += "" if name is None else f" {name!r:.80}"
-        geometry = members.get("geometry")
-        if _is_set(properties, "keep_out", where):
-            origins[f"keep_out[{len(keep_out)}]"] = where
-            keep_out.append(_corners(geometry, where))
-        elif not _is_set(properties, "skip", where):
-            own = {name: properties[name] for name in OF_ZONES if properties.get(name) is not None}
-            named = {"name": f"zone {number + 1}"} | own
-            placed = {} if "room" in own else {"polygon": _corners(geometry, where)}
-            origins[f"zones[{len(zones)}]"] = where
-            zones.append(named | placed)
-        _check_spelling(properties, (*OF_ZONES, *OF_FEATURES), where)
-    order = {name: document[name] for name in OF_ORDERS if name in document}
-    return order | {"zones": zones, "keep_out": keep_out}, origins
-
-
-def _check_spelling(members: dict[str, object], known: Sequence[str], where: str) -> None:
-    """Check that no member is a misspelling; other unknown members may come from any program."""
-    for name in (each for each in members if each not in (*known, *OF_COLLECTIONS)):
-        if near := nearest(name, known, ALIKE):
-            raise OrderError(f"{where}: unknown member {name}; did you mean {near[0]}?", hint=HINT)
-
-
-def _is_set(properties: dict[str, object], name: str, where: str) -> bool:
-    """Return a boolean property; False if it is missing."""
-    value = properties.get(name)
-    if value is not None and not isinstance(value, bool):
-        raise OrderError(f"{where}: {name}: must be true or false, is {value!r}", hint=HINT)
-    return bool(value)
-
-
-def _corners(geometry: object, where: str) -> list[object]:
-    """Return the corners of a polygon without holes."""
-    members = geometry if isinstance(geometry, dict) else {}
-    rings, kind = members.get("coordinates"), members.get("type")
-    if kind != "Polygon" or not isinstance(rings, list) or not rings:
-        raise OrderError(f"{where}: must be a Polygon, is {kind or 'none'}", hint=HINT)
-    if len(rings) > 1:
-        raise OrderError(
-            f"{where}: the polygon must have one ring, got {len(rings)}: rings after the first are "
-            "holes in it, and an order takes no holes",
-            hint="delete the holes; to keep the robot out of one, draw it as a Polygon of its own, "
-            'with the property "keep_out": true',
-        )
-    ring = rings[0]
-    if not isinstance(ring, list) or len(ring) < 2 or ring[0] != ring[-1]:
-        raise OrderError(f"{where}: the last corner must be the first again", hint=HINT)
-    # Drawing programs add a height.
-    return [corner[:2] if isinstance(corner, list) else corner for corner in ring[:-1]]
+    names: dict[str, object] = {}
+    drawn, faults = inspected(_Collection, document, OrderError)
+    for index, feature in enumerate(drawn.features or ()):
+        if not feature:
+            continue
+        key, known, (polygon, flaws) = f"features[{index}]", feature.known, feature.polygon()
+        names[key] = known.name or feature.id
+        corners = None if flaws else polygon.corners or None
+        if known.keep_out and corners:
+            origins[f"keep_out[{len(keep_out)}]"] = key
+            keep_out.append(corners)
+        elif not known.keep_out and not known.skip:
+            members = structs.asdict(known) | {"polygon": corners}
+            del members["keep_out"], members["skip"]
+            own = {name: value for name, value in members.items() if value is not None}
+            origins[f"zones[{len(zones)}]"] = key
+            zones.append({"name": f"zone {index + 1}"} | own)
+    given = structs.asdict(drawn).items()
+    order = {name: value for name, value in given if name in OF_ORDERS and value is not UNSET}
+    read, found = inspected(
+        OrderDocument, order | {"zones": zones, "keep_out": keep_out}, OrderError
+    )
+    for fault in found:
+        place = fault.key[: fault.key.find("]") + 1]
+        if place in origins:
+            rest = fault.key.removeprefix(place)
+            is_corner = place.startswith("keep_out") or rest.startswith(".polygon")
+            part = ".geometry.coordinates[0]" if is_corner else ".properties"
+            fault.key = f"{origins[place]}{part}{rest.removeprefix('.polygon')}"
+    for fault in (faults := faults + found):
+        # A file may be one line, so that its number says nothing.
+        if name := names.get(fault.key[: fault.key.find("]") + 1]):
+            fault.what += f" (feature {name!r:.80})"
+        fault.hint = HINT if fault.hint == OrderError.hint else fault.hint
+    return read, faults

@@ -6,7 +6,6 @@ import argparse
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import yaml
@@ -85,7 +84,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="where to write (default: %(default)s)",
     )
     parser.add_argument(
-        "--robot-radius", type=float, metavar="M", help="radius of the disc around the robot [m]"
+        "--robot-radius", type=_number, metavar="M", help="radius of the disc around the robot [m]"
     )
     parser.add_argument(
         "--robot-size",
@@ -95,11 +94,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "plans use the disc around the rectangle",
     )
     parser.add_argument(
-        "--tool-width", type=float, metavar="M", help="width of the brush, mop or mower [m]"
+        "--tool-width", type=_number, metavar="M", help="width of the brush, mop or mower [m]"
     )
     parser.add_argument(
         "--clearance",
-        type=float,
+        type=_number,
         default=CLEARANCE_M,
         metavar="M",
         help="distance that lines keep from walls and furniture in addition to the radius [m], "
@@ -136,10 +135,18 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "the configuration and what was received")
 
 
+def _number(text: str) -> float:
+    """Return a number with a decimal point or a decimal comma."""
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a number such as 0.25, got {text!r}") from None
+
+
 def _size(text: str) -> dict[str, float]:
     try:
-        width_m, length_m = (float(part) for part in text.split("x"))
-    except ValueError:
+        width_m, length_m = (_number(part) for part in text.split("x"))
+    except (ValueError, argparse.ArgumentTypeError):
         raise argparse.ArgumentTypeError(f"must be like 0.5x0.6, got {text!r}") from None
     return {"width_m": width_m, "length_m": length_m}
 
@@ -155,7 +162,7 @@ def run(args: argparse.Namespace) -> int:
     _ask(args)
     document = document_of(args)
     text = HEAD + (yaml.safe_dump(document, sort_keys=False) if document else "")
-    config = _checked(text)
+    config = _checked(document)
     with writing(file) as new:
         new.write_text(text, encoding="utf-8")
     found = None if args.no_try else _listen(config, args.listen)
@@ -232,28 +239,23 @@ def _read(name: str, text: str) -> object:
     if name == "connect":
         bus = {"mode": "client", "listen": [], "connect": [text]}
         if text:
-            _checked(yaml.safe_dump({"bus": bus}))
+            _checked({"bus": bus})
         return text
     try:
-        value = float(text)
-    except ValueError:
-        raise BadConfiguration(f"must be a number, got {shown(text)}") from None
+        value = _number(text)
+    except argparse.ArgumentTypeError as error:
+        raise BadConfiguration(str(error)) from None
     key = next(key for key, option in ROBOT.items() if option == name)
-    _checked(yaml.safe_dump({"robot": {key: value}}))
+    _checked({"robot": {key: value}})
     return value
 
 
-def _checked(text: str) -> DaemonConfig:
-    """Return the configuration in a text; raise its first fault."""
-    from fasaco_edge.config.loading import inspect_config
+def _checked(document: dict[str, object]) -> DaemonConfig:
+    """Return a configuration; raise its faults."""
+    from fasaco_edge.config.config import DaemonConfig
+    from fasaco_edge.host.documents import converted
 
-    with TemporaryDirectory() as folder:
-        file = Path(folder, "config.yaml")
-        file.write_text(text, encoding="utf-8")
-        config, faults = inspect_config(file)
-    if config is None:
-        raise faults[0].error
-    return config
+    return converted(DaemonConfig, document, BadConfiguration)
 
 
 def _listen(config: DaemonConfig, listen_s: float) -> Finding:

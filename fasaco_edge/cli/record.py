@@ -12,6 +12,7 @@ import msgspec
 from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.documents import converted, inspected
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.settings import BusSettings
@@ -57,12 +58,9 @@ def ros_config(text: str) -> RosConfig:
     from fasaco_edge.config.ros import RosConfig
 
     try:
-        config = msgspec.json.decode(text, type=RosConfig)
-    except msgspec.DecodeError as error:
+        return converted(RosConfig, msgspec.json.decode(text), BadConfiguration)
+    except (msgspec.DecodeError, BadConfiguration) as error:
         raise argparse.ArgumentTypeError(f"ros2: {error}") from error
-    for fault in config.faults():
-        raise argparse.ArgumentTypeError(f"ros2: {fault}")
-    return config
 
 
 def run(args: argparse.Namespace) -> int:
@@ -106,14 +104,15 @@ def _record(args: argparse.Namespace) -> int:
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:
     """Return the configuration and bus settings by the options."""
-    from fasaco_edge.config.config import BusConfig, DaemonConfig, RecordingConfig
+    from fasaco_edge.config.config import DaemonConfig, RecordingConfig
     from fasaco_edge.config.robot import RobotConfig
+    from fasaco_edge.config.security import BusConfig
 
     keys, bus, _ = robot_on_bus(args)
-    try:
-        recording = msgspec.convert({"quota_mb": args.quota_mb}, RecordingConfig)
-    except msgspec.ValidationError as error:
-        raise BadConfiguration(f"disk space: {error}") from error
+    limits = {"quota_mb": args.quota_mb}
+    recording, faults = inspected(RecordingConfig, limits, BadConfiguration)
+    for fault in faults:
+        raise BadConfiguration(fault.what, key="--quota-mb")
     config = DaemonConfig(
         robot=RobotConfig(name=keys.robot),
         bus=BusConfig(base=keys.base),

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.bus import DEFAULT_ENDPOINT
-from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.config.endpoints import from_here
-from fasaco_edge.config.reading import Section
+from fasaco_edge.config.reading import refused
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.config.security import SecurityConfig
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.config.security import BusConfig
+from fasaco_edge.errors import BadConfiguration, DocumentError
 from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.host.addresses import Address, read_address
+from fasaco_edge.host.documents import Document
 from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
+from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
+from fasaco_edge.mission.orders.order import place_faults
 from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from fasaco_edge.wire import schemas
@@ -36,45 +36,7 @@ else:
 Percent = Annotated[int, Meta(ge=0, le=100)]
 
 
-class BusConfig(Section, frozen=True):
-    """How the daemon joins the bus, and who else may join it.
-
-    Remote access requires authentication (``security``), unless ``open_to_everyone`` is set.
-    """
-
-    base: str = "fasaco"
-    mode: Literal["peer", "client", "router"] = "peer"
-    listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
-    connect: tuple[str, ...] = ()
-    open_to_everyone: bool = False
-    security: SecurityConfig = SecurityConfig()
-
-    def settings(self, prefix: str, ros: RosConfig | None = None) -> BusSettings:
-        """Return the settings of the session of a robot whose keys begin with ``prefix``.
-
-        ``ros``: its section of ROS 2; None without one.
-
-        Raises:
-            BadConfiguration: a file of ``security`` cannot be read.
-        """
-        rights = (ros.rights(), ros.driver_rights()) if ros else ()
-        part = self.security.of_daemon(prefix, *rights)
-        if self.open_to_everyone:
-            part |= self.security.thinned(prefix)
-        return BusSettings(self.mode, self.connect, self.listen, part)
-
-    def of_client(self) -> BusSettings:
-        """Return the settings of another program's session, on the same computer.
-
-        Raises:
-            BadConfiguration: a file of ``security`` cannot be read.
-        """
-        self.security.warn_of_clock()
-        endpoints = tuple(map(from_here, self.listen or self.connect))
-        return BusSettings("client", endpoints, secured=self.security.of_client())
-
-
-class MapConfig(Section, frozen=True):
+class MapConfig(Document, frozen=True):
     """Thresholds of free and occupied [percent]; largest map and lattice (``daemon.memory``)."""
 
     free_at_most: Percent = 25
@@ -82,8 +44,14 @@ class MapConfig(Section, frozen=True):
     max_pixels: Annotated[int, Meta(ge=1, le=MAX_GRID_CELLS)] = 25_000_000
     max_lattice_cells: Annotated[int, Meta(ge=1, le=100_000_000)] = 600_000
 
+    def faults(self) -> Iterator[BadConfiguration]:
+        low, high = self.free_at_most, self.occupied_at_least
+        if low >= high:
+            text = f"must be below map.occupied_at_least, got {low} and {high}"
+            yield BadConfiguration(text, key="free_at_most", others=["occupied_at_least"])
 
-class PoseConfig(Section, frozen=True):
+
+class PoseConfig(Document, frozen=True):
     """The type of poses in samples that name none, as under ROS 2."""
 
     schema: Literal[
@@ -93,7 +61,7 @@ class PoseConfig(Section, frozen=True):
     ] = schemas.POSE_STAMPED
 
 
-class PlannerConfig(Section, frozen=True):
+class PlannerConfig(Document, frozen=True):
     """The colony, see ``planners.paper.colony.ColonyConfig``; and the time one plan may take [s].
 
     While the robot drives, ``spare_share`` of a processor core is used to improve the rest of its
@@ -126,6 +94,9 @@ class PlannerConfig(Section, frozen=True):
     line: Literal["cells", "quick", "thorough"] = "thorough"
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
+    def faults(self) -> Iterator[BadConfiguration]:
+        yield from refused(self.colony, others=["ants", "velocities"])
+
     def colony(self) -> ColonyConfig:
         """Return the configuration of the colony.
 
@@ -145,13 +116,25 @@ class PlannerConfig(Section, frozen=True):
         )
 
 
-class MissionSettings(Section, MissionPolicy, frozen=True, kw_only=True):
+class MissionSettings(Document, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and the folder of its progress.
 
     ``state_dir`` "" is the state folder of the service, else of the user.
     """
 
     state_dir: str = ""
+
+    def faults(self) -> Iterator[DocumentError]:
+        if "\0" in self.state_dir:
+            yield BadConfiguration("must be a path, got one with a NUL", key="state_dir")
+        yield from place_faults(self.zones, self.keep_out)
+        mask = self.keep_out_mask
+        if not mask.startswith(INLINE):
+            if mask and self.keep_out_topic:
+                text = f"must be left out beside mission.keep_out_topic, got {mask!r}"
+                yield BadConfiguration(text, key="keep_out_mask", others=["keep_out_topic"])
+            return
+        yield from refused(lambda: mask_polygons(mask), key="keep_out_mask")
 
     def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
         """Return the folder of the coverage ledger.
@@ -172,12 +155,11 @@ def _home(path: Path) -> Path:
     try:
         return path.expanduser()
     except RuntimeError as error:
-        raise BadConfiguration(
-            f"mission.state_dir: {path}: there is no home folder", hint="give an absolute path"
-        ) from error
+        text, hint = f"{path}: there is no home folder", "give an absolute path"
+        raise BadConfiguration(text, hint=hint, key="mission.state_dir") from error
 
 
-class FleetConfig(Section, frozen=True):
+class FleetConfig(Document, frozen=True):
     """A fleet: robots with the same ``bus.base``, name and map frame share the work in an area.
 
     Only names of frames are compared, so the frame must have the same origin for all. Robots with
@@ -193,12 +175,39 @@ class FleetConfig(Section, frozen=True):
     yaw_deg: Annotated[float, Meta(ge=-360, le=360)] = 0.0
     map_frame: Annotated[str, Meta(max_length=MAX_STRING_BYTES)] = ""
 
+    def faults(self) -> Iterator[BadConfiguration]:
+        if self.frame:
+            return
+        if self.x_m or self.y_m or self.yaw_deg:
+            yield BadConfiguration(
+                "expected the name of the frame that fleet.x_m, fleet.y_m and fleet.yaw_deg are "
+                "given in",
+                key="frame",
+                others=["x_m", "y_m", "yaw_deg"],
+            )
+        if self.map_frame:
+            yield BadConfiguration(
+                "expected fleet.frame beside it, the name of the frame in which that map has a "
+                "place",
+                key="map_frame",
+                others=["frame"],
+            )
 
-class BatteryConfig(Section, BatteryPolicy, frozen=True, kw_only=True):
+
+class BatteryConfig(Document, BatteryPolicy, frozen=True, kw_only=True):
     """When to charge; without the block ``battery`` the robot never charges by itself."""
 
+    def faults(self) -> Iterator[BadConfiguration]:
+        if self.enough < max(self.low, self.reserve) + 0.1:
+            yield BadConfiguration(
+                "must be at least 0.1 above battery.low and battery.reserve, got "
+                f"{self.enough:g}, {self.low:g} and {self.reserve:g}",
+                key="enough",
+                others=["low", "reserve"],
+            )
 
-class ScanConfig(Section, frozen=True):
+
+class ScanConfig(Document, frozen=True):
     """The robot's lidar: ``fasaco-edge follow`` stops before obstacles that only its scans show.
 
     It is mounted ``x_m`` ahead of the robot's centre, ``y_m`` to its left [m]; its angle 0 points
@@ -213,7 +222,7 @@ class ScanConfig(Section, frozen=True):
     lost_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
 
 
-class RecordingConfig(Section, frozen=True):
+class RecordingConfig(Document, frozen=True):
     """Limits on the size and age of a file, and on the size of all files.
 
     The next file begins after ``part_mb`` [MB] or ``part_min`` [min], 0 for never. Above
@@ -226,8 +235,13 @@ class RecordingConfig(Section, frozen=True):
     quota_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 2000
     least_free_mb: Annotated[int, Meta(ge=0, le=100_000_000)] = 200
 
+    def faults(self) -> Iterator[BadConfiguration]:
+        if 0 < self.quota_mb < (least := 2 * self.part_mb):
+            text = f"must be 0 or at least twice recording.part_mb, {least}, got {self.quota_mb}"
+            yield BadConfiguration(text, key="quota_mb", others=["part_mb"])
 
-class MetricsConfig(Section, frozen=True):
+
+class MetricsConfig(Document, frozen=True):
     """The address of metrics over HTTP, as ``127.0.0.1:9465``; "" for none.
 
     Other computers may read them only if ``open_to_everyone`` is set, as HTTP asks for no password.
@@ -235,6 +249,9 @@ class MetricsConfig(Section, frozen=True):
 
     listen: str = ""
     open_to_everyone: bool = False
+
+    def faults(self) -> Iterator[BadConfiguration]:
+        yield from refused(self.address, key="listen", others=["open_to_everyone"])
 
     def address(self) -> Address | None:
         """Return the address; None for none.
@@ -248,13 +265,14 @@ class MetricsConfig(Section, frozen=True):
         address = read_address("metrics.listen", self.listen, example=9465)
         if not address.is_loopback and not self.open_to_everyone:
             raise BadConfiguration(
-                f"metrics.listen: {self.listen} lets other computers read the status",
+                f"{self.listen} lets other computers read the status",
+                key="metrics.listen",
                 hint="listen on 127.0.0.1, or set metrics.open_to_everyone",
             )
         return address
 
 
-class DaemonConfig(Section, frozen=True):
+class DaemonConfig(Document, frozen=True):
     """The whole configuration.
 
     Without ``fleet`` the robot is alone, without ``scan`` it uses only the map, and without
@@ -273,6 +291,18 @@ class DaemonConfig(Section, frozen=True):
     metrics: MetricsConfig = MetricsConfig()
     fleet: FleetConfig | msgspec.UnsetType = msgspec.UNSET
     ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
+
+    def faults(self) -> Iterator[BadConfiguration]:
+        yield from refused(lambda: Keys(robot=self.robot.name), key="robot.name")
+        others = ("robot.tool_width_m", "robot.quarter_turn_s", "robot.turn_deg_s")
+        for error in refused(self.robot.cost):
+            yield BadConfiguration(error.said, key="robot.speed_m_s", others=others)
+        if self.bus.security.roles.ros and not self.ros2:
+            text = "without a block ros2 there is no such role"
+            yield BadConfiguration(text, key="bus.security.roles.ros", others=["ros2"])
+        if self.ros2 and self.ros2.dock == "nav2" and not self.mission.dock:
+            text = "must be given where ros2.dock is nav2, got null"
+            yield BadConfiguration(text, key="mission.dock", others=["ros2.dock"])
 
     @property
     def cell_m(self) -> float:

@@ -74,10 +74,11 @@ def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfigur
         name: the key or option that contains them.
         endpoints: the endpoints as given.
     """
-    for endpoint in endpoints:
+    for index, endpoint in enumerate(endpoints):
         if why := _why_none(endpoint):
             yield BadConfiguration(
-                f"{name}: {endpoint!r}: {why}",
+                f"{endpoint!r}: {why}",
+                key=f"{name}[{index}]",
                 hint="an endpoint is <protocol>/<address>, as tcp/192.168.1.5:7447",
             )
 

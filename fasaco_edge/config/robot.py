@@ -9,8 +9,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.documents import Document
 from fasaco_edge.kernels.floor.turning import (
     Turning,
     limited_turning,
@@ -27,7 +27,7 @@ Length = Annotated[float, Meta(gt=0, le=7)]
 Coordinate = Annotated[float, Meta(ge=-7, le=7)]
 
 
-class FootprintConfig(Section, frozen=True):
+class FootprintConfig(Document, frozen=True):
     """The robot's outline relative to its turning point [m]; x points ahead.
 
     Either ``width_m`` and ``length_m``, of which ``ahead_m`` lie ahead of that point (by default
@@ -50,23 +50,21 @@ class FootprintConfig(Section, frozen=True):
         return max((math.hypot(x, y) for x, y in corners), default=0.0)
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield missing, duplicate and inconsistent values."""
-        lengths = (self.width_m, self.length_m)
-        if self.polygon and any(length is not None for length in (*lengths, self.ahead_m)):
+        lengths, corners = (self.width_m, self.length_m), self.polygon
+        if corners and any(length is not None for length in (*lengths, self.ahead_m)):
             yield BadConfiguration("must be a polygon, or width_m and length_m, not both")
-        elif not self.polygon and None in lengths:
+        elif not corners and None in lengths:
             yield BadConfiguration("must have width_m and length_m, or a polygon")
-        elif self.polygon and len(self.polygon) < 3:
-            yield BadConfiguration(f"polygon must have 3 corners, got {len(self.polygon)}")
-        elif self.polygon and not self.radius():
-            yield BadConfiguration("polygon must have corners apart from each other")
+        elif corners and len(corners) < 3:
+            yield BadConfiguration(f"must have 3 corners, got {len(corners)}", key="polygon")
+        elif corners and not self.radius():
+            yield BadConfiguration("must have corners apart from each other", key="polygon")
         elif self.length_m is not None and (self.ahead_m or 0.0) > self.length_m:
-            yield BadConfiguration(
-                f"ahead_m must be at most length_m, {self.length_m:g}, got {self.ahead_m:g}"
-            )
+            text = f"must be at most length_m, {self.length_m:g}, got {self.ahead_m:g}"
+            yield BadConfiguration(text, key="ahead_m", others=["length_m"])
 
 
-class RobotConfig(Section, frozen=True):
+class RobotConfig(Document, frozen=True):
     """The robot: its name on the bus, its size [m], and its driving.
 
     ``quarter_turn_s`` is the duration of a turn by 90 degrees on the spot, with braking and
@@ -116,6 +114,16 @@ class RobotConfig(Section, frozen=True):
         members = msgspec.structs.asdict(self).items()
         texts = (f"{name}={value!r}" for name, value in members if value is not msgspec.UNSET)
         return f"Robot({', '.join(texts)})"
+
+    def faults(self) -> Iterator[BadConfiguration]:
+        radius_m = self.footprint.radius() if self.footprint else self.radius_m
+        if radius_m and abs(self.radius_m - radius_m) > 1e-6:
+            yield BadConfiguration(
+                f"must be left out beside robot.footprint, whose disc has {radius_m:.3g} m, "
+                f"got {self.radius_m:g}",
+                key="radius_m",
+                others=["footprint"],
+            )
 
     @property
     def assumed(self) -> str:

@@ -6,11 +6,12 @@ import re
 from collections.abc import Iterator
 from typing import Annotated, Literal
 
+import msgspec
 from msgspec import Meta
 
 from fasaco_edge.bus.access import Role, ros_rights
-from fasaco_edge.config.reading import Section
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.documents import Document
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.messages.ros_node import TRIGGERED, Triggered
 from fasaco_edge.wire.ros_keys import TRIGGER, Release, RosTopic, graph_key
@@ -31,7 +32,11 @@ SERVICE_DEPTH = 10
 DRIVER_INPUTS = ("map", "map_update", "pose", TF_STATIC)
 
 
-class RosTopicNames(Section, frozen=True):
+def _misfit(key: str, expected: str, name: str) -> BadConfiguration:
+    return BadConfiguration(f"must be {expected}, got {name!r}", key=key)
+
+
+class RosTopicNames(Document, frozen=True):
     """Names of topics below the namespace; either ``pose`` or ``tf`` is used."""
 
     map: str = "/map"
@@ -49,14 +54,24 @@ class RosTopicNames(Section, frozen=True):
     cmd_vel: str = "/cmd_vel"
 
 
-class RosFrames(Section, frozen=True):
+class RosFrames(Document, frozen=True):
     """First and last frame of the chain of transforms; frames in between are found."""
 
     map: str = "map"
     robot: str = "base_link"
 
+    def faults(self) -> Iterator[BadConfiguration]:
+        for key, frame in msgspec.structs.asdict(self).items():
+            # Unprintable characters may have no UTF-8, or be a NUL.
+            printed = frame if frame.isprintable() else ""
+            if not 0 < len(printed.encode()) <= MAX_STRING_BYTES:
+                yield _misfit(key, "the name of a frame", frame)
+        if self.map == self.robot:
+            text = f"must differ from frames.map, got {self.map!r} twice"
+            yield BadConfiguration(text, key="robot", others=["map"])
 
-class Nav2Config(Section, frozen=True):
+
+class Nav2Config(Document, frozen=True):
     """Nav2's controller server, used if ``follow`` is ``nav2``.
 
     ``controller``, ``goal_checker``, ``progress_checker`` and ``path_handler`` name its plugins, ""
@@ -80,8 +95,20 @@ class Nav2Config(Section, frozen=True):
     dock_id: str = ""
     dock_type: str = ""
 
+    def faults(self) -> Iterator[BadConfiguration]:
+        usual = Nav2Config()
+        for key in ("action", "dock_action", "undock_action"):
+            if not _TOPIC.fullmatch(name := getattr(self, key)):
+                yield _misfit(key, f"like {getattr(usual, key)}", name)
+        plugins = ("controller", "goal_checker", "progress_checker", "path_handler")
+        for key in (*plugins, "dock_id", "dock_type"):
+            name = getattr(self, key)
+            if not name.isprintable() or len(name.encode()) > MAX_STRING_BYTES:
+                of = "dock" if key == "dock_id" else "plugin"
+                yield _misfit(key, f"the name of a {of}", name)
 
-class RosConfig(Section, frozen=True):
+
+class RosConfig(Document, frozen=True):
     """ROS 2 topics, in addition to the native keys.
 
     ``kind`` is the connection of ROS to Zenoh: the middleware rmw_zenoh, or a bridge,
@@ -196,49 +223,29 @@ class RosConfig(Section, frozen=True):
         return [] if self.kind == "bridge" else [graph_key(self.domain)]
 
     def faults(self) -> Iterator[BadConfiguration]:
-        """Yield invalid or equal names, and settings of rmw_zenoh for a bridge."""
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
-            yield BadConfiguration(f"namespace must be / or like /robot1, got {self.namespace!r}")
-        if (
-            not _TOPIC.fullmatch(self.services)
-            or len(self._name(self.services)) > _MAX_PREFIX_LENGTH
-        ):
-            yield BadConfiguration(f"services must be like /coverage, got {self.services!r}")
+            yield _misfit("namespace", "/ or like /robot1", self.namespace)
+        prefix = self._name(self.services)
+        if not _TOPIC.fullmatch(self.services) or len(prefix) > _MAX_PREFIX_LENGTH:
+            yield _misfit("services", "like /coverage", self.services)
         if not _NODE.fullmatch(self.node):
-            yield BadConfiguration(f"node must be letters, digits and _, got {self.node!r}")
+            yield _misfit("node", "letters, digits and _", self.node)
         if self.kind == "bridge" and (self.domain != 0 or self.node != DEFAULT_NODE):
-            yield BadConfiguration("domain and node are for kind rmw_zenoh: a bridge has its own")
-        for key in ("action", "dock_action", "undock_action"):
-            name = getattr(self.nav2, key)
-            if not _TOPIC.fullmatch(name):
-                like = Nav2Config.__struct_defaults__[Nav2Config.__struct_fields__.index(key)]
-                yield BadConfiguration(f"nav2.{key} must be like {like}, got {name!r}")
-        plugins = ("controller", "goal_checker", "progress_checker", "path_handler")
-        for key in (*plugins, "dock_id", "dock_type"):
-            name = getattr(self.nav2, key)
-            if not name.isprintable() or len(name.encode()) > MAX_STRING_BYTES:
-                of = "dock" if key == "dock_id" else "plugin"
-                yield BadConfiguration(f"nav2.{key} must be the name of a {of}, got {name!r}")
-        yield from self._topic_faults()
-        for key in ("map", "robot"):
-            frame = getattr(self.frames, key)
-            # Unprintable characters may have no UTF-8, or be a NUL.
-            printed = frame if frame.isprintable() else ""
-            if not 0 < len(printed.encode()) <= MAX_STRING_BYTES:
-                yield BadConfiguration(f"frames.{key} must be the name of a frame, got {frame!r}")
-        if self.frames.map == self.frames.robot:
-            both = self.frames.map
-            yield BadConfiguration(f"frames.map and frames.robot must differ, got {both!r} twice")
-
-    def _topic_faults(self) -> Iterator[BadConfiguration]:
+            yield BadConfiguration(
+                "domain and node are for kind rmw_zenoh: a bridge has its own",
+                key="node" if self.domain == 0 else "domain",
+                others=["kind"],
+            )
         keys: dict[str, str] = {}
         for key in RosTopicNames.__struct_fields__:
             name: str = getattr(self.topics, key)
             if not _TOPIC.fullmatch(name) or len(self._name(name)) > _MAX_TOPIC_LENGTH:
-                yield BadConfiguration(f"topics.{key} must be like /robot1/map, got {name!r}")
+                yield _misfit(f"topics.{key}", "like /robot1/map", name)
             if name in keys:
                 yield BadConfiguration(
-                    f"topics.{keys[name]} and topics.{key} must differ, got {name!r} twice"
+                    f"must differ from topics.{keys[name]}, got {name!r} twice",
+                    key=f"topics.{key}",
+                    others=[f"topics.{keys[name]}"],
                 )
             keys[name] = key
 

@@ -1,4 +1,4 @@
-"""Security of the bus: the section ``bus.security``, and Zenoh's settings from it."""
+"""The bus and its security: the section ``bus``, and Zenoh's settings from it."""
 
 from __future__ import annotations
 
@@ -7,17 +7,28 @@ import os
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import msgspec
 from msgspec import Meta, structs
 
-from fasaco_edge.bus import access
-from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
-from fasaco_edge.config.reading import Section
+from fasaco_edge.bus import DEFAULT_ENDPOINT, access
+from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.config.endpoints import (
+    UNIX,
+    endpoint_faults,
+    from_here,
+    is_local,
+    protocol_of,
+)
+from fasaco_edge.config.reading import refused
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
-from fasaco_edge.host.plain_yaml import load, read_bounded
+from fasaco_edge.host.documents import Document, inspected
+from fasaco_edge.host.plain_yaml import read_bounded, read_written
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import FLEET
+
+if TYPE_CHECKING:
+    from fasaco_edge.config.ros import RosConfig
 
 LOG = logging.getLogger(__name__)
 
@@ -31,7 +42,7 @@ CARRIERS = {
 Name = Annotated[str, Meta(min_length=1)]
 
 
-class TlsConfig(Section, frozen=True):
+class TlsConfig(Document, frozen=True):
     """PEM files: the CA of all participants, this daemon's certificate and its key."""
 
     root_ca: str = ""
@@ -39,7 +50,7 @@ class TlsConfig(Section, frozen=True):
     private_key: str = ""
 
 
-class UserConfig(Section, frozen=True):
+class UserConfig(Document, frozen=True):
     """This daemon's user name, and a file with its password and nothing else.
 
     ``dictionary_file`` has a line ``name:password`` for each user who may connect.
@@ -50,7 +61,7 @@ class UserConfig(Section, frozen=True):
     dictionary_file: str = ""
 
 
-class RolesConfig(Section, frozen=True):
+class RolesConfig(Document, frozen=True):
     """Names with each role: common names of certificates, or user names (``bus.access.ROLES``)."""
 
     mapper: tuple[Name, ...] = ()
@@ -62,11 +73,11 @@ class RolesConfig(Section, frozen=True):
     router: tuple[Name, ...] = ()
 
 
-class LimitsConfig(Section, access.Limits, frozen=True):
+class LimitsConfig(Document, access.Limits, frozen=True):
     """Limits on each sender."""
 
 
-class SecurityConfig(Section, frozen=True):
+class SecurityConfig(Document, frozen=True):
     """Authentication of participants, and their permissions."""
 
     kind: Literal["none", "tls", "user"] = "none"
@@ -119,9 +130,8 @@ class SecurityConfig(Section, frozen=True):
                 user = self.user
                 password = _read("user.password_file", user.password_file).strip()
                 if not password:
-                    raise BadConfiguration(
-                        f"bus.security.user.password_file: {user.password_file} is empty"
-                    )
+                    text = f"{user.password_file} is empty"
+                    raise BadConfiguration(text, key="bus.security.user.password_file")
                 if dictionary_file:
                     _read("user.dictionary_file", dictionary_file)
                 transport = access.user_password(user.name, password, dictionary_file)
@@ -174,6 +184,55 @@ class SecurityConfig(Section, frozen=True):
         return access.limits(prefix, self.limits)
 
 
+class BusConfig(Document, frozen=True):
+    """How the daemon joins the bus, and who else may join it.
+
+    Remote access requires authentication (``security``), unless ``open_to_everyone`` is set.
+    """
+
+    base: str = "fasaco"
+    mode: Literal["peer", "client", "router"] = "peer"
+    listen: tuple[str, ...] = (DEFAULT_ENDPOINT,)
+    connect: tuple[str, ...] = ()
+    open_to_everyone: bool = False
+    security: SecurityConfig = SecurityConfig()
+
+    def faults(self) -> Iterator[BadConfiguration]:
+        yield from refused(lambda: Keys(base=self.base))
+        if not (self.listen or self.connect):
+            text = "must not be empty where bus.connect is"
+            yield BadConfiguration(text, key="listen", others=["connect"])
+        yield from endpoint_faults("listen", self.listen)
+        yield from endpoint_faults("connect", self.connect)
+        yield from security_faults(
+            self.security, self.listen, self.connect, open_to_everyone=self.open_to_everyone
+        )
+
+    def settings(self, prefix: str, ros: RosConfig | None = None) -> BusSettings:
+        """Return the settings of the session of a robot whose keys begin with ``prefix``.
+
+        ``ros``: its section of ROS 2; None without one.
+
+        Raises:
+            BadConfiguration: a file of ``security`` cannot be read.
+        """
+        rights = (ros.rights(), ros.driver_rights()) if ros else ()
+        part = self.security.of_daemon(prefix, *rights)
+        if self.open_to_everyone:
+            part |= self.security.thinned(prefix)
+        return BusSettings(self.mode, self.connect, self.listen, part)
+
+    def of_client(self) -> BusSettings:
+        """Return the settings of another program's session, on the same computer.
+
+        Raises:
+            BadConfiguration: a file of ``security`` cannot be read.
+        """
+        self.security.warn_of_clock()
+        endpoints = tuple(map(from_here, self.listen or self.connect))
+        return BusSettings("client", endpoints, secured=self.security.of_client())
+
+
 def files(security: SecurityConfig) -> Iterator[tuple[str, str]]:
     """Yield the files that the chosen kind needs: the key under ``bus.security``, and the path."""
     section = {"tls": security.tls, "user": security.user}.get(security.kind)
@@ -189,57 +248,60 @@ def security_faults(
     *,
     open_to_everyone: bool = False,
 ) -> Iterator[BadConfiguration]:
-    """Yield missing and inconsistent values.
+    """Yield missing and inconsistent values, with keys below ``bus``.
 
     Remote endpoints without authentication yield OpenToEveryone.
     """
-    beyond = [endpoint for endpoint in listen if not is_local(endpoint)]
+    kind = ["security.kind"]
+    beyond = [index for index, endpoint in enumerate(listen) if not is_local(endpoint)]
     if security.kind == "none":
         if beyond and not open_to_everyone:
             yield OpenToEveryone(
-                f"bus.listen: {beyond[0]} can be reached from other computers: remote access "
-                "requires authentication (bus.security)"
+                f"{listen[beyond[0]]} can be reached from other computers: remote access requires "
+                "authentication (bus.security)",
+                key=f"listen[{beyond[0]}]",
+                others=[*kind, "open_to_everyone"],
             )
-        named = [role for role, who in security.names().items() if who]
-        if named:
-            yield BadConfiguration(
-                f"bus.security.roles.{named[0]}: with bus.security.kind none there are no names"
-            )
+        for role, who in security.names().items():
+            if who:
+                text = "with bus.security.kind none there are no names"
+                yield BadConfiguration(text, key=f"security.roles.{role}", others=kind)
         return
     if open_to_everyone:
-        yield BadConfiguration(
-            f"bus.open_to_everyone: contradicts bus.security.kind {security.kind}"
-        )
+        text = f"contradicts bus.security.kind {security.kind}"
+        yield BadConfiguration(text, key="open_to_everyone", others=kind)
     yield from _missing(security, listen)
     protocols, carries = CARRIERS[security.kind]
     for key, endpoints in (("listen", listen), ("connect", connect)):
-        for endpoint in endpoints:
+        for index, endpoint in enumerate(endpoints):
             if protocol_of(endpoint) not in protocols:
                 yield BadConfiguration(
-                    f"bus.{key}: {endpoint}: {carries}",
+                    f"{endpoint}: {carries}",
                     hint="correct the endpoint, or bus.security.kind",
+                    key=f"{key}[{index}]",
+                    others=kind,
                 )
 
 
 def _missing(security: SecurityConfig, listen: Sequence[str]) -> Iterator[BadConfiguration]:
+    needed, others = f"needed with bus.security.kind {security.kind}", ["security.kind"]
     if security.kind == "user" and not security.user.name:
-        yield BadConfiguration("bus.security.user.name: needed with bus.security.kind user")
+        yield BadConfiguration(needed, key="security.user.name", others=others)
     for name, file in files(security):
         if "\0" in file:
-            yield BadConfiguration(f"bus.security.{name} must be a path, got one with a NUL")
+            yield BadConfiguration("must be a path, got one with a NUL", key=f"security.{name}")
         if not file and (name != "user.dictionary_file" or listen):
-            yield BadConfiguration(
-                f"bus.security.{name}: needed with bus.security.kind {security.kind}"
-            )
+            yield BadConfiguration(needed, key=f"security.{name}", others=[*others, "listen"])
 
 
 def _read(name: str, file: str) -> str:
+    key = f"bus.security.{name}"
     try:
         return read_bounded(Path(file))
     except OSError as error:
-        raise BadConfiguration(f"bus.security.{name}: {file}: {error.strerror}") from error
+        raise BadConfiguration(f"{file}: {error.strerror}", key=key) from error
     except ValueError as error:
-        raise BadConfiguration(f"bus.security.{name}: {file}: not a text") from error
+        raise BadConfiguration(f"{file}: not a text", key=key) from error
 
 
 def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
@@ -248,14 +310,11 @@ def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
     Raises:
         BadConfiguration: it cannot be read, is incomplete, or does not fit the endpoints.
     """
-    try:
-        security = msgspec.convert(load(read_bounded(Path(file))) or {}, SecurityConfig)
-        for fault in security_faults(security, (), connect):
-            raise fault
-    except OSError as error:
-        raise BadConfiguration(f"--security: {file}: {error.strerror}") from error
-    except ValueError as error:
-        raise BadConfiguration(f"--security: {file}: {error}") from error
-    except BadConfiguration as error:
-        raise BadConfiguration(f"--security, --connect: {error}", hint=error.hint) from error
+    text = read_written(Path(file), BadConfiguration, missing="name the file of --security")
+    security, faults = inspected(SecurityConfig, text.values, BadConfiguration)
+    text.check(faults)
+    for fault in security_faults(security, (), connect):
+        raise BadConfiguration(
+            f"--security, --connect: {fault.within('bus', BadConfiguration)}", hint=fault.hint
+        )
     return security

@@ -103,15 +103,14 @@ class MaskTopic:
             try:
                 self._read(newest)
             except FasacoError as error:
-                is_named = isinstance(error, BadConfiguration)
-                text = str(error) if is_named else f"keep_out_mask: {error}"
-                faults.append(BadConfiguration(text, hint=error.hint))
+                what = error.what if isinstance(error, BadConfiguration) else str(error)
+                faults.append(BadConfiguration(what, hint=error.hint, key="keep_out_mask"))
             else:
                 mask_frame = next(reversed(self._masks))
                 if mask_frame != frame:
-                    text = f"keep_out_mask: in frame {mask_frame!r}, the map in {frame!r}"
+                    text = f"in frame {mask_frame!r}, the map in {frame!r}"
                     hint = "publish map and mask in the same frame"
-                    faults.append(BadConfiguration(text, hint=hint))
+                    faults.append(BadConfiguration(text, hint=hint, key="keep_out_mask"))
         self._in_force = self._masks.get(frame, self._in_force)
         # Only a restart can replace the mask of a message by that of a file.
         mission = structs.replace(config.mission, keep_out_mask=self._in_force)
@@ -120,9 +119,7 @@ class MaskTopic:
     def _read(self, sample: Sample) -> None:
         most = most_bytes(topics.MAP.name, self._max_pixels)
         if sample.size > most:
-            raise BadConfiguration(
-                f"keep_out_mask: a message of {sample.size} bytes; it may have at most {most}"
-            )
+            raise BadConfiguration(f"a message of {sample.size} bytes; it may have at most {most}")
         grid = decode_occupancy_grid(sample.payload, self._max_pixels)
         mask = inline_grid(grid, self._occupied_at_least)
         self._masks.pop(grid.frame, None)

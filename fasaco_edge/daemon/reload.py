@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from fasaco_edge.config.loading import load_config, with_mask
 from fasaco_edge.daemon.mask_topic import MaskTopic
 from fasaco_edge.daemon.memory import mask_bytes
 from fasaco_edge.daemon.notify import ServiceManager
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, DocumentError
 from fasaco_edge.host.processes import memory_limit
 
 LOG = logging.getLogger(__name__)
@@ -116,7 +116,7 @@ class Reload:
 
         threading.Thread(target=run, name="reload", daemon=True).start()
 
-    def take(self, running: DaemonConfig) -> tuple[DaemonConfig, list[BadConfiguration]]:
+    def take(self, running: DaemonConfig) -> tuple[DaemonConfig, Sequence[DocumentError]]:
         """Return the running configuration with the changeable values of the file.
 
         Also return why the file or the newest mask is refused; a refused file changes no value.
@@ -128,8 +128,9 @@ class Reload:
         except BadConfiguration as error:
             text = "configuration refused, the previous one stays in force: %s (%s)"
             extra = {"event": "reload_refused", "code": error.code}
-            LOG.error(text, error, error.hint, extra=extra)
-            return running, [error]
+            for fault in (refused := [error, *error.rest]):
+                LOG.error(text, fault, fault.hint, extra=extra)
+            return running, refused
         for fault in faults:
             extra = {"event": "mask_refused", "code": fault.code}
             LOG.error("keep-out mask refused: %s (%s)", fault, fault.hint, extra=extra)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from fasaco_edge.bus.access import ROLES
 from fasaco_edge.config.certificates import read_certificate
-from fasaco_edge.config.config import BusConfig
 from fasaco_edge.config.endpoints import UNIX, is_local, protocol_of
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.doctor.finding import CheckContext, Finding, fail, ok, warn
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate
 

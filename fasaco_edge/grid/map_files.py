@@ -10,15 +10,15 @@ Keys that contradict the image, or make never-seen ground free, are logged (``ma
 from __future__ import annotations
 
 import logging
-import math
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import MapFileError
@@ -38,10 +38,11 @@ from fasaco_edge.grid.map_images import (
     yaw_in_degrees,
 )
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
+from fasaco_edge.host.documents import Document, inspected
 from fasaco_edge.host.files import check_plain
-from fasaco_edge.host.plain_yaml import PlainYamlError, load, read_bounded
+from fasaco_edge.host.plain_yaml import read_written
 from fasaco_edge.host.resources import folder
-from fasaco_edge.text import nearest, shown
+from fasaco_edge.text import shown
 
 LOG = logging.getLogger(__name__)
 
@@ -49,15 +50,21 @@ IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
 # Thresholds of ROS 1's map_saver, by which its grey for unknown, 205, is not free.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
-MODES = ("trinary", "scale", "raw")
+Mode = Literal["trinary", "scale", "raw"]
+_Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 
 # What to do about a fault inside a file.
 GRID_HINT = "give a bool array (rows, cols), True = coverable, as free.astype(bool)"
 _YAML_HINT = "correct it: a map file that is not .npy is read as a map_server YAML file"
+_MISSING_HINT = "name a file that exists and may be read"
 _KEY_HINTS = {
-    "image": "correct image in this file: a path from this file's folder, from / or from ~",
-    "resolution": "correct resolution in this file: the edge of a pixel in metres, as 0.05",
-    "free_thresh": "correct the thresholds in this file: map_saver writes 0.65 and 0.196 or 0.25",
+    "image": "image is a path from this file's folder, from / or from ~",
+    "resolution": "resolution is the edge of a pixel in metres, as 0.05",
+    "origin": "origin is [x, y, yaw] of the lower left corner: metres, metres, radians",
+    "negate": "negate is 0, or 1 for an image whose free floor is black",
+    "mode": "mode is trinary for maps of map_saver",
+    "free_thresh": "map_saver writes free_thresh: 0.196 or 0.25",
+    "occupied_thresh": "map_saver writes occupied_thresh: 0.65",
 }
 
 
@@ -98,16 +105,11 @@ def read_map_rows(
             f"{path}: an image alone has no resolution",
             hint="give --resolution (metres a pixel), or the map_server YAML file beside it",
         )
-    keys = _YamlKeys(path, _load_yaml(path))
-    keys.values.setdefault("free_thresh", FREE_THRESH)
-    keys.values.setdefault("occupied_thresh", OCCUPIED_THRESH)
-    thresholds = keys.number("free_thresh", 0, 1), keys.number("occupied_thresh", 0, 1)
-    if thresholds[0] >= thresholds[1]:
-        raise keys.error("free_thresh", f"less than occupied_thresh, {thresholds[1]}")
-    resolution = keys.number("resolution", MIN_RESOLUTION_M, MAX_RESOLUTION_M, " [m/pixel]")
-    file, mode, origin, negate = keys.image(), keys.mode(), keys.origin(), keys.negate()
-    image = read_image(Path(file), most_bytes)
-    geometry = GridGeometry(image.rows, image.cols, resolution, origin)
+    keys, file = _read_keys(path)
+    image = read_image(file, most_bytes)
+    mode, origin, negate = keys.mode, Pose2D(*keys.origin), bool(keys.negate)
+    thresholds = keys.free_thresh, keys.occupied_thresh
+    geometry = GridGeometry(image.rows, image.cols, keys.resolution, origin)
     values = values_of(mode, thresholds, image.white, negate)
     conflict = settle(image, values, mode, negate=negate, is_mask=is_mask)
     for text in filter(None, (yaw_in_degrees(origin.yaw), conflict)):
@@ -146,9 +148,8 @@ def read_bare_image(path: str | Path, resolution_m: float) -> OccupancyGrid:
         )
     image = read_image(path)
     geometry = GridGeometry(image.rows, image.cols, resolution_m, Pose2D(0, 0, 0))
-    mode, thresholds = MODES[0], (FREE_THRESH, OCCUPIED_THRESH)
-    values = values_of(mode, thresholds, image.white, negate=False)
-    return _grid(geometry, _cells(image, values, mode))
+    values = values_of("trinary", (FREE_THRESH, OCCUPIED_THRESH), image.white, negate=False)
+    return _grid(geometry, _cells(image, values, "trinary"))
 
 
 def _cells(image: MapImage, values: NDArray[np.int8], mode: str) -> Iterator[NDArray[np.int8]]:
@@ -180,7 +181,7 @@ def map_sources(path: Path) -> list[Path]:
     """
     if path.suffix.lower() in (*IMAGE_SUFFIXES, ".npy"):
         return [path]
-    return [path, _YamlKeys(path, _load_yaml(path)).image()]
+    return [path, _read_keys(path)[1]]
 
 
 def read_coverage_grid(path: str | Path) -> NDArray[np.bool_]:
@@ -269,85 +270,40 @@ def _maps() -> Path:
 
 
 def _index() -> dict[str, _BuiltIn]:
-    return msgspec.convert(_load_yaml(_maps() / "index.yaml"), dict[str, _BuiltIn])
+    text = read_written(_maps() / "index.yaml", MapFileError, missing=_MISSING_HINT)
+    return msgspec.convert(text.values, dict[str, _BuiltIn])
 
 
-def _load_yaml(path: Path) -> dict[str, object]:
-    try:
-        loaded = load(read_bounded(path))
-    except OSError as error:
-        raise MapFileError(
-            f"{path}: {error.strerror or error}", hint="name a file that exists and may be read"
-        ) from error
-    except PlainYamlError as error:
-        raise MapFileError(
-            f"{path}: not readable as plain YAML: {error}", hint=_YAML_HINT
-        ) from error
-    if not isinstance(loaded, dict):
-        raise MapFileError(
-            f"{path}: expected keys and values, got {shown(loaded) if loaded else 'nothing'}",
-            hint=_YAML_HINT,
-        )
-    return loaded
+class MapKeys(Document, frozen=True):
+    """The keys of a map_server YAML file, which may have further keys of other programs."""
+
+    is_open: ClassVar[bool] = True
+
+    image: Annotated[str, Meta(min_length=1)]
+    resolution: Annotated[float, Meta(ge=MIN_RESOLUTION_M, le=MAX_RESOLUTION_M)]
+    origin: tuple[_Coordinate, _Coordinate, _Coordinate]
+    negate: Literal[0, 1] | bool
+    mode: Mode = "trinary"
+    free_thresh: Annotated[float, Meta(ge=0, le=1)] = FREE_THRESH
+    occupied_thresh: Annotated[float, Meta(ge=0, le=1)] = OCCUPIED_THRESH
+
+    def faults(self) -> Iterator[MapFileError]:
+        free, occupied = self.free_thresh, self.occupied_thresh
+        if free >= occupied:
+            text = f"must be less than occupied_thresh, {occupied:g}, got {free:g}"
+            yield MapFileError(text, key="free_thresh", others=["occupied_thresh"])
 
 
-@dataclass(frozen=True, slots=True)
-class _YamlKeys:
-    path: Path
-    values: dict[str, object]
-
-    def error(self, key: str, expected: str) -> MapFileError:
-        got = f"got {shown(self.values[key])}" if key in self.values else "the key is missing"
-        if key not in self.values and (near := nearest(key, [*map(str, self.values)])):
-            got += f"; is {near[0]} meant for it?"
-        hint = _KEY_HINTS.get(key, f"correct {key} in this file")
-        return MapFileError(f"{self.path}: {key} must be {expected}; {got}", hint=hint)
-
-    def number(self, key: str, low: float, high: float, unit: str = "") -> float:
-        number = self._finite(key, self.values.get(key), "a number")
-        if not low <= number <= high:
-            raise self.error(key, f"a number from {low:g} to {high:g}{unit}")
-        return number
-
-    def _finite(self, key: str, value: object, expected: str) -> float:
-        # 5e-2 is a string in YAML 1.1, but a number for yaml-cpp, and so for ROS.
-        if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise self.error(key, expected)
-        try:
-            number = float(value)
-        except (ValueError, OverflowError) as error:
-            raise self.error(key, expected) from error
-        if not math.isfinite(number):
-            raise self.error(key, expected)
-        return number
-
-    def origin(self) -> Pose2D:
-        expected = "three numbers: x [m], y [m], yaw [rad]"
-        origin = self.values.get("origin")
-        if not isinstance(origin, list) or len(origin) != 3:
-            raise self.error("origin", expected)
-        x, y, yaw = (self._finite("origin", value, expected) for value in origin)
-        if max(abs(x), abs(y), abs(yaw)) > FARTHEST_M:
-            raise self.error("origin", f"{expected}, each within {FARTHEST_M:g} of 0")
-        return Pose2D(x, y, yaw)
-
-    def mode(self) -> str:
-        mode = self.values.get("mode", MODES[0])
-        if mode not in MODES:
-            raise self.error("mode", "trinary, scale or raw")
-        return str(mode)
-
-    def negate(self) -> bool:
-        negate = self.values.get("negate")
-        if negate not in (0, 1):
-            raise self.error("negate", "0 or 1")
-        return bool(negate)
-
-    def image(self) -> Path:
-        image = self.values.get("image")
-        if not isinstance(image, str) or not image:
-            raise self.error("image", "the name of an image file")
-        found = self.path.parent / os.path.expanduser(image)
-        if not os.path.isfile(found):
-            raise self.error("image", f"an existing file, sought at {found}")
-        return found
+def _read_keys(path: Path) -> tuple[MapKeys, Path]:
+    """Return the keys of a YAML file, and the image that it names."""
+    text = read_written(path, MapFileError, missing=_MISSING_HINT, broken=_YAML_HINT)
+    keys, faults = inspected(MapKeys, text.values, MapFileError)
+    image = path
+    if keys and keys.image:
+        image = path.parent / os.path.expanduser(keys.image)
+        if not os.path.isfile(image):
+            faults.append(MapFileError(f"no file {shown(str(image))}", key="image"))
+    for fault in faults:
+        fault.hint = _KEY_HINTS.get(fault.key.partition("[")[0], _YAML_HINT)
+    text.check(faults)
+    return keys, image

@@ -61,8 +61,8 @@ def read_address(name: str, text: str, example: int) -> Address:
     """
     found = _ADDRESS.fullmatch(text)
     wrong = BadConfiguration(
-        f"{name} must be an address and a port, as 127.0.0.1:{example} or [::1]:{example}, "
-        f"got {text!r}"
+        f"must be an address and a port, as 127.0.0.1:{example} or [::1]:{example}, got {text!r}",
+        key=name,
     )
     if found is None or not 0 < int(found["port"]) < 1 << 16:
         raise wrong

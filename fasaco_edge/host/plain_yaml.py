@@ -1,4 +1,4 @@
-"""Plain YAML: a document written by a user, of bounded size and depth.
+"""Plain YAML: a document written by a user, of bounded size and depth, with the line of each key.
 
 Aliases count with their expanded size: 500 bytes of aliases can expand to gigabytes. Tags, which
 turn a text into other types, are refused.
@@ -7,11 +7,17 @@ turn a text into other types, are refused.
 from __future__ import annotations
 
 import os
+import re
 import select
 import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import yaml
+
+from fasaco_edge.errors import DocumentError, together
 
 MOST_BYTES = 1_048_576
 MOST_VALUES = 50_000
@@ -55,13 +61,105 @@ def read_bounded(path: Path) -> str:
         raise PlainYamlError(str(error)) from error
 
 
-def load(text: str) -> object:
-    """Return the plain values of a document; None for an empty one.
+_Error = TypeVar("_Error", bound=DocumentError)
+
+
+@dataclass(frozen=True, slots=True)
+class Written(Generic[_Error]):
+    """The content of a file.
+
+    Attributes:
+        file: the file.
+        values: plain values.
+        lines: line of each key, from 1.
+        twice: a fault for each key that occurs more than once; YAML would take the last.
+    """
+
+    file: Path
+    values: object
+    lines: dict[str, int]
+    twice: tuple[_Error, ...]
+
+    def faults(self, found: Sequence[_Error]) -> list[_Error]:
+        """Return all faults in the order of their lines: duplicate keys, and those ``found``."""
+        for fault in (faults := [*self.twice, *found]):
+            fault.file, fault.line = self.file, self._line_of(fault.key)
+        return sorted(faults, key=lambda fault: fault.line or 0)
+
+    def check(self, found: Sequence[_Error]) -> None:
+        """Raise the first of all faults, with the others as its rest; see ``faults``."""
+        if faults := self.faults(found):
+            raise together(faults)
+
+    def _line_of(self, key: str) -> int | None:
+        """Return the line of a key, or of its section if it is missing; None if both are."""
+        while key:
+            if key in self.lines:
+                return self.lines[key]
+            key = key[: max(key.rfind("."), key.rfind("["), 0)]
+        return None
+
+
+def read_written(
+    path: Path,
+    error: type[_Error],
+    *,
+    missing: str,
+    broken: str = "correct the file at that place",
+    parse: Callable[[str], object] | None = None,
+) -> Written[_Error]:
+    """Read a file.
+
+    Args:
+        path: the file.
+        error: kind of the errors.
+        missing: hint for a file that cannot be read.
+        broken: hint for a file that is no plain YAML.
+        parse: reads the values of a JSON file; None for YAML.
 
     Raises:
-        PlainYamlError: it is no YAML, or not plain.
+        DocumentError: ``error``, the file cannot be read, or is no plain YAML.
     """
-    return compose(text)[1]
+    try:
+        text = read_bounded(path)
+        node, values = compose(text) if parse is None else (_node_of_json(text), parse(text))
+    except (OSError, ValueError, RecursionError) as refused:
+        if isinstance(refused, OSError):
+            fault = error(str(refused.strerror), hint=missing)
+        else:
+            fault = error(f"not plain {'JSON' if parse else 'YAML'}: {refused}", hint=broken)
+        fault.file = path
+        raise fault from refused
+    lines: dict[str, int] = {}
+    twice = []
+    for key, line in _keys_and_lines(node):
+        if key in lines:
+            text = f"is given twice, in line {lines[key]} and in line {line}"
+            twice.append(error(text, key=key))
+        lines[key] = line
+    return Written(path, {} if values is None else values, lines, tuple(twice))
+
+
+def _node_of_json(text: str) -> yaml.Node | None:
+    """Return JSON, whose tabs YAML does not take, as nodes; None where YAML takes it in no way."""
+    try:
+        return compose(text.replace("\t", " "))[0]
+    except PlainYamlError:
+        return None
+
+
+def _keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:
+    """Yield each key and its line."""
+    if isinstance(node, yaml.MappingNode):
+        for name, value in node.value:
+            key = f"{before}.{name.value}" if before else str(name.value)
+            yield key, name.start_mark.line + 1
+            yield from _keys_and_lines(value, key)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, item in enumerate(node.value):
+            key = f"{before}[{index}]"
+            yield key, item.start_mark.line + 1
+            yield from _keys_and_lines(item, key)
 
 
 def compose(text: str) -> tuple[yaml.Node | None, object]:
@@ -85,6 +183,17 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
         raise PlainYamlError(str(error)) from error
 
 
+# What the parser says of frequent mistakes, and what that means.
+_PLAIN = {
+    "found character '\\t' that cannot start any token": "a tab: indent by spaces",
+    "expected <block end>, but found '<block mapping start>'": (
+        "indented otherwise than the lines before"
+    ),
+    "mapping values are not allowed here": "a key within a value: perhaps the line before lacks a "
+    "quote, or this one is indented too far",
+}
+
+
 def _described(error: yaml.MarkedYAMLError) -> str:
     """Return where a document is no YAML, and why, in one line."""
     mark, began = error.problem_mark or error.context_mark, error.context_mark
@@ -92,7 +201,9 @@ def _described(error: yaml.MarkedYAMLError) -> str:
     context = error.context or ""
     if began is not None and mark is not None and began.line != mark.line:
         context += f" that begins in line {began.line + 1}"
-    return where + ", ".join(filter(None, (error.problem, context)))
+    if (problem := error.problem or "") in _PLAIN:
+        return where + _PLAIN[problem]
+    return where + ", ".join(filter(None, (problem, context)))
 
 
 class _Loader(yaml.SafeLoader):
@@ -137,3 +248,6 @@ class _Loader(yaml.SafeLoader):
 
 
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+# As in YAML 1.2: YAML 1.1 takes 1e-6 for a text.
+_EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
+_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))

@@ -15,6 +15,7 @@ import numpy as np
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.host.documents import converted
 from fasaco_edge.offline.ground import Ground, Line
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.result import Plan
@@ -181,12 +182,9 @@ def checked(robot: RobotConfig) -> RobotConfig:
     Raises:
         BadConfiguration: one is invalid; the error names it.
     """
-    try:
-        members = msgspec.structs.asdict(robot).items()
-        given = {name: value for name, value in members if value is not msgspec.UNSET}
-        return msgspec.convert(given, RobotConfig)
-    except msgspec.ValidationError as error:
-        raise BadConfiguration(f"robot: {error}") from error
+    members = msgspec.structs.asdict(robot).items()
+    given = {name: value for name, value in members if value is not msgspec.UNSET}
+    return converted(RobotConfig, given, BadConfiguration)
 
 
 def _ground(

@@ -169,7 +169,8 @@ def steps_in_rows(cells: NDArray[np.int32]) -> int:
 def _require(name: str, value: float, least: float, most: float, unit: str) -> None:
     # A negated comparison, so that NaN is caught too.
     if not least <= value <= most:
-        raise BadConfiguration(f"{name} must be in [{least:g}, {most:g}] {unit}, got {value!r}")
+        text = f"must be in [{least:g}, {most:g}] {unit}, got {value!r}"
+        raise BadConfiguration(text, key=name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -128,23 +128,29 @@ def check_passes(passes: Sequence[Pass], name: str = "passes") -> None:
             pass exclude each other; or all passes are edges.
     """
     if not 1 <= len(passes) <= MOST_PASSES:
-        raise BadConfiguration(f"{name} must be 1 to {MOST_PASSES}, got {len(passes)}")
+        raise BadConfiguration(f"must be 1 to {MOST_PASSES}, got {len(passes)}", key=name)
     crossed = False
     for index, each in enumerate(passes):
-        where = f"{name}[{index}]"
-        if each.lanes == "cross" and not crossed:
-            raise BadConfiguration(f"{where}: cross goes after a pass with lanes, which is missing")
-        if each.covers == "rest" and all(other.covers != "edge" for other in passes[:index]):
-            raise BadConfiguration(f"{where}: rest goes after an edge, which is missing")
-        if each.lanes == "cross" and each.angle_deg is not None:
-            raise BadConfiguration(f"{where}: cross is an angle, got another one beside it")
-        if each.covers == "edge" and (each.lanes == "cross" or each.angle_deg is not None):
-            raise BadConfiguration(f"{where}: edge follows the walls, and has no lanes")
-        if each.covers == "edge" and each.overlap is not None:
-            raise BadConfiguration(f"{where}: edge has no lanes that could overlap")
+        if why := _why_not(each, passes[:index], crossed=crossed):
+            raise BadConfiguration(why, key=f"{name}[{index}]")
         crossed = crossed or each.covers != "edge"
     if not crossed:
-        raise BadConfiguration(f"{name}: edge alone leaves most of the floor; add auto or rest")
+        raise BadConfiguration("edge alone leaves most of the floor; add auto or rest", key=name)
+
+
+def _why_not(each: Pass, before: Sequence[Pass], *, crossed: bool) -> str:
+    """Return why a pass cannot follow others; "" if it can."""
+    if each.lanes == "cross" and not crossed:
+        return "cross goes after a pass with lanes, which is missing"
+    if each.covers == "rest" and all(other.covers != "edge" for other in before):
+        return "rest goes after an edge, which is missing"
+    if each.lanes == "cross" and each.angle_deg is not None:
+        return "cross is an angle, got another one beside it"
+    if each.covers == "edge" and (each.lanes == "cross" or each.angle_deg is not None):
+        return "edge follows the walls, and has no lanes"
+    if each.covers == "edge" and each.overlap is not None:
+        return "edge has no lanes that could overlap"
+    return ""
 
 
 def read_pass(text: str) -> Pass:

@@ -76,7 +76,7 @@ class RecordedRun:
         """
         # The defaults are what releases did before these keys existed: they drove through cells,
         # along the axes of the map, and without a price for steps into other rooms.
-        config = without_removed(renamed(self.config))
+        config = without_removed(renamed(self.config))[0]
         mission = config.get("mission", {})
         if isinstance(mission, Mapping):
             config["mission"] = {"by_room": "never", **mission}

@@ -76,6 +76,5 @@ def is_chunk(text: str) -> bool:
 
 def _check_chunk(what: str, chunk: str) -> None:
     if not is_chunk(chunk):
-        raise BadConfiguration(
-            f"{what} must be chunks of letters, digits, '_' and '-', got {chunk!r}"
-        )
+        text = f"must be chunks of letters, digits, '_' and '-', got {chunk!r}"
+        raise BadConfiguration(text, key=what)

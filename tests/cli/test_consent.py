@@ -107,8 +107,8 @@ def test_a_keep_out_in_mid_mission_loses_nothing(robot):
     [
         (("add", "1,1;2,1;2,2"), 2, "the following arguments are required: --name"),
         (("add", "--name", "a", "-1,1", "2,1"), 2, "must be x,y;x,y;x,y;... in metres, got '-1,1"),
-        (("add", "--name", "a", "0,0;1,1;1,0;0,1"), 1, "keep_out.polygon crosses or touches"),
-        (("add", "--name", " a", "0,0;1,1;1,0"), 1, "keep_out.name must be 1..64 printable"),
+        (("add", "--name", "a", "0,0;1,1;1,0;0,1"), 1, "keep_out.polygon: crosses or touches"),
+        (("add", "--name", " a", "0,0;1,1;1,0"), 1, "keep_out.name: must be 1..64 printable"),
         (("remove",), 2, "the following arguments are required: NAME"),
         ((), 2, "the following arguments are required: COMMAND"),
     ],

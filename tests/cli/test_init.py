@@ -36,7 +36,7 @@ def test_it_has_nothing_in_it_but_what_differs_from_the_defaults(tmp_path, capsy
 
 def test_ros_and_a_router(tmp_path, capsys):
     file = tmp_path / "robot.yaml"
-    words = ["--robot-radius", "0.18", "--tool-width", "0.4", "--map-by", "rmw_zenoh"]
+    words = ["--robot-radius", "0,18", "--tool-width", "0.4", "--map-by", "rmw_zenoh"]
     words += ["--domain", "7", "--namespace", "/left", "--connect", "tcp/127.0.0.1:7447"]
     assert init(file, *words, "--json") == 0
     config = load_config(file)
@@ -102,7 +102,7 @@ def test_at_a_terminal_it_asks(tmp_path, typed):
 
 
 def test_a_typing_error_is_asked_for_again(tmp_path, typed, capsys):
-    typed("0,25\n25\n0.25\nO.3\n0.3\nzeno\nzenoh\n127.0.0.1:7447\ntcp/127.0.0.1:7447\n")
+    typed("O,25\n25\n0,25\nO.3\n0.3\nzeno\nzenoh\n127.0.0.1:7447\ntcp/127.0.0.1:7447\n")
     file = tmp_path / "robot.yaml"
     assert init(file) == 0
     config = load_config(file)
@@ -110,11 +110,11 @@ def test_a_typing_error_is_asked_for_again(tmp_path, typed, capsys):
     assert config.bus.connect == ("tcp/127.0.0.1:7447",)
     asked = capsys.readouterr().err
     for said in (
-        "must be a number, got '0,25'",
+        "must be a number such as 0.25, got 'O,25'",
         "robot.radius_m: expected float <= 10.0, got 25.0",
-        "must be a number, got 'O.3'",
+        "must be a number such as 0.25, got 'O.3'",
         "must be zenoh, rmw_zenoh, bridge, got 'zeno'",
-        "bus.connect: '127.0.0.1:7447': no protocol before the address (an endpoint is ",
+        "bus.connect[0]: '127.0.0.1:7447': no protocol before the address (an endpoint is ",
     ):
         assert f"  {said}" in asked
     assert asked.count("Radius of the disc") == 3

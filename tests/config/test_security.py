@@ -69,7 +69,7 @@ def test_endpoints_beyond_this_computer(tmp_path, endpoint):
     assert not is_local(endpoint)
     with pytest.raises(OpenToEveryone) as refused:
         load(tmp_path, listen=["tcp/127.0.0.1:7447", endpoint])
-    assert f"bus.listen: {endpoint} can be reached" in str(refused.value)
+    assert f"bus.listen[1]: {endpoint} can be reached" in str(refused.value)
     assert "bus.open_to_everyone: true" in refused.value.hint
     opened = load(tmp_path, listen=[endpoint], open_to_everyone=True)
     assert opened.bus.open_to_everyone
@@ -101,7 +101,7 @@ def test_an_invalid_endpoint_is_refused_before_opening(tmp_path, key, endpoint, 
     """Zenoh would try for ever to connect there, or refuse to listen without saying why."""
     with pytest.raises(BadConfiguration) as refused:
         load(tmp_path, **{"open_to_everyone": True, key: ["tcp/127.0.0.1:7447", endpoint]})
-    assert f"bus.{key}: {endpoint!r}: " in str(refused.value)
+    assert f"bus.{key}[1]: {endpoint!r}: " in str(refused.value)
     assert why in str(refused.value)
     assert "as tcp/192.168.1.5:7447" in refused.value.hint
 
@@ -156,14 +156,14 @@ def user(**more):
             {"security": {"kind": "user", "user": {**USER, "dictionary_file": ""}}},
             "user.dictionary_file: needed",
         ),
-        ({"security": tls()}, "bus.listen: tcp/127.0.0.1:7447: only tls/<host>:<port>"),
+        ({"security": tls()}, "bus.listen[0]: tcp/127.0.0.1:7447: only tls/<host>:<port>"),
         (
             {"listen": ["tls/0.0.0.0:1"], "connect": ["tcp/10.0.0.1:1"], "security": tls()},
-            "bus.connect: tcp/10.0.0.1:1: only tls/<host>:<port>",
+            "bus.connect[0]: tcp/10.0.0.1:1: only tls/<host>:<port>",
         ),
         (
             {"listen": ["tls/0.0.0.0:1"], "security": user()},
-            "bus.listen: tls/0.0.0.0:1: user and password",
+            "bus.listen[0]: tls/0.0.0.0:1: user and password",
         ),
         (
             {"listen": ["tls/0.0.0.0:1"], "security": tls(), "open_to_everyone": True},
@@ -174,7 +174,7 @@ def user(**more):
             "bus.security.roles.mapper: with bus.security.kind none there are no names",
         ),
         ({"security": {"kind": "tsl"}}, "bus.security.kind: expected none, tls or user"),
-        ({"security": {"roles": {"admin": []}}}, "unknown key bus.security.roles.admin"),
+        ({"security": {"roles": {"admin": []}}}, "bus.security.roles.admin: unknown key"),
         ({"security": {"roles": {"viewer": [""]}}}, "bus.security.roles.viewer[0]"),
         ({"security": {"limits": {"maps_hz": 0}}}, "bus.security.limits.maps_hz: expected float"),
         (
@@ -189,7 +189,7 @@ def user(**more):
 def test_conflicting_security_settings_are_refused(tmp_path, bus, said):
     with pytest.raises(BadConfiguration) as refused:
         load(tmp_path, **bus)
-    assert said in str(refused.value)
+    assert any(said in str(fault) for fault in (refused.value, *refused.value.rest))
 
 
 def test_a_file_that_is_missing_is_named(tmp_path):

@@ -11,7 +11,8 @@ import time
 import pytest
 
 from fasaco_edge.bus.session import open_bus
-from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon import supervisor
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, free_endpoint

@@ -266,7 +266,7 @@ def test_a_wrong_address_is_a_fault_with_its_line(tmp_path, listen, said):
     file.write_text(f"metrics:\n  listen: '{listen}'\n")
     config, faults = inspect_config(file)
     assert config is None
-    assert said in str(faults[0].error)
+    assert said in str(faults[0])
     assert faults[0].line == 2
     with pytest.raises(BadConfiguration, match=r"metrics\.listen"):
         MetricsConfig(listen=listen).address()

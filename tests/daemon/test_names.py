@@ -13,7 +13,8 @@ import zenoh
 from msgspec import convert
 
 from fasaco_edge.bus.claim import ClaimState, claims_in
-from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon.memory import needed_bytes
 from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level

@@ -12,7 +12,8 @@ import pytest
 import zenoh
 
 from fasaco_edge import __version__
-from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon.loop.answers import LEFT_OUT, config_document
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from fasaco_edge.wire.topics import RPC_NAMES

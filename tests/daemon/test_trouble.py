@@ -5,7 +5,8 @@ from __future__ import annotations
 import urllib.request
 from dataclasses import dataclass
 
-from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, NoDisk
 from fasaco_edge.daemon.loop.inbox import make_mailbox
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner

@@ -8,7 +8,8 @@ from contextlib import contextmanager
 
 import zenoh
 
-from fasaco_edge.config.config import BusConfig, DaemonConfig
+from fasaco_edge.config.config import DaemonConfig
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level
 from tests.daemon.test_mask_topic import AROUND, BLANK, MASK, driven

@@ -12,8 +12,9 @@ import pytest
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.config.config import BusConfig, DaemonConfig, MetricsConfig, MissionSettings
+from fasaco_edge.config.config import DaemonConfig, MetricsConfig, MissionSettings
 from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.config.security import BusConfig
 from fasaco_edge.doctor import computer, report, security, session
 from fasaco_edge.doctor.finding import Check, CheckContext, Finding, Level, Unit, find_unit
 from fasaco_edge.kernels import manifest

@@ -15,7 +15,7 @@ from fasaco_edge.host.plain_yaml import (
     MOST_DEPTH,
     MOST_VALUES,
     PlainYamlError,
-    load,
+    compose,
     read_bounded,
 )
 
@@ -31,13 +31,14 @@ LAUGHS = "a0: &a0 [lol,lol,lol,lol,lol,lol,lol,lol,lol,lol]\n" + "".join(
         ("a: 1\nb: [x, 1.5, true, null]", {"a": 1, "b": ["x", 1.5, True, None]}),
         ("a: &x [1]\nb: *x", {"a": [1], "b": [1]}),
         ("a: &x {k: 1}\nb: {<<: *x, l: 2}", {"a": {"k": 1}, "b": {"k": 1, "l": 2}}),
+        ("[5e-2, 1e7, -1E+3, 1e, a1e3]", [0.05, 1e7, -1e3, "1e", "a1e3"]),
         ("[" * MOST_DEPTH + "]" * MOST_DEPTH, None),
         ("[" + "1," * (MOST_VALUES - 1) + "]", None),
     ],
 )
 def test_common_yaml_is_read(text, value):
-    assert value is None or load(text) == value
-    load(text)
+    assert value is None or compose(text)[1] == value
+    compose(text)
 
 
 @pytest.mark.parametrize(
@@ -65,7 +66,7 @@ def test_common_yaml_is_read(text, value):
 )
 def test_other_yaml_is_refused_with_its_cause(text, said):
     with pytest.raises(PlainYamlError, match=r".*") as refused:
-        load(text)
+        compose(text)
     assert said in str(refused.value)
     assert len(str(refused.value)) < 1000
 
@@ -86,10 +87,10 @@ def test_a_billion_laughs_take_no_memory():
     """In a process of its own, with 200 MB more than it has: they stand for three gigabytes."""
     code = (
         "import resource, sys\n"
-        "from fasaco_edge.host.plain_yaml import PlainYamlError, load\n"
+        "from fasaco_edge.host.plain_yaml import PlainYamlError, compose\n"
         "size = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         "resource.setrlimit(resource.RLIMIT_AS, (size + 200_000_000,) * 2)\n"
-        "try:\n    load(sys.stdin.read())\n"
+        "try:\n    compose(sys.stdin.read())\n"
         "except PlainYamlError as error:\n    print(error)\n"
     )
     ended = subprocess.run(

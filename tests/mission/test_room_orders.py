@@ -364,9 +364,9 @@ def test_documents_are_read_as_they_were_written():
 @pytest.mark.parametrize(
     ("document", "said"),
     [
-        ({"command": "room_name"}, "room goes with room_name, room_split"),
-        ({"command": "pause", "room": {"id": 3}}, "room goes with room_name"),
-        ({"command": "room_name", "room": {}}, "room: missing member id"),
+        ({"command": "room_name"}, "room: goes with room_name, room_split"),
+        ({"command": "pause", "room": {"id": 3}}, "room: goes with room_name"),
+        ({"command": "room_name", "room": {}}, "room.id: missing"),
         ({"command": "room_name", "room": {"id": 0, "name": "a"}}, "room.id: expected"),
         ({"command": "room_name", "room": {"id": 3}}, "room.name: missing with room_name"),
         ({"command": "room_name", "room": {"id": 3, "skip": True}}, "room.skip: does not go with"),
@@ -380,10 +380,13 @@ def test_documents_are_read_as_they_were_written():
             "room.cut: must be finite",
         ),
         ({"command": "room_merge", "room": {"id": 3, "name": "a"}}, "room.others: missing"),
-        ({"command": "room_set", "room": {"id": 3}}, "room.passes or priority or skip: missing"),
+        ({"command": "room_set", "room": {"id": 3}}, "room: passes or priority or skip is missing"),
         ({"command": "room_set", "room": {"id": 3, "passes": 0}}, "room.passes: expected"),
         ({"command": "room_set", "room": {"id": 3, "passes": ["rest"]}}, "rest goes after an edge"),
-        ({"command": "start", "order": {"unknown": "ask"}}, "order.unknown: expected refuse, wait"),
+        (
+            {"command": "start", "order": {"unknown": "ask"}},
+            "order.unknown: expected refuse or wait",
+        ),
     ],
 )
 def test_a_wrong_member_of_a_request_is_named(document, said):

@@ -98,7 +98,7 @@ def test_a_map_does_not_follow_the_array_it_came_from():
         ({"end": "nowhere"}, BadConfiguration, r"home or a cell \(row, col\), got nowhere"),
         ({"start": (-90, 0)}, StartOutsideMap, "is outside the map"),
         ({"start_xy": (-3.5, -3.5)}, StartBlocked, "does not fit"),
-        ({"search": fe.Search(ants=0)}, BadConfiguration, "ants must be in"),
+        ({"search": fe.Search(ants=0)}, BadConfiguration, "ants: must be in"),
     ],
 )
 def test_a_plan_says_what_is_wrong_with_it(options, error, said):

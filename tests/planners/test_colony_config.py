@@ -13,22 +13,22 @@ from fasaco_edge.planners.paper.colony import ColonyConfig, parse_velocities
 @pytest.mark.parametrize(
     ("given_values", "message"),
     [
-        ({"velocities": ()}, "velocities must name at least one, got ()"),
-        ({"velocities": (4, 0)}, "velocities must be in 1..64, got 0"),
-        ({"velocities": (65,)}, "velocities must be in 1..64, got 65"),
-        ({"ants": 7}, "ants must be in 8..1000000, one for each cohort at least, got 7"),
-        ({"ants": 1_000_001}, "ants must be in 8..1000000, .* got 1000001"),
-        ({"q0": 1.5}, r"q0 must be in \[0, 1\], got 1.5"),
-        ({"q0": float("nan")}, r"q0 must be in \[0, 1\], got nan"),
-        ({"alpha": 0.0}, r"alpha must be in \(0, 1\], got 0.0"),
-        ({"alpha": 1.1}, r"alpha must be in \(0, 1\], got 1.1"),
-        ({"alpha": float("nan")}, r"alpha must be in \(0, 1\], got nan"),
-        ({"tau0": 0.0}, r"tau0 must be in \[1e-12, 1e6\], got 0.0"),
-        ({"tau0": float("inf")}, r"tau0 must be in \[1e-12, 1e6\], got inf"),
-        ({"visibility": "far"}, "visibility must be one of neighbour, .*, got 'far'"),
-        ({"beta": -1.0}, r"beta must be in \[0, 10\], got -1.0"),
-        ({"seed": -1}, r"seed must be in 0..2\^63 - 1, got -1"),
-        ({"seed": 2**63}, r"seed must be in 0..2\^63 - 1, got 9223372036854775808"),
+        ({"velocities": ()}, "velocities: must name at least one, got ()"),
+        ({"velocities": (4, 0)}, "velocities: must be in 1..64, got 0"),
+        ({"velocities": (65,)}, "velocities: must be in 1..64, got 65"),
+        ({"ants": 7}, "ants: must be in 8..1000000, one for each cohort at least, got 7"),
+        ({"ants": 1_000_001}, "ants: must be in 8..1000000, .* got 1000001"),
+        ({"q0": 1.5}, r"q0: must be in \[0, 1\], got 1.5"),
+        ({"q0": float("nan")}, r"q0: must be in \[0, 1\], got nan"),
+        ({"alpha": 0.0}, r"alpha: must be in \(0, 1\], got 0.0"),
+        ({"alpha": 1.1}, r"alpha: must be in \(0, 1\], got 1.1"),
+        ({"alpha": float("nan")}, r"alpha: must be in \(0, 1\], got nan"),
+        ({"tau0": 0.0}, r"tau0: must be in \[1e-12, 1e6\], got 0.0"),
+        ({"tau0": float("inf")}, r"tau0: must be in \[1e-12, 1e6\], got inf"),
+        ({"visibility": "far"}, "visibility: must be one of neighbour, .*, got 'far'"),
+        ({"beta": -1.0}, r"beta: must be in \[0, 10\], got -1.0"),
+        ({"seed": -1}, r"seed: must be in 0..2\^63 - 1, got -1"),
+        ({"seed": 2**63}, r"seed: must be in 0..2\^63 - 1, got 9223372036854775808"),
     ],
     ids=str,
 )
@@ -78,10 +78,10 @@ def test_velocities_from_text(text, velocities):
 def test_a_text_that_names_no_velocities_is_quoted(text):
     with pytest.raises(BadConfiguration) as caught:
         parse_velocities(text)
-    assert str(caught.value) == f"velocities must look like 8:1, 1:8, 4 or 8,4,1, got {text!r}"
+    assert str(caught.value) == f"velocities: must look like 8:1, 1:8, 4 or 8,4,1, got {text!r}"
 
 
 @pytest.mark.parametrize("text", ["0", "0:8", "8:0", "-1:3", "1:65", "8,65,1", "1:10000000000"])
 def test_velocities_out_of_range_are_refused(text):
-    with pytest.raises(BadConfiguration, match=r"velocities must be in 1\.\.64, got"):
+    with pytest.raises(BadConfiguration, match=r"velocities: must be in 1\.\.64, got"):
         parse_velocities(text)

@@ -100,15 +100,15 @@ def test_a_robot_s_cost_is_in_whole_microseconds():
 @pytest.mark.parametrize(
     ("step_s", "quarter_turn_s", "said"),
     [
-        (0.0, 0.0, "step_s must be in [0.001, 3600] s, got 0.0"),
-        (-1.0, 0.0, "step_s must be in [0.001, 3600] s, got -1.0"),
-        (1e-4, 0.0, "step_s must be in [0.001, 3600] s, got 0.0001"),
-        (3601.0, 0.0, "step_s must be in [0.001, 3600] s, got 3601.0"),
-        (math.inf, 0.0, "step_s must be in [0.001, 3600] s, got inf"),
-        (math.nan, 0.0, "step_s must be in [0.001, 3600] s, got nan"),
-        (1.0, -0.1, "quarter_turn_s must be in [0, 3600] s, got -0.1"),
-        (1.0, math.inf, "quarter_turn_s must be in [0, 3600] s, got inf"),
-        (1.0, math.nan, "quarter_turn_s must be in [0, 3600] s, got nan"),
+        (0.0, 0.0, "step_s: must be in [0.001, 3600] s, got 0.0"),
+        (-1.0, 0.0, "step_s: must be in [0.001, 3600] s, got -1.0"),
+        (1e-4, 0.0, "step_s: must be in [0.001, 3600] s, got 0.0001"),
+        (3601.0, 0.0, "step_s: must be in [0.001, 3600] s, got 3601.0"),
+        (math.inf, 0.0, "step_s: must be in [0.001, 3600] s, got inf"),
+        (math.nan, 0.0, "step_s: must be in [0.001, 3600] s, got nan"),
+        (1.0, -0.1, "quarter_turn_s: must be in [0, 3600] s, got -0.1"),
+        (1.0, math.inf, "quarter_turn_s: must be in [0, 3600] s, got inf"),
+        (1.0, math.nan, "quarter_turn_s: must be in [0, 3600] s, got nan"),
     ],
 )
 def test_an_impossible_cost_is_refused(step_s, quarter_turn_s, said):
@@ -120,13 +120,13 @@ def test_an_impossible_cost_is_refused(step_s, quarter_turn_s, said):
 @pytest.mark.parametrize(
     ("cell_m", "speed_m_s", "said"),
     [
-        (0.3, 0.0, "speed_m_s must be in"),
-        (0.3, -0.2, "speed_m_s must be in"),
-        (0.3, math.nan, "speed_m_s must be in"),
-        (0.3, math.inf, "speed_m_s must be in"),
-        (0.0, 0.3, "cell_m must be in"),
-        (math.nan, 0.3, "cell_m must be in"),
-        (10.0, 0.001, r"cell_m / speed_m_s must be in \[0.001, 3600\] s, got 10000.0"),
+        (0.3, 0.0, "speed_m_s: must be in"),
+        (0.3, -0.2, "speed_m_s: must be in"),
+        (0.3, math.nan, "speed_m_s: must be in"),
+        (0.3, math.inf, "speed_m_s: must be in"),
+        (0.0, 0.3, "cell_m: must be in"),
+        (math.nan, 0.3, "cell_m: must be in"),
+        (10.0, 0.001, r"cell_m / speed_m_s: must be in \[0.001, 3600\] s, got 10000.0"),
     ],
 )
 def test_a_robot_that_cannot_be_is_refused(cell_m, speed_m_s, said):

@@ -73,8 +73,8 @@ def test_a_cross_pass_lies_across_the_last_lanes(passes, lie):
 @pytest.mark.parametrize(
     ("passes", "said"),
     [
-        ([], "passes must be 1 to 100, got 0"),
-        ([Pass()] * 101, "passes must be 1 to 100, got 101"),
+        ([], "passes: must be 1 to 100, got 0"),
+        ([Pass()] * 101, "passes: must be 1 to 100, got 101"),
         ([Pass(lanes="cross")], r"passes\[0\]: cross goes after a pass with lanes"),
         ([Pass("edge"), Pass(lanes="cross")], r"passes\[1\]: cross goes after a pass with lanes"),
         ([Pass("rest")], r"passes\[0\]: rest goes after an edge"),

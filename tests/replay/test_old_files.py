@@ -152,7 +152,7 @@ def test_a_recording_names_the_planner_of_its_mission(recording, capsys):
 
 def test_a_configuration_is_read_but_for_a_removed_key(tmp_path):
     old, path = DATA / "config.yaml", tmp_path / "config.yaml"
-    with pytest.raises(BadConfiguration, match=r"line 23: planner\.local_search was removed"):
+    with pytest.raises(BadConfiguration, match=r"line 23: planner\.local_search: was removed"):
         load_config(old)
     text = old.read_text(encoding="utf-8")
     path.write_text(text.replace("name: fasaco, local_search: true", "name: colony-search"))

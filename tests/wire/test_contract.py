@@ -85,7 +85,7 @@ def test_names_that_are_no_chunk_are_refused(name: str) -> None:
             make()
     for base in (f"{name}/fasaco", f"fasaco/{name}"):
         if name != "a/b":
-            with pytest.raises(BadConfiguration, match="base must be"):
+            with pytest.raises(BadConfiguration, match="base: must be"):
                 Keys(base=base)
 
 

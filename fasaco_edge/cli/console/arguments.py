@@ -193,7 +193,7 @@ def _client(name: str, connect: tuple[str, ...], security_file: str | None) -> B
     from fasaco_edge.config.endpoints import endpoint_faults
 
     for fault in endpoint_faults(name, connect):
-        raise fault
+        raise BadConfiguration(f"{name}: {fault.what}", hint=fault.hint)
     if security_file is None:
         return BusSettings("client", connect)
     from fasaco_edge.config.security import read_client_security

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
 
-from fasaco_edge.errors import FasacoError
+from fasaco_edge.errors import DocumentError, FasacoError
 from fasaco_edge.text import lines, one_line
 
 PERIOD_S = 10.0
@@ -141,15 +141,17 @@ def begin_logging(level: str) -> None:
 
 
 def report_error(error: FasacoError) -> None:
-    """Print or log the reason of a command's failure, with its hint."""
+    """Print or log the reason of a command's failure, or all of a document, with the hints."""
+    rest = error.rest if isinstance(error, DocumentError) else ()
     if is_journal():
-        text = f"{error} ({error.hint})" if error.hint else str(error)
-        LOG.error("%s", text, extra={"event": "failure", "code": error.code})
+        for fault in (error, *rest):
+            text = f"{fault} ({fault.hint})" if fault.hint else str(fault)
+            LOG.error("%s", text, extra={"event": "failure", "code": fault.code})
         return
     # Further lines of a message are indented more than the hint, so that none looks like a hint.
-    print("fasaco-edge:", _indented(str(error)), file=sys.stderr)
-    if error.hint:
-        print("  hint:", _indented(error.hint), file=sys.stderr)
+    print("fasaco-edge:", _indented("\n".join(map(str, (error, *rest)))), file=sys.stderr)
+    for hint in filter(None, dict.fromkeys(fault.hint for fault in (error, *rest))):
+        print("  hint:", _indented(hint), file=sys.stderr)
 
 
 def _indented(text: str) -> str:

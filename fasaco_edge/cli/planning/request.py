@@ -15,9 +15,9 @@ import msgspec
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
-from fasaco_edge.config.reading import section_faults
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.documents import inspected
 from fasaco_edge.offline.settings import CELLS, LIKE_OWN, Search, default_line
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.planner import SearchProgress
@@ -119,10 +119,9 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
     if config is None and line == CELLS:
         robot = msgspec.structs.replace(robot, quarter_turn_s=0.0)  # as in the paper
     changes = _given(args, ROBOT_OPTIONS)
-    for fault in section_faults(RobotConfig, changes):
+    for fault in inspected(RobotConfig, changes, BadConfiguration)[1]:
         option = next(name for name, member in ROBOT_OPTIONS.items() if member == fault.key)
-        text = str(fault.error).removeprefix(fault.key)
-        raise BadConfiguration(f"--{option.replace('_', '-')}{text}")
+        raise BadConfiguration(fault.what, key=f"--{option.replace('_', '-')}")
     if args.turn_s is not None:
         changes["turn_deg_s"] = None
     if args.forward_only:

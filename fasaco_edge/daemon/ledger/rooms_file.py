@@ -46,8 +46,8 @@ from fasaco_edge.mission.map.room_book import (
     RoomSheet,
 )
 from fasaco_edge.mission.map.room_raster import MOST_SQUARES, RoomRaster
-from fasaco_edge.mission.orders.keep_outs import PlaceName, check_name
-from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_of
+from fasaco_edge.mission.orders.keep_outs import PlaceName, name_faults
+from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_faults, passes_of
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY, Priority
 
 MOST_BYTES = 16_000_000
@@ -201,14 +201,14 @@ def _numbers(raster: RoomRaster) -> set[int]:
 
 
 def _room(note: RoomNote) -> Room:
-    if note.name is not None:
-        check_name("name", note.name)
-        if LIKE_NUMBER.fullmatch(note.name):
-            raise ValueError(f"{note.name!r} is no name")
+    for fault in (*name_faults(note.name or ""), *passes_faults(note.passes)):
+        raise fault
+    if note.name is not None and LIKE_NUMBER.fullmatch(note.name):
+        raise ValueError(f"{note.name!r} is no name")
     if len(note.outline) in (1, 2):
         raise ValueError("an outline has three corners or more")
     _check_finite([note.area_m2])
-    passes, kinds = (None, ()) if note.passes is None else passes_of(note.passes, "passes")
+    passes, kinds = (None, ()) if note.passes is None else passes_of(note.passes)
     settings = RoomSettings(passes, kinds, note.skip, note.priority)
     outline: Sequence[Point] = note.outline
     return Room(

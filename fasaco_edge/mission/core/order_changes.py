@@ -111,12 +111,14 @@ class OrderChanges:
         usual = self.config.speed_m_s
         if usual and fastest > usual:
             raise OrderError(
-                f"passes: speed_m_s: expected at most robot.speed_m_s, {usual:g}, got {fastest:g}"
+                f"speed_m_s: expected at most robot.speed_m_s, {usual:g}, got {fastest:g}",
+                key="passes",
             )
         for name in () if self.is_alone else ("angle_deg", "overlap"):
             if any(getattr(kind, name) is not None for kind in kinds):
                 raise OrderError(
-                    f"passes: {name} is for a robot alone; robots of a fleet share cells",
+                    f"{name} is for a robot alone; robots of a fleet share cells",
+                    key="passes",
                     hint=f"leave {name} out: auto and cross run along the cells",
                 )
 

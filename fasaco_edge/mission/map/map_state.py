@@ -328,8 +328,9 @@ class MapState(Ground):
             x0, y0, x1, y1 = polygon_bounds(zone.polygon) if zone.polygon else whole
             if x1 <= west or x0 >= east or y1 <= south or y0 >= north:
                 raise OrderError(
-                    f"zones[{index}].polygon: zone {zone.name!r} lies outside of the map, "
-                    f"x {west:.2f}..{east:.2f} m, y {south:.2f}..{north:.2f} m"
+                    f"zone {zone.name!r} lies outside of the map, "
+                    f"x {west:.2f}..{east:.2f} m, y {south:.2f}..{north:.2f} m",
+                    key=f"zones[{index}].polygon",
                 )
 
     def coverage(self, ledger: MissionLedger, known: NDArray[np.bool_]) -> Coverage | None:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.mission.map.room_raster import Cut, RoomRaster
-from fasaco_edge.mission.orders.keep_outs import check_name
+from fasaco_edge.mission.orders.keep_outs import name_faults
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
 from fasaco_edge.planners.passes import Pass
 
@@ -232,7 +232,8 @@ class RoomBook:
         room = self.find(called)
         if room is None:
             raise OrderError(
-                f"room.id: there is no room {called!r}; {self.listed()}",
+                f"there is no room {called!r}; {self.listed()}",
+                key="room.id",
                 hint="name one of those, or its number",
             )
         return room
@@ -264,17 +265,20 @@ class RoomBook:
         Raises:
             OrderError: it is no valid name, or another room has it.
         """
-        check_name(where, name)
+        for fault in name_faults(name, where):
+            raise fault
         if LIKE_NUMBER.fullmatch(name):
             raise OrderError(
-                f"{where}: {name!r} would be read as the number of a room",
+                f"{name!r} would be read as the number of a room",
                 hint="choose a name that is more than a number",
+                key=where,
             )
         taken = self.find(name)
         if taken is not None and taken.id not in of:
             raise OrderError(
-                f"{where}: room {taken.id} is {name!r} already",
+                f"room {taken.id} is {name!r} already",
                 hint="choose another name, or give that room another one first",
+                key=where,
             )
 
     def set(self, called: str | int, settings: RoomSettings) -> None:

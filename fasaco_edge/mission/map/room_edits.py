@@ -32,7 +32,7 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
     """
     room, sheet = book.room(called), _sheet(book)
     if len(sheet.cuts) >= MOST_CUTS:
-        raise OrderError(f"room.cut: there are {MOST_CUTS} already", hint="merge rooms first")
+        raise OrderError(f"there are {MOST_CUTS} already", hint="merge rooms first", key="room.cut")
     window, mask = sheet.raster.squares(room.id)
     near = is_cut(window, sheet.raster.square_m, cut)
     inside = _part_at(mask, mask & near)
@@ -41,11 +41,12 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
     parts = [number for number, squares in enumerate(areas.cells.tolist(), 1) if squares >= least]
     if len(parts) < 2:
         raise OrderError(
-            f"room.cut: does not divide {room.title!r} into parts of {LEAST_M2:g} m2 or more",
+            f"does not divide {room.title!r} into parts of {LEAST_M2:g} m2 or more",
+            key="room.cut",
             hint="draw it from wall to wall, across the whole room",
         )
     if book.numbers_left < len(parts) - 1:
-        raise OrderError("room.cut: there are too many rooms", hint="merge some first")
+        raise OrderError("there are too many rooms", hint="merge some first", key="room.cut")
     parts.sort(key=lambda number: (-areas.cells[number - 1], number))
     ids = np.zeros(mask.shape, np.uint16)
     numbers = [room.id, *(book.new_id() for _ in parts[1:])]
@@ -74,13 +75,16 @@ def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
     sheet = _sheet(book) if book.sheet else None
     rooms = [room for _, room in sorted({each.id: each for each in map(book.room, called)}.items())]
     if len(rooms) < 2 or sheet is None:
-        raise OrderError("room.others: a merge takes two rooms or more", hint="name another room")
+        raise OrderError(
+            "a merge takes two rooms or more", hint="name another room", key="room.others"
+        )
     numbers = [room.id for room in rooms]
     if name:
         book.check_name("room.name", name, *numbers)
     if apart := _apart(rooms):
         raise OrderError(
-            f"room.others: {apart.title!r} is not joined to the others",
+            f"{apart.title!r} is not joined to the others",
+            key="room.others",
             hint="merge rooms that have a passage to each other; add the room between them",
         )
     stays = rooms[0]

@@ -7,16 +7,16 @@ the order.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
+from fasaco_edge.host.documents import Document
 
 # Limits on the places of an order, as it is part of the ledger, which is written once a second.
 MOST_KEEP_OUT = 100
@@ -31,11 +31,15 @@ Corners = Annotated[
 PlaceName = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 
 
-class KeepOutDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class KeepOutDocument(Document, frozen=True):
     """A keep-out of the operator; a request to remove it has no polygon."""
 
     name: PlaceName
     polygon: Corners | None = None
+
+    def faults(self) -> Iterator[OrderError]:
+        yield from name_faults(self.name)
+        yield from polygon_faults({"polygon": tuple(self.polygon)} if self.polygon else {})
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,15 +59,8 @@ KeepOuts = tuple[KeepOut, ...]
 
 
 def keep_out_of(document: KeepOutDocument) -> KeepOut:
-    """Return the keep-out in a document.
-
-    Raises:
-        OrderError: a member is wrong; the text names it.
-    """
-    check_name("keep_out.name", document.name)
-    polygon = tuple(document.polygon or ())
-    check_polygons({"keep_out.polygon": polygon} if polygon else {})
-    return KeepOut(document.name, polygon)
+    """Return the keep-out in a document."""
+    return KeepOut(document.name, tuple(document.polygon or ()))
 
 
 def keep_out_document(keep_out: KeepOut) -> dict[str, object]:
@@ -82,7 +79,8 @@ def added(keep_outs: KeepOuts, new: KeepOut) -> KeepOuts:
         return keep_outs
     if any(new.name == known.name for known in keep_outs):
         raise OrderError(
-            f"keep_out.name: there is a keep-out {new.name!r} already, with other corners",
+            f"there is a keep-out {new.name!r} already, with other corners",
+            key="keep_out.name",
             hint="give it another name, or remove that one first",
         )
     together = (*keep_outs, new)
@@ -110,41 +108,33 @@ def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
         names = ", ".join(repr(known.name) for known in keep_outs)
         there = f"there are {names:.400}" if names else "there are none"
         raise OrderError(
-            f"keep_out.name: no keep-out {unwanted.name!r} was added; {there}",
+            f"no keep-out {unwanted.name!r} was added; {there}",
+            key="keep_out.name",
             hint="name one of those; keep-outs of an order end with it, and those of the "
             "configuration are changed there",
         )
     return rest
 
 
-def check_name(where: str, name: str) -> None:
-    """Check the name of a place.
-
-    Raises:
-        OrderError: it has unprintable characters, or spaces at an end.
-    """
-    if not (name.isprintable() and name.strip() == name):
-        raise OrderError(
-            f"{where} must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
-        )
+def name_faults(name: str, key: str = "name") -> Iterator[OrderError]:
+    """Yield unprintable characters and spaces at an end of a place's name; "" has none."""
+    if name and not (name.isprintable() and name.strip() == name):
+        text = f"must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
+        yield OrderError(text, key=key)
 
 
-def check_polygons(polygons: Mapping[str, Polygon]) -> None:
-    """Check polygons, each under the name of its member, beyond their types.
-
-    Raises:
-        OrderError: a polygon is wrong; the text names its member.
-    """
+def polygon_faults(polygons: Mapping[str, Polygon]) -> Iterator[OrderError]:
+    """Yield the first fault of each polygon beyond its type; all have too many points, or each."""
     points = sum(map(len, polygons.values()))
     if points > MOST_POINTS_IN_ALL:
-        raise OrderError(f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}")
-    for where, polygon in polygons.items():
-        for index, (x, y) in enumerate(polygon):
-            # A negated comparison, so that NaN is caught too.
-            if not math.hypot(x, y) <= FARTHEST_M:
-                raise OrderError(
-                    f"{where}[{index}] must be finite and within {FARTHEST_M:g} m of 0, "
-                    f"got ({x}, {y})"
-                )
-        if why := polygon_flaw(polygon):
-            raise OrderError(f"{where} {why}")
+        text = f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}"
+        yield OrderError(text, others=list(polygons))
+        return
+    for key, polygon in polygons.items():
+        # A negated comparison, so that NaN is caught too.
+        far = (at for at, (x, y) in enumerate(polygon) if not math.hypot(x, y) <= FARTHEST_M)
+        if (index := next(far, None)) is not None:
+            text = f"must be finite and within {FARTHEST_M:g} m of 0, got {polygon[index]}"
+            yield OrderError(text, key=f"{key}[{index}]")
+        elif why := polygon_flaw(polygon):
+            yield OrderError(why, key=key)

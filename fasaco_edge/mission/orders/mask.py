@@ -28,6 +28,8 @@ MOST_RECTANGLES = 2_000
 MOST_COLS = 100_000
 # Prefix of a mask stored in the configuration itself: a replay has no file.
 INLINE = "mask:"
+# Key of the mask in a configuration.
+MASK = "mission.keep_out_mask"
 
 
 class _Inline(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -53,10 +55,12 @@ def inline_mask(file: Path, occupied_at_least: int, most_bytes: int | None = Non
         _check_width(place.cols)
         # Stripes are packed separately, so each has a multiple of 8 rows.
         packed = [np.packbits(stripe >= occupied_at_least) for stripe in stripes]
-    except (MapFileError, ValueError) as error:
-        hint = getattr(error, "hint", "")
-        raise BadConfiguration(f"mission.keep_out_mask: {error}", hint=hint) from error
-    return _inline(place, np.concatenate(packed), f"mission.keep_out_mask: {file}")
+    except MapFileError as error:
+        text = "; ".join(str(each) for each in (error, *error.rest))
+        raise BadConfiguration(text, hint=error.hint, key=MASK) from error
+    except ValueError as error:
+        raise BadConfiguration(str(error), key=MASK) from error
+    return _inline(place, np.concatenate(packed), MASK)
 
 
 def inline_grid(grid: OccupancyGrid, occupied_at_least: int) -> str:
@@ -69,7 +73,7 @@ def inline_grid(grid: OccupancyGrid, occupied_at_least: int) -> str:
     try:
         _check_width(place.cols)
     except ValueError as error:
-        raise BadConfiguration(f"keep_out_mask: {error}") from error
+        raise BadConfiguration(str(error), key="keep_out_mask") from error
     bits = np.packbits(grid.cells >= occupied_at_least)
     return _inline(place, bits, "keep_out_mask", grid.frame)
 
@@ -79,11 +83,12 @@ def mask_frame(inline: str) -> str:
     return msgspec.json.decode(inline.removeprefix(INLINE), type=_Inline).frame if inline else ""
 
 
-def _inline(place: GridGeometry, bits: NDArray[np.uint8], what: str, frame: str = "") -> str:
+def _inline(place: GridGeometry, bits: NDArray[np.uint8], key: str, frame: str = "") -> str:
     shape = (place.rows, place.cols)
     if len(_rectangles(bits, *shape)) > MOST_RECTANGLES:
         raise BadConfiguration(
-            f"{what}: its outlines take more than {MOST_RECTANGLES} rectangles",
+            f"its outlines take more than {MOST_RECTANGLES} rectangles",
+            key=key,
             hint="draw with straight edges, or larger pixels; or give mission.keep_out polygons",
         )
     deflated = base64.b64encode(zlib.compress(bits.data, 9)).decode()
@@ -117,7 +122,7 @@ def mask_polygons(inline: str) -> tuple[Polygon, ...]:
         if len(rectangles) > MOST_RECTANGLES:
             raise ValueError(f"more than {MOST_RECTANGLES} rectangles")
     except (msgspec.DecodeError, binascii.Error, zlib.error, ValueError) as error:
-        raise BadConfiguration(f"mission.keep_out_mask: not a mask: {error}") from error
+        raise BadConfiguration(f"not a mask: {error}", key=MASK) from error
     geometry = GridGeometry(rows, cols, resolution, Pose2D(x, y, yaw))
     return tuple(
         tuple(

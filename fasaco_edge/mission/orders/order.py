@@ -5,32 +5,32 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Annotated, Literal, NamedTuple, TypeVar, get_args
+from typing import Annotated, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
-from fasaco_edge.grid.geometry import Polygon
+from fasaco_edge.grid.geometry import Point, Polygon
+from fasaco_edge.host.documents import Document, converted
 from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     Corners,
     KeepOut,
     PlaceName,
-    check_name,
-    check_polygons,
+    name_faults,
+    polygon_faults,
 )
-from fasaco_edge.mission.orders.passes import Passes, PassWord, passes_document, passes_of
+from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_faults, passes_of
 from fasaco_edge.mission.orders.room_requests import (
     USUAL_PRIORITY,
     Priority,
     RoomNumber,
     RoomRequest,
 )
-from fasaco_edge.planners.passes import Covers, Direction, Laid, Pass, laid
-from fasaco_edge.text import misfit, nearest, objects_of
+from fasaco_edge.planners.passes import Laid, Pass, laid
 
 MOST_ZONES = 100
 Minutes = Annotated[float, Meta(ge=0, le=1440)]
@@ -165,10 +165,6 @@ class Command(NamedTuple):
     room: RoomRequest | None = None
 
 
-class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A document without unknown members."""
-
-
 class StandingZone(Document, frozen=True):
     """A zone of the configuration, referred to by its name."""
 
@@ -191,6 +187,13 @@ class ZoneDocument(Document, frozen=True):
     room: RoomNumber | None = None
     priority: Priority | None = None
 
+    def faults(self) -> Iterator[OrderError]:
+        yield from passes_faults(self.passes)
+
+
+_Zones = Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)]
+_KeepOuts = Annotated[list[Corners], Meta(max_length=MOST_KEEP_OUT)]
+
 
 class OrderDocument(Document, frozen=True):
     """What to cover. Without zones: everything the robot can reach.
@@ -204,23 +207,35 @@ class OrderDocument(Document, frozen=True):
             null for `mission.until_min` of the configuration.
     """
 
-    zones: Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)] = []
-    keep_out: Annotated[list[Corners], Meta(max_length=MOST_KEEP_OUT)] = []
+    zones: _Zones = msgspec.field(default_factory=list)
+    keep_out: _KeepOuts = msgspec.field(default_factory=list)
     passes: Passes | None = None
     return_home: bool = False
     keep_covered: bool = False
     unknown: Unknown = "refuse"
     until_min: Minutes | None = None
 
+    def faults(self) -> Iterator[OrderError]:
+        yield from passes_faults(self.passes)
+        yield from place_faults(self.zones, self.keep_out)
 
-_Read = TypeVar("_Read", bound=Document)
-# The allowed words of members other than ``command``.
-_WORDS: dict[str, object] = {
-    "passes": PassWord,
-    "covers": Covers,
-    "lanes": Direction,
-    "unknown": Unknown,
-}
+
+def place_faults(
+    zones: Sequence[ZoneDocument | StandingZone], keep_out: Sequence[Sequence[Point]]
+) -> Iterator[OrderError]:
+    """Yield wrong and equal names of zones, and wrong polygons."""
+    polygons = {f"keep_out[{at}]": tuple(each) for at, each in enumerate(keep_out) if each}
+    names: set[str] = set()
+    for index, zone in enumerate(zones):
+        if not zone:
+            continue
+        yield from name_faults(zone.name, key := f"zones[{index}].name")
+        if zone.name and zone.name in names:
+            yield OrderError(f"there is a zone {zone.name!r} already", key=key)
+        names.add(zone.name)
+        if zone.polygon:
+            polygons[f"zones[{index}].polygon"] = tuple(zone.polygon)
+    yield from polygon_faults(polygons)
 
 
 def read_order(document: object) -> MissionOrder:
@@ -229,7 +244,7 @@ def read_order(document: object) -> MissionOrder:
     Raises:
         OrderError: a member is wrong; the text names it, the expected and the given value.
     """
-    return order_of(converted(document if document is not None else {}, OrderDocument))
+    return order_of(converted(OrderDocument, {} if document is None else document, OrderError))
 
 
 def order_document(order: MissionOrder) -> dict[str, object]:
@@ -258,24 +273,20 @@ def _zone_document(zone: Zone) -> dict[str, object]:
 
 
 def order_of(document: OrderDocument) -> MissionOrder:
-    """Return the order in a document.
-
-    Raises:
-        OrderError: a member is wrong; the text names it, and what is allowed.
-    """
-    usual, is_usual = passes_of(document.passes or 1, "passes"), document.passes is None
+    """Return the order in a document without faults."""
+    usual, is_usual = passes_of(document.passes or 1), document.passes is None
     zones = tuple(
         Zone(
             zone.name,
             tuple(zone.polygon or ()),
-            *(passes_of(zone.passes, f"zones[{index}].passes") if zone.passes else usual),
+            *(passes_of(zone.passes) if zone.passes else usual),
             room=zone.room or 0,
             priority=zone.priority,
             is_as_usual=is_usual and zone.passes is None,
         )
-        for index, zone in enumerate(document.zones)
+        for zone in document.zones
     )
-    order = MissionOrder(
+    return MissionOrder(
         zones or (Zone(EVERYTHING, None, *usual),),
         tuple(map(tuple, document.keep_out)),
         document.return_home,
@@ -283,55 +294,3 @@ def order_of(document: OrderDocument) -> MissionOrder:
         document.unknown,
         document.until_min,
     )
-    # Checks beyond types that need no map.
-    names = [zone.name for zone in order.zones]
-    for index, name in enumerate(names):
-        where = f"zones[{index}].name"
-        check_name(where, name)
-        if name in names[:index]:
-            raise OrderError(f"{where}: there is a zone {name!r} already")
-    polygons = {
-        f"zones[{index}].polygon": zone.polygon
-        for index, zone in enumerate(order.zones)
-        if zone.polygon
-    } | {f"keep_out[{index}]": polygon for index, polygon in enumerate(order.keep_out)}
-    check_polygons(polygons)
-    return order
-
-
-def converted(document: object, kind: type[_Read]) -> _Read:
-    """Return a parsed document as a typed one.
-
-    Raises:
-        OrderError: a member is wrong; the text names it, the expected and the given value.
-    """
-    try:
-        return msgspec.convert(document, kind)
-    except msgspec.ValidationError as error:
-        raise OrderError(_explained(str(error), document, kind)) from error
-
-
-def _members(kind: type[msgspec.Struct], where: str) -> list[str]:
-    """Return the members of the object at ``where`` in a document."""
-    for name in re.findall(r"[a-z_]+", where):
-        types = {field.encode_name: field.type for field in msgspec.structs.fields(kind)}
-        kind = next(objects_of(types[name], 6))
-    return [field.encode_name for field in msgspec.structs.fields(kind)]
-
-
-def _explained(message: str, document: object, whole: type[Document]) -> str:
-    """Turn ``Expected `int` >= 1 - at `$.passes``` into member, expectation and value."""
-    where, what, value = misfit(message, document)
-    where = where.lstrip(".")
-    if match := re.fullmatch(r"object (contains unknown|missing required) field (.*)", what):
-        of = where or "the order"
-        if match[1] == "missing required":
-            return f"{of}: missing member {match[2]}"
-        names = _members(whole, where)
-        near = nearest(match[2], names)
-        meant = f"did you mean {near[0]}?" if near else f"there are {', '.join(names)}"
-        return f"{of}: unknown member {match[2]}; {meant}"
-    if what.startswith("invalid enum value"):
-        member = re.sub(r"\[\d+\]$", "", where).rpartition(".")[2]
-        what = f"expected {', '.join(get_args(_WORDS.get(member, CommandName)))}"
-    return f"{where or 'the order'}: {what}, got {value!r:.60}"

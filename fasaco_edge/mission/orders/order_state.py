@@ -12,6 +12,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import CommandError, OrderError
+from fasaco_edge.host.documents import misfits
 from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     KeepOutDocument,
@@ -199,6 +200,8 @@ class OrderState(OrderProgress):
             raise OrderError(
                 f"the order kept with the ledger cannot be read: {error}", hint=_START_AGAIN
             ) from error
+        for fault in misfits(kept, OrderError):
+            raise fault
         order = None if kept.order is None else order_of(kept.order)
         if order is not None and not (
             kept.zone < len(order.zones) and kept.pass_number <= order.zones[kept.zone].passes

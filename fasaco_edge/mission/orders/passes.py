@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import BadConfiguration, OrderError
+from fasaco_edge.host.documents import Document
 from fasaco_edge.planners.passes import (
     MOST_ANGLE_DEG,
     MOST_OVERLAP,
@@ -20,9 +22,7 @@ from fasaco_edge.planners.passes import (
 )
 
 
-class PassDocument(
-    msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True
-):
+class PassDocument(Document, frozen=True, omit_defaults=True):
     """A pass of an order.
 
     Attributes:
@@ -52,27 +52,28 @@ Passes = (
 )
 
 
-def passes_of(document: Passes, where: str) -> tuple[int, tuple[Pass, ...]]:
-    """Return the number of passes, and the settings of each; () if all are usual.
-
-    Args:
-        document: the passes.
-        where: member of the order that contains them.
-
-    Raises:
-        OrderError: the passes cannot follow each other.
-    """
+def passes_of(document: Passes) -> tuple[int, tuple[Pass, ...]]:
+    """Return the number of passes, and the settings of each; () if all are usual."""
     if isinstance(document, int):
         return document, ()
-    passes = tuple(
+    passes = _passes(document)
+    return len(passes), () if all(each == Pass() for each in passes) else passes
+
+
+def _passes(document: list[PassWord | PassDocument]) -> tuple[Pass, ...]:
+    return tuple(
         read_pass(item) if isinstance(item, str) else Pass(**msgspec.structs.asdict(item))
         for item in document
     )
-    try:
-        check_passes(passes, where)
-    except BadConfiguration as error:
-        raise OrderError(str(error)) from error
-    return len(passes), () if all(each == Pass() for each in passes) else passes
+
+
+def passes_faults(document: Passes | None, key: str = "passes") -> Iterator[OrderError]:
+    """Yield why passes cannot follow each other."""
+    if isinstance(document, list) and all(document):
+        try:
+            check_passes(_passes(document), key)
+        except BadConfiguration as error:
+            yield error.within("", OrderError)
 
 
 def passes_document(number: int, passes: tuple[Pass, ...]) -> int | list[object]:
@@ -96,7 +97,7 @@ def _item(each: Pass) -> object:
 
 def passes_words(document: Passes) -> str:
     """Return passes as text that follows the name of what they cover; "" for one usual pass."""
-    number, passes = passes_of(document, "passes")
+    number, passes = passes_of(document)
     if not passes:
         return f" {number} times" if number > 1 else ""
     return f" in passes: {', '.join(each.name or 'auto' for each in passes)}"

@@ -55,15 +55,17 @@ def _looked_up(
         return zone
     if zone.room:
         raise OrderError(
-            f"zones[{index}].room: there is no room {zone.room} on the map; {book.listed()}",
+            f"there is no room {zone.room} on the map; {book.listed()}",
             hint="give the number of one of those, or none",
+            key=f"zones[{index}].room",
         )
     there = f"there are {', '.join(standing)}" if standing else "it has none"
     raise OrderError(
-        f"zones[{index}].name: no zone {zone.name!r} in mission.zones of the daemon's "
+        f"no zone {zone.name!r} in mission.zones of the daemon's "
         f"configuration; {there}; nor a room: {book.listed()}",
         hint="name one of those, or give the zone a polygon; with `unknown: wait` the order "
         "waits for a room of that name, but of no number",
+        key=f"zones[{index}].name",
     )
 
 

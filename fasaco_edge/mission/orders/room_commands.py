@@ -36,7 +36,7 @@ def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
             before = book.room(asked.id).settings
             passes, kinds = before.passes, before.kinds
             if asked.passes is not None:
-                passes, kinds = passes_of(asked.passes, "room.passes")
+                passes, kinds = passes_of(asked.passes)
             skip = before.skip if asked.skip is None else asked.skip
             priority = before.priority if asked.priority is None else asked.priority
             book.set(asked.id, RoomSettings(passes, kinds, skip, priority))

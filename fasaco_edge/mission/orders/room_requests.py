@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated
 
 import msgspec
@@ -10,8 +11,9 @@ from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M
+from fasaco_edge.host.documents import Document
 from fasaco_edge.mission.orders.keep_outs import LONGEST_NAME, PlaceName
-from fasaco_edge.mission.orders.passes import Passes, passes_of
+from fasaco_edge.mission.orders.passes import Passes, passes_faults
 
 # Most rooms that a merge joins with one.
 MOST_MERGED = 50
@@ -23,7 +25,7 @@ RoomNumber = Annotated[int, Meta(ge=1, le=65_000)]
 Corner = Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]
 
 
-class RoomRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+class RoomRequest(Document, frozen=True, omit_defaults=True):
     """A room, and what to change.
 
     Attributes:
@@ -50,6 +52,11 @@ class RoomRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     skip: bool | None = None
     priority: Priority | None = None
 
+    def faults(self) -> Iterator[OrderError]:
+        if any(not math.hypot(x, y) <= FARTHEST_M for x, y in self.cut or ()):
+            yield OrderError(f"must be finite and within {FARTHEST_M:g} m of 0", key="cut")
+        yield from passes_faults(self.passes)
+
 
 # For each command: the members it takes besides the room's id, and those it requires.
 _TAKES: dict[str, tuple[set[str], set[str]]] = {
@@ -60,25 +67,19 @@ _TAKES: dict[str, tuple[set[str], set[str]]] = {
 }
 
 
-def checked_room(command: str, asked: RoomRequest | None) -> RoomRequest | None:
-    """Return the request of a command; None for a command that takes none.
-
-    Raises:
-        OrderError: a member is missing, wrong, or for another command; the text names it.
-    """
+def room_faults(command: str, asked: RoomRequest | None) -> Iterator[OrderError]:
+    """Yield what is missing in the request of a command, wrong, or for another command."""
     if (asked is not None) != (command in _TAKES):
         got = "missing" if asked is None else "got it"
-        raise OrderError(f"room goes with {', '.join(_TAKES)}, {got} with {command}")
-    if asked is None:
-        return None
-    takes, needs = _TAKES[command]
-    members = msgspec.structs.asdict(asked).items()
-    given = {name for name, value in members if value is not None and name != "id"}
-    if other := sorted(given - takes):
-        raise OrderError(f"room.{other[0]}: does not go with {command}")
-    if missing := sorted(needs - given or (takes if not given else set())):
-        raise OrderError(f"room.{' or '.join(missing)}: missing with {command}")
-    if any(not math.hypot(x, y) <= FARTHEST_M for x, y in asked.cut or ()):
-        raise OrderError(f"room.cut: must be finite and within {FARTHEST_M:g} m of 0")
-    passes_of(asked.passes or 1, "room.passes")
-    return asked
+        yield OrderError(f"goes with {', '.join(_TAKES)}, {got} with {command}", key="room")
+    elif asked is not None:
+        takes, needs = _TAKES[command]
+        members = msgspec.structs.asdict(asked).items()
+        given = {name for name, value in members if value is not None and name != "id"}
+        for other in sorted(given - takes):
+            yield OrderError(f"does not go with {command}", key=f"room.{other}")
+        for missing in sorted(needs - given):
+            yield OrderError(f"missing with {command}", key=f"room.{missing}")
+        if not (given or needs):
+            text = f"{' or '.join(sorted(takes))} is missing with {command}"
+            yield OrderError(text, key="room")

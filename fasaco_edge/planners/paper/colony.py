@@ -83,7 +83,8 @@ def parse_velocities(text: str) -> tuple[int, ...]:
     except ValueError:
         named = ()
     if not named or (":" in text and len(named) != 2):
-        raise BadConfiguration(f"velocities must look like 8:1, 1:8, 4 or 8,4,1, got {text!r}")
+        text = f"must look like 8:1, 1:8, 4 or 8,4,1, got {text!r}"
+        raise BadConfiguration(text, key="velocities")
     for velocity in named:
         _require(1 <= velocity <= 64, "velocities", "be in 1..64", velocity)
     if ":" not in text:
@@ -95,4 +96,4 @@ def parse_velocities(text: str) -> tuple[int, ...]:
 
 def _require(condition: bool, key: str, expectation: str, value: object) -> None:
     if not condition:
-        raise BadConfiguration(f"{key} must {expectation}, got {value!r}")
+        raise BadConfiguration(f"must {expectation}, got {value!r}", key=key)
