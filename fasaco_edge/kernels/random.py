@@ -6,7 +6,7 @@ No libm function is called, so results are equal on all machines.
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 
 # The lowest bits select one of few alternatives, the highest an index: they do not overlap.
 INDEX_BITS = 41
@@ -39,7 +39,7 @@ def draw_share(random: NDArray[np.uint64]) -> float:
     return float(draw(random) >> 10) / 9007199254740992.0
 
 
-@lean_kernel
+@lean_inner_kernel
 def draw_unit(state: NDArray[np.int64]) -> float:
     """Advance a stream of four words of 32 bits, int64 (4,); return a number in [0, 1).
 

@@ -29,6 +29,7 @@ from fasaco_edge.kernels.floor.sweeps import (
     sweep_edges,
 )
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
+from fasaco_edge.kernels.lattice.polygons import BITS
 
 # Greatest distance from an edge to floor for which the edge makes a detour [m].
 FARTHEST_M = 1.0
@@ -58,8 +59,6 @@ TURNING = proportional_turning(1.5)
 SEED = 0x9E3779B97F4A7C15
 # Pixels that are counted at once.
 CACHED = 1 << 17
-# Number of ones in a byte.
-_ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1, dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True)
@@ -294,7 +293,7 @@ def left_in_blocks(counts: NDArray[np.int16]) -> NDArray[np.int32]:
     rows = max(CACHED // (side * counts.shape[1]), 1)
     for first in range(0, len(left), rows):
         part = counts[side * first : side * (first + rows)]
-        in_rows = _ONES.take(np.packbits(part == 0, axis=1))
+        in_rows = BITS.take(np.packbits(part == 0, axis=1))
         begins = np.arange(0, len(part), side)
         left[first : first + rows] = np.add.reduceat(in_rows, begins, axis=0, dtype=np.uint8)
     return left

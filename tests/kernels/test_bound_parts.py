@@ -7,24 +7,27 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fasaco_edge.kernels.bound import blocks, matching
 from fasaco_edge.kernels.bound.blocks import (
     Sea,
-    biconnected_blocks,
-    find_islands,
-    measure_from,
-    spanning_weight,
-    wanted_first,
 )
 from fasaco_edge.kernels.bound.matching import (
     SINGLE,
     Bipartite,
-    choose_independent,
-    match,
-    pairing_for,
 )
 from tests import naive
 from tests.support.examples import examples
 from tests.support.grids import problems
+from tests.support.inner import entry
+
+biconnected_blocks = entry(blocks.biconnected_blocks)
+find_islands = entry(blocks.find_islands)
+measure_from = entry(blocks.measure_from)
+spanning_weight = entry(blocks.spanning_weight)
+wanted_first = entry(blocks.wanted_first)
+choose_independent = entry(matching.choose_independent)
+match = entry(matching.match)
+pairing_for = entry(matching.pairing_for)
 
 PLENTY = 10**6
 

@@ -9,22 +9,29 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.kernels.floor.bits import any_between, is_marked, packed, spread, unpacked
-from fasaco_edge.kernels.floor.capsule import is_clear, is_clear_but, is_near
+from fasaco_edge.kernels.floor import bits, capsule, seconds, sweeps
+from fasaco_edge.kernels.floor.bits import packed, spread, unpacked
+from fasaco_edge.kernels.floor.capsule import is_clear
 from fasaco_edge.kernels.floor.line import MOST_CAPSULES
 from fasaco_edge.kernels.floor.places import connected, disc_rows, places_of, within
-from fasaco_edge.kernels.floor.seconds import turn_between
 from fasaco_edge.kernels.floor.sweeps import (
     COLUMNS,
     NEVER,
     Scratch,
     Sweeps,
-    exchange,
-    prepare,
-    sweep,
-    swept_more,
 )
 from tests.support.examples import examples
+from tests.support.inner import entry
+
+any_between = entry(bits.any_between)
+is_marked = entry(bits.is_marked)
+is_clear_but = entry(capsule.is_clear_but)
+is_near = entry(capsule.is_near)
+turn_between = entry(seconds.turn_between)
+exchange = entry(sweeps.exchange)
+prepare = entry(sweeps.prepare)
+sweep = entry(sweeps.sweep)
+swept_more = entry(sweeps.swept_more)
 
 SIDE = 40
 COORDINATES = st.floats(8.0, 31.0)

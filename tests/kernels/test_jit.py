@@ -6,10 +6,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from fasaco_edge.kernels import folder
+from fasaco_edge.kernels.random import draw
 from tests.kernels.installations import ALL_LOADED, COMPILES
+from tests.support.examples import PLAIN
+from tests.support.inner import entry
 from tests.support.processes import ENVIRONMENT
 
 ROOT = Path(__file__).parents[2]
@@ -187,6 +191,14 @@ def test_a_numba_file_in_the_working_folder_is_ignored(tmp_path: Path):
         words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False
     )
     assert done.stdout == "0 3\n", done.stderr
+
+
+@pytest.mark.skipif(PLAIN, reason="kernels are plain functions")
+def test_an_inner_kernel_refuses_a_call_from_python():
+    stream = np.array([1], np.uint64)
+    with pytest.raises(TypeError, match="draw is an inner kernel"):
+        draw(stream)
+    assert entry(draw)(stream) > 0
 
 
 INTERRUPTED = """

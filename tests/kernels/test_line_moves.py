@@ -9,16 +9,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from fasaco_edge.kernels.floor import exchange, sweeps
 from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.bits import packed, unpacked
 from fasaco_edge.kernels.floor.capsule import TOUCH
 from fasaco_edge.kernels.floor.detour import find_patches, sweep_patches
-from fasaco_edge.kernels.floor.exchange import Exchange, move_stretch, reverse_stretch
+from fasaco_edge.kernels.floor.exchange import Exchange
 from fasaco_edge.kernels.floor.nearness import PIECE
 from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.kernels.floor.reorder import reorder
-from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps, sweep
+from fasaco_edge.kernels.floor.sweeps import NEVER, Sweeps
 from fasaco_edge.kernels.floor.turning import (
     Turning,
     limited_turning,
@@ -26,6 +27,10 @@ from fasaco_edge.kernels.floor.turning import (
     turn_seconds,
 )
 from fasaco_edge.planners.line import linked, memory_for_moves, numbers_along
+from tests.support.inner import entry
+
+exchange_stretch, sweep = entry(exchange.exchange_stretch), entry(sweeps.sweep)
+is_way, replace_points = entry(kernel.is_way), entry(kernel.replace_points)
 
 ROWS, COLS = 72, 96
 ROBOT, TOOL = 7.2, 6.0
@@ -172,7 +177,7 @@ def test_a_reordered_line_keeps_its_ends_and_leads_both_ways():
     assert sorted(map(tuple, room.points.tolist())) == before
     numbers = numbers_along(room.line)
     assert [room.line.previous[number] for number in numbers] == [kernel.NONE, *numbers[:-1]]
-    assert kernel.is_way(room.floor, room.points, 0, len(before) - 1)
+    assert is_way(room.floor, room.points, 0, len(before) - 1)
 
 
 def reordering(rng: np.random.Generator, count: int) -> tuple[list[int | bool], list[int]]:
@@ -180,7 +185,9 @@ def reordering(rng: np.random.Generator, count: int) -> tuple[list[int | bool], 
     order = list(range(count))
     if rng.integers(2):
         a, c = sorted(rng.choice(count, 2, replace=False).tolist())
-        return [a, c], order[: a + 1] + order[a + 1 : c + 1][::-1] + order[c + 1 :]
+        return [a + 1, c, kernel.NONE, True], order[: a + 1] + order[a + 1 : c + 1][::-1] + order[
+            c + 1 :
+        ]
     while True:
         b, c = sorted(rng.choice(range(1, count), 2, replace=False).tolist())
         if places := [e for e in order if not b - 2 <= e <= c + 1]:
@@ -195,7 +202,7 @@ def reordering(rng: np.random.Generator, count: int) -> tuple[list[int | bool], 
 @pytest.mark.parametrize("is_end_fixed", [False, True])
 def test_a_reordering_is_that_of_a_list(turning, is_end_fixed):
     rng = np.random.default_rng(5)
-    made = {2: 0, 4: 0}
+    made = {"reversed": 0, "moved": 0}
     for _ in range(400):
         count = int(rng.integers(6, 12))
         way = [(float(y), float(x)) for y, x in rng.uniform((10, 10), (62, 86), (count, 2))]
@@ -203,9 +210,8 @@ def test_a_reordering_is_that_of_a_list(turning, is_end_fixed):
         args, order = reordering(rng, count)
         other = Room(turning, way=[way[number] for number in order])
         edges = Exchange(np.zeros((3, 4), np.int64), np.zeros((3, 4), np.int64), np.zeros(1, int))
-        move = reverse_stretch if len(args) == 2 else move_stretch
         before = room.cost_s()
-        gain = move(room.line, room.floor, room.price, room.memory, edges, *args)
+        gain = exchange_stretch(room.line, room.floor, room.price, room.memory, edges, *args)
         should = before - other.cost_s()
         numbers = numbers_along(room.line)
         assert [room.line.previous[number] for number in numbers] == [kernel.NONE, *numbers[:-1]]
@@ -214,14 +220,14 @@ def test_a_reordering_is_that_of_a_list(turning, is_end_fixed):
         if gain > 0.0:
             assert numbers == order
             assert gain == pytest.approx(should, abs=1e-3)
-            made[len(args)] += 1
+            made["reversed" if args[2] == kernel.NONE else "moved"] += 1
             continue
         assert numbers == list(range(count))
         new = {frozenset(edge) for edge in pairwise(order)} - {
             frozenset(edge) for edge in pairwise(numbers)
         }
         ends = (np.array([way[number] for number in edge]) for edge in map(sorted, new))
-        is_blocked = not all(kernel.is_way(room.floor, edge, 0, 1) for edge in ends)
+        is_blocked = not all(is_way(room.floor, edge, 0, 1) for edge in ends)
         assert is_blocked or should < 0.01 or (is_end_fixed and order[-1] != count - 1)
     assert min(made.values()) > 20
 
@@ -229,7 +235,7 @@ def test_a_reordering_is_that_of_a_list(turning, is_end_fixed):
 def test_a_chain_longer_than_a_move_is_replaced_as_well():
     room = Room()
     numbers = numbers_along(room.line)
-    kernel.replace_points(room.line, room.floor, room.memory, numbers[0], numbers[-1], 0)
+    replace_points(room.line, room.floor, room.memory, numbers[0], numbers[-1], 0)
     assert len(room.points) == 2
     below = room.floor.sweeps.counts < NEVER // 2
     assert (room.floor.sweeps.counts[below] == room.recounted().counts[below]).all()

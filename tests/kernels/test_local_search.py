@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fasaco_edge.kernels import random
 from fasaco_edge.kernels.lattice.reach import walk_cost
-from fasaco_edge.kernels.local_search.proposals import accepts, improve
+from fasaco_edge.kernels.local_search import proposals
+from fasaco_edge.kernels.local_search.proposals import improve
 from fasaco_edge.kernels.local_search.walk_array import COST, LENGTH
-from fasaco_edge.kernels.random import draw, index_of
 from tests.kernels.grounds import (
     PRICES,
     assert_sound,
@@ -25,6 +26,11 @@ from tests.kernels.grounds import (
 )
 from tests.support.examples import examples
 from tests.support.grids import ROOMS, lattice
+from tests.support.inner import entry
+
+accepts = entry(proposals.accepts)
+draw = entry(random.draw)
+index_of = entry(random.index_of)
 
 EVERYWHERE = np.empty(0, np.int32)
 
@@ -166,8 +172,8 @@ def test_the_stream_determines_the_walk_in_any_portions(prices):
     ways = []
     for pieces in ([4000], [1500, 2500], [1] * 4000):
         walk, random = walk_on(ground, task.cells(), prices), stream(9)
-        for proposals in pieces:
-            improve(ground, walk, prices, EVERYWHERE, prices.step_us, proposals, random)
+        for piece in pieces:
+            improve(ground, walk, prices, EVERYWHERE, prices.step_us, piece, random)
         ways.append((cells_of(walk), random.tolist()))
     assert ways[1:] == ways[:-1]
 

@@ -9,19 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fasaco_edge.kernels.local_search import parity
 from fasaco_edge.kernels.local_search.parity import (
     NOWHERE,
     ODDS,
     SHORTEST,
-    change_step,
-    common_ancestor,
-    count_steps,
-    draw_end,
-    draw_loop,
-    euler_walk,
-    find_loops,
-    note_order,
-    search_ways,
 )
 from fasaco_edge.kernels.local_search.proposals import improve
 from fasaco_edge.kernels.local_search.walk_array import recount
@@ -41,6 +33,17 @@ from tests.kernels.grounds import (
 from tests.kernels.test_holes import Space, crossing, links_of, loops_of, squares_of
 from tests.support.examples import examples
 from tests.support.grids import lattice
+from tests.support.inner import entry
+
+change_step = entry(parity.change_step)
+common_ancestor = entry(parity.common_ancestor)
+count_steps = entry(parity.count_steps)
+draw_end = entry(parity.draw_end)
+draw_loop = entry(parity.draw_loop)
+euler_walk = entry(parity.euler_walk)
+find_loops = entry(parity.find_loops)
+note_order = entry(parity.note_order)
+search_ways = entry(parity.search_ways)
 
 EVERYWHERE = np.empty(0, np.int32)
 FREE, FIXED_END = PRICES[0], PRICES[1]
@@ -171,7 +174,7 @@ def test_twin_finds_the_same_ways(task, limit, seed):
 
 def change_way(ground, tally, way):
     for one, other in itertools.pairwise(way):
-        change_step(ground, tally, one, other)
+        change_step(tally.times, one, other)
 
 
 @examples(100)

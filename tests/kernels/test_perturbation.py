@@ -112,7 +112,7 @@ def test_perturbations_leave_a_sound_walk_and_remember_the_best(
         assert (colony.first_end == NOTHING).all()
         assert (colony.trail > 0.0).all()
     assert_best_is_sound(task, ground, memory, prices)
-    recall(search)
+    recall(search.ground, search.walk, search.prices, search.memory)
     assert cells_of(walk) == best_of(memory)
     assert_sound(task, ground, walk, prices)
     assert_guards_hold(walk, tally, memory, colony)

@@ -7,7 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.kernels.floor.words import MOST_WORDS, PIECES, find_words
+from fasaco_edge.kernels.floor import words
+from fasaco_edge.kernels.floor.words import MOST_WORDS, PIECES
+from tests.support.inner import entry
+
+find_words = entry(words.find_words)
 
 GOALS = np.random.default_rng(0).uniform((-4, -4, -math.pi), (4, 4, math.pi), (400, 3)).tolist()
 STRAIGHT_AHEAD = [(2.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 2.0, math.pi), (0.0, 4.0, math.pi)]

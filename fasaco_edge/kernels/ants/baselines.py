@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.ants.graph import Graph, Scratch, append_way, begin, close, open_steps_of
-from fasaco_edge.kernels.jit import as_value, kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inner_kernel, kernel, lean_kernel
 
 
 @lean_kernel
@@ -96,7 +96,7 @@ class Blocks(NamedTuple):
     offsets: NDArray[np.int64]
 
 
-@kernel
+@inner_kernel
 def _has_step(blocks: Blocks, cell: int, direction: int) -> bool:
     """Return whether the step exists and leads to a cell to cover."""
     if not blocks.steps[cell] >> direction & 1:
@@ -104,7 +104,7 @@ def _has_step(blocks: Blocks, cell: int, direction: int) -> bool:
     return bool(blocks.node[cell + blocks.offsets[direction]] != NO_NODE)
 
 
-@kernel
+@inner_kernel
 def _add(blocks: Blocks, cell: int, direction: int, times: int) -> None:
     """Walk a step ``times`` more often (or less, below 0), seen from either of its cells."""
     if direction > NORTH:
@@ -112,21 +112,21 @@ def _add(blocks: Blocks, cell: int, direction: int, times: int) -> None:
     blocks.times[cell, direction & 1] += times
 
 
-@kernel
+@inner_kernel
 def _times(blocks: Blocks, cell: int, direction: int) -> int:
     if direction > NORTH:
         cell += blocks.offsets[direction]
     return int(blocks.times[cell, direction & 1])
 
 
-@kernel
+@inner_kernel
 def _inner_directions(blocks: Blocks, cell: int) -> tuple[int, int]:
     """Return the two directions that stay in the cell's block."""
     row, col = cell // blocks.offsets[NORTH], cell % blocks.offsets[NORTH]
     return (EAST if col % 2 == 0 else WEST), (NORTH if row % 2 == 0 else SOUTH)
 
 
-@kernel
+@inner_kernel
 def _grow_node(blocks: Blocks, first: int, number: int) -> None:
     """Label the connected part of the block around cell ``first``; give it its closed walk."""
     cells = np.empty(4, np.int64)
@@ -156,7 +156,7 @@ def _grow_node(blocks: Blocks, first: int, number: int) -> None:
                     blocks.times[here, direction] = 1
 
 
-@kernel
+@inner_kernel
 def _join(blocks: Blocks, here: int, direction: int) -> None:
     """Join the closed walks of two nodes across the step from ``here`` in a direction."""
     after = here + blocks.offsets[direction]
@@ -178,7 +178,7 @@ def _join(blocks: Blocks, here: int, direction: int) -> None:
     _add(blocks, here, direction, 2)
 
 
-@kernel
+@inner_kernel
 def _step_out(blocks: Blocks, reached: NDArray[np.uint8], first: int) -> tuple[int, int]:
     """Return the first step (cell, direction) out of a node to one not reached; (-1, 0) for none.
 
@@ -200,7 +200,7 @@ def _step_out(blocks: Blocks, reached: NDArray[np.uint8], first: int) -> tuple[i
     return -1, 0
 
 
-@kernel
+@inner_kernel
 def _span(blocks: Blocks, start: int, nodes: int) -> None:
     """Span the nodes by a tree, depth first from that of ``start``, and join along it."""
     reached = np.zeros(nodes, np.uint8)
@@ -225,7 +225,7 @@ def _span(blocks: Blocks, start: int, nodes: int) -> None:
         depth += 1
 
 
-@kernel
+@inner_kernel
 def _circuit(blocks: Blocks, start: int) -> NDArray[np.int32]:
     """Return an Eulerian circuit from ``start`` by Hierholzer's algorithm; uses up ``times``."""
     length = 0

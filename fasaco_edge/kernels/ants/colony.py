@@ -36,7 +36,7 @@ from fasaco_edge.kernels.ants.graph import (
     close,
     open_steps_of,
 )
-from fasaco_edge.kernels.jit import as_value, lean_kernel
+from fasaco_edge.kernels.jit import as_value, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.random import draw_unit
 
@@ -83,7 +83,7 @@ class ColonyState(NamedTuple):
     rules: Rules
 
 
-@lean_kernel
+@lean_inner_kernel
 def _visibility(
     colony: ColonyState, scratch: Scratch, here: int, direction: int, velocity: int
 ) -> float:
@@ -101,7 +101,7 @@ def _visibility(
     return float(rules.powers[run - 1])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _weigh(colony: ColonyState, scratch: Scratch, here: int, velocity: int) -> None:
     """Fill ``scratch.weights`` with tau * eta ** beta of the open neighbours."""
     mask = open_steps_of(colony.graph, scratch, here)
@@ -111,7 +111,7 @@ def _weigh(colony: ColonyState, scratch: Scratch, here: int, velocity: int) -> N
             scratch.weights[0, direction] = colony.trail[here, direction] * eta
 
 
-@lean_kernel
+@lean_inner_kernel
 def _choose(
     mask: int,
     weights: NDArray[np.float64],
@@ -145,7 +145,7 @@ def _choose(
     return best
 
 
-@lean_kernel
+@lean_inner_kernel
 def _walk_one(
     colony: ColonyState,
     scratch: Scratch,
@@ -210,7 +210,7 @@ def walk_ants(
         lengths[ant] = _walk_one(colony, scratch, velocity, streams[ant], walks[ant])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _pull(colony: ColonyState, walk: NDArray[np.int32], towards: float) -> None:
     """Pull the trail of every move of a walk towards a value, by the weight alpha."""
     graph, trail, alpha = colony.graph, colony.trail, colony.rules.alpha

@@ -14,12 +14,12 @@ from fasaco_edge.kernels.ants.fold import (
     list_ends,
     unfold,
 )
-from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel
 from fasaco_edge.kernels.local_search.walk_array import LENGTH, Ground, Prices, Walk, copy
 from fasaco_edge.kernels.random import draw, index_of
 
 
-@lean_kernel
+@lean_inner_kernel
 def _is_same(colony: Colony, items: int) -> bool:
     """Return whether an ant's sequence is the walk's own."""
     for item in range(items):  # noqa: SIM110 - numba has no generators in `all`
@@ -28,7 +28,7 @@ def _is_same(colony: Colony, items: int) -> bool:
     return True
 
 
-@lean_kernel
+@lean_inner_kernel
 def _pull(
     ground: Ground, colony: Colony, sequence: NDArray[np.int32], items: int, towards: float
 ) -> None:
@@ -50,7 +50,7 @@ def cohort(colony: Colony) -> int:
     return int((colony.counts[DISCS] - 1) % colony.rules.velocities.size)
 
 
-@lean_kernel
+@lean_inner_kernel
 def rebuild_disc(
     ground: Ground,
     walk: Walk,
@@ -105,7 +105,7 @@ def rebuild_disc(
     return disc.cells
 
 
-@lean_kernel
+@lean_inner_kernel
 def strengthen(ground: Ground, walk: Walk, colony: Colony) -> None:
     """Strengthen the trail along the walk's moves in the last disc by equation (8)."""
     number, cells = colony.counts[DISCS], walk.cells

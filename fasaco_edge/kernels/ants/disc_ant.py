@@ -25,7 +25,7 @@ from fasaco_edge.kernels.ants.fold import (
     quarters_between,
     wide,
 )
-from fasaco_edge.kernels.jit import as_value, lean_kernel
+from fasaco_edge.kernels.jit import as_value, lean_inner_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground, Prices, Walk
 from fasaco_edge.kernels.random import draw_share
 
@@ -42,7 +42,7 @@ class _Ant(NamedTuple):
 LOST = _Ant(NOTHING, 0, 0, 0)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _search(ground: Ground, colony: Colony, here: int, goal: int) -> int:
     """Return the nearest open cell or tunnel end, or ``goal`` if it is given; NOTHING if far."""
     colony.counts[SEARCHES] += 1
@@ -68,7 +68,7 @@ def _search(ground: Ground, colony: Colony, here: int, goal: int) -> int:
     return NOTHING
 
 
-@lean_kernel
+@lean_inner_kernel
 def _go_to(ground: Ground, prices: Prices, colony: Colony, ant: _Ant, goal: int) -> _Ant:
     """Return the ant at the nearest open cell or tunnel end, or at ``goal``; LOST if that is far.
 
@@ -96,7 +96,7 @@ def _go_to(ground: Ground, prices: Prices, colony: Colony, ant: _Ant, goal: int)
     return _Ant(ant.items + steps - 1, found, heading, cost)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _choose(
     ground: Ground, colony: Colony, cells: NDArray[np.int32], ant: _Ant, random: NDArray[np.uint64]
 ) -> int:
@@ -126,7 +126,7 @@ def _choose(
     return best
 
 
-@lean_kernel
+@lean_inner_kernel
 def _weight(
     ground: Ground, colony: Colony, cells: NDArray[np.int32], ant: _Ant, direction: int
 ) -> float:
@@ -143,7 +143,7 @@ def _weight(
     return float(colony.trail[ant.here, direction] * colony.rules.powers[quarters])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _first(ground: Ground, colony: Colony, cells: NDArray[np.int32], head: int) -> _Ant:
     """Return an ant at the end of the first stretch, or at the walk's first cell."""
     if head == NOTHING:
@@ -155,7 +155,7 @@ def _first(ground: Ground, colony: Colony, cells: NDArray[np.int32], head: int) 
     return _Ant(as_value(0), wide(cells[head]), heading, as_value(0))
 
 
-@lean_kernel
+@lean_inner_kernel
 def walk_ant(
     ground: Ground,
     walk: Walk,
@@ -209,7 +209,7 @@ def walk_ant(
     return ant.items, ant.cost
 
 
-@lean_kernel
+@lean_inner_kernel
 def _pass(
     ground: Ground,
     prices: Prices,
@@ -229,7 +229,7 @@ def _pass(
     return _Ant(ant.items + 1, here, heading, cost)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _end(
     ground: Ground,
     prices: Prices,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 from fasaco_edge.kernels.local_search.regions import neighbourhood
 from fasaco_edge.kernels.local_search.walk_array import (
     LENGTH,
@@ -131,7 +131,7 @@ def quarters_between(one: int, other: int) -> int:
     return 2 if one ^ other == 2 else 1
 
 
-@lean_kernel
+@lean_inner_kernel
 def direction_of(ground: Ground, one: int, other: int) -> int:
     """Return the direction of a step, or AHEAD for none."""
     for direction in range(4):
@@ -140,7 +140,7 @@ def direction_of(ground: Ground, one: int, other: int) -> int:
     return AHEAD
 
 
-@lean_kernel
+@lean_inner_kernel
 def end_at(colony: Colony, cell: int) -> int:
     """Return the first tunnel end at a cell that is not taken, or NOTHING."""
     end = colony.first_end[cell]
@@ -149,7 +149,7 @@ def end_at(colony: Colony, cell: int) -> int:
     return wide(end)
 
 
-@lean_kernel
+@lean_inner_kernel
 def inward_from(ground: Ground, colony: Colony, cells: NDArray[np.int32], end: int) -> int:
     """Return the direction of the first step into a tunnel, or AHEAD if it has no step."""
     first, last = colony.tunnels[end >> 1, 0], colony.tunnels[end >> 1, 1]
@@ -160,7 +160,7 @@ def inward_from(ground: Ground, colony: Colony, cells: NDArray[np.int32], end: i
     return direction_of(ground, cells[first], cells[first + 1])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _mark(ground: Ground, walk: Walk, colony: Colony, centre: int, radius: int) -> int:
     """Label the cells of a disc and list them in ``colony.area``; return their number."""
     cells, labels, number = walk.cells, colony.labels, colony.counts[DISCS]
@@ -180,7 +180,7 @@ def _mark(ground: Ground, walk: Walk, colony: Colony, centre: int, radius: int) 
     return inside
 
 
-@lean_kernel
+@lean_inner_kernel
 def fold(
     ground: Ground, walk: Walk, prices: Prices, colony: Colony, centre: int, radius: int
 ) -> Disc:
@@ -218,7 +218,7 @@ def fold(
     return Disc(inside, tunnels, items, head, last, goal)
 
 
-@lean_kernel
+@lean_inner_kernel
 def list_ends(walk: Walk, colony: Colony, disc: Disc, is_listed: bool) -> None:
     """List the tunnels' ends by their cells, or remove them from the list."""
     for tunnel in range(disc.tunnels):
@@ -231,7 +231,7 @@ def list_ends(walk: Walk, colony: Colony, disc: Disc, is_listed: bool) -> None:
                 colony.first_end[cell] = 2 * tunnel + side
 
 
-@lean_kernel
+@lean_inner_kernel
 def open_disc(ground: Ground, colony: Colony, disc: Disc) -> int:
     """Open the cells and tunnels of a disc; return their number."""
     count = disc.tunnels
@@ -244,7 +244,7 @@ def open_disc(ground: Ground, colony: Colony, disc: Disc) -> int:
     return count
 
 
-@lean_kernel
+@lean_inner_kernel
 def unfold(
     ground: Ground,
     walk: Walk,

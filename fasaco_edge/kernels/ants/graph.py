@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.jit import lean_inner_kernel
 
 
 class Graph(NamedTuple):
@@ -51,7 +51,7 @@ class Scratch(NamedTuple):
     weights: NDArray[np.float64]
 
 
-@lean_kernel
+@lean_inner_kernel
 def begin(graph: Graph, scratch: Scratch, start: int) -> int:
     """Open all wanted cells but the start; return their number."""
     for index in range(graph.open_steps.size):
@@ -63,7 +63,7 @@ def begin(graph: Graph, scratch: Scratch, start: int) -> int:
     return int(wanted - graph.wanted[start])
 
 
-@lean_kernel
+@lean_inner_kernel
 def close(graph: Graph, scratch: Scratch, cell: int) -> None:
     """Note the visit of ``cell``: it is no longer open, so the steps to it lead to no open cell."""
     at = cell + graph.offsets[1]
@@ -71,13 +71,13 @@ def close(graph: Graph, scratch: Scratch, cell: int) -> None:
         scratch.open_steps[at + graph.offsets[direction]] &= 255 ^ (1 << ((direction + 2) & 3))
 
 
-@lean_kernel
+@lean_inner_kernel
 def open_steps_of(graph: Graph, scratch: Scratch, cell: int) -> int:
     """Return the mask of steps from ``cell`` to open cells."""
     return int(scratch.open_steps[cell + graph.offsets[1]])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
     """Search breadth first; return ``goal``, or with goal -1 the nearest open cell."""
     scratch.searches[0] += 1
@@ -105,7 +105,7 @@ def _find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
     return here
 
 
-@lean_kernel
+@lean_inner_kernel
 def append_way(
     graph: Graph, scratch: Scratch, walk: NDArray[np.int32], length: int, here: int, goal: int
 ) -> tuple[int, int]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.jit import inner_kernel
 from fasaco_edge.kernels.lattice.areas import root
 
 
@@ -32,7 +32,7 @@ class Blocks(NamedTuple):
     first: NDArray[np.int32]
 
 
-@kernel
+@inner_kernel
 def biconnected_blocks(steps: NDArray[np.uint8], offsets: NDArray[np.int64], root: int) -> Blocks:
     """Return the blocks reached from the flat cell ``root``; none if it has no step.
 
@@ -91,7 +91,7 @@ def biconnected_blocks(steps: NDArray[np.uint8], offsets: NDArray[np.int64], roo
     return Blocks(cells[:filled], first[: blocks + 1])
 
 
-@kernel
+@inner_kernel
 def wanted_first(cells: NDArray[np.int32], wanted: NDArray[np.uint8]) -> int:
     """Move the wanted cells of a block to the front, after its top; return their number.
 
@@ -131,7 +131,7 @@ class Sea(NamedTuple):
     queue: NDArray[np.int32]
 
 
-@kernel
+@inner_kernel
 def find_islands(sea: Sea, chosen: NDArray[np.uint8], colour: NDArray[np.uint8]) -> tuple[int, int]:
     """Number the islands with a wanted cell; return the number of islands of each colour.
 
@@ -172,7 +172,7 @@ def find_islands(sea: Sea, chosen: NDArray[np.uint8], colour: NDArray[np.uint8])
     return islands[0], islands[1]
 
 
-@kernel
+@inner_kernel
 def spanning_weight(sea: Sea, islands: int) -> tuple[int, int]:
     """Return the weight of a minimum spanning tree over islands, and of its heaviest edge.
 
@@ -198,7 +198,7 @@ def spanning_weight(sea: Sea, islands: int) -> tuple[int, int]:
     return total, heaviest
 
 
-@kernel
+@inner_kernel
 def measure_from(sea: Sea, source: int) -> None:
     """Write each cell's distance from ``source`` [steps] into ``away``; islands are cleared."""
     for cell in sea.cells:
@@ -207,7 +207,7 @@ def measure_from(sea: Sea, source: int) -> None:
     _spread(sea)
 
 
-@kernel
+@inner_kernel
 def _spread(sea: Sea) -> int:
     """Assign each cell to its nearest island; return the number of cells in the queue, in order."""
     tail = 0
@@ -231,7 +231,7 @@ def _spread(sea: Sea) -> int:
     return tail
 
 
-@kernel
+@inner_kernel
 def _join(sea: Sea, parent: NDArray[np.int64], cell: int, away: int) -> int:
     """Join the islands of ``cell`` and of neighbours at ``away`` steps; return how many."""
     joined = 0

@@ -58,7 +58,7 @@ from fasaco_edge.kernels.bound.matching import (
     match,
     pairing_for,
 )
-from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.jit import inner_kernel, kernel
 
 NO_END = -(2**30)
 # Search budget for a larger matching [cells]. On maps of a million cells with scattered obstacles a
@@ -138,7 +138,7 @@ def covering_bound(
     return int(closed - saved[start])
 
 
-@kernel
+@inner_kernel
 def _ground(steps: NDArray[np.uint8], required: NDArray[np.uint8]) -> Ground:
     rows, cols = steps.shape
     size = rows * cols
@@ -162,7 +162,7 @@ def _ground(steps: NDArray[np.uint8], required: NDArray[np.uint8]) -> Ground:
     )
 
 
-@kernel
+@inner_kernel
 def _bound_block(ground: Ground, cells: NDArray[np.int32], count: int, number: int) -> int:
     """Return the bound of a closed walk over a block; write those of open ones.
 
@@ -204,7 +204,7 @@ def _bound_block(ground: Ground, cells: NDArray[np.int32], count: int, number: i
     return closed
 
 
-@kernel
+@inner_kernel
 def _cut_out(ground: Ground, cells: NDArray[np.int32], number: int) -> None:
     """Write the step masks inside a block, and to its wanted cells."""
     for cell in cells:
@@ -221,7 +221,7 @@ def _cut_out(ground: Ground, cells: NDArray[np.int32], number: int) -> None:
         ground.inside[cell], ground.links[cell] = inside, links
 
 
-@kernel
+@inner_kernel
 def _bound_by_set(ground: Ground, graph: Bipartite, sea: Sea, side: int, first: int) -> int:
     """Bound walks over a block, as ``_bound_block`` does, by one independent set."""
     colour, chosen, island = ground.colour, ground.chosen, sea.island

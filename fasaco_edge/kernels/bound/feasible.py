@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, Lines, StepPrices
-from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.jit import lean_inner_kernel
 
 # Magnitude of the price of a missing side [half us].
 NO_SIDE = 1 << 60
 
 
-@lean_kernel
+@lean_inner_kernel
 def make_feasible(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
     """Change the prices as little as possible so that no passage has a negative reduced cost."""
     for axis in range(2):
@@ -26,7 +26,7 @@ def make_feasible(lines: Lines, prices: StepPrices, step: int, turn: int) -> Non
         _clamp(lines.links[axis], prices.price[axis], prices.box[axis], step, prices.use[0])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _level(
     links: NDArray[np.uint8], price: NDArray[np.int64], step: int, spare: NDArray[np.int64]
 ) -> None:
@@ -54,7 +54,7 @@ def _level(
         first = index + 1
 
 
-@lean_kernel
+@lean_inner_kernel
 def _fit_boxes(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
     """Divide the cost of a corner between a cell's two axes, as each needs."""
     rows, cols = prices.price[ALONG_ROWS], prices.price[ALONG_COLS]
@@ -77,7 +77,7 @@ def _fit_boxes(lines: Lines, prices: StepPrices, step: int, turn: int) -> None:
         prices.box[ALONG_ROWS, cell], prices.box[ALONG_COLS, rank] = along, across
 
 
-@lean_kernel
+@lean_inner_kernel
 def _clamp(
     links: NDArray[np.uint8],
     price: NDArray[np.int64],

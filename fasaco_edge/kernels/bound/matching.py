@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.jit import inner_kernel
 
 SINGLE = -1
 DEAD = -1
@@ -52,7 +52,7 @@ class Pairing(NamedTuple):
     degree: NDArray[np.uint8]
 
 
-@kernel
+@inner_kernel
 def pairing_for(size: int) -> Pairing:
     """Return memory for lattices of ``size`` cells."""
     return Pairing(
@@ -64,7 +64,7 @@ def pairing_for(size: int) -> Pairing:
     )
 
 
-@kernel
+@inner_kernel
 def match(graph: Bipartite, pairing: Pairing, budget: int) -> None:
     """Find a maximum matching, or a large one if that takes long.
 
@@ -92,7 +92,7 @@ def match(graph: Bipartite, pairing: Pairing, budget: int) -> None:
             budget -= _augment(graph, pairing, cell, search)
 
 
-@kernel
+@inner_kernel
 def _match_lone_cells_first(graph: Bipartite, pairing: Pairing) -> None:
     """Match cells with one partner left, each a safe choice; else the next cell in order."""
     mate, lone, degree = pairing.mate, pairing.queue, pairing.degree
@@ -112,7 +112,7 @@ def _match_lone_cells_first(graph: Bipartite, pairing: Pairing) -> None:
             waiting = _match_with_rarest(graph, pairing, cell, waiting)
 
 
-@kernel
+@inner_kernel
 def _match_with_rarest(graph: Bipartite, pairing: Pairing, cell: int, waiting: int) -> int:
     """Match ``cell`` with the single neighbour of least degree; return the length of the queue."""
     mate, degree = pairing.mate, pairing.degree
@@ -137,7 +137,7 @@ def _match_with_rarest(graph: Bipartite, pairing: Pairing, cell: int, waiting: i
     return waiting
 
 
-@kernel
+@inner_kernel
 def _augment(graph: Bipartite, pairing: Pairing, source: int, search: int) -> int:
     """Search an augmenting path from ``source`` and switch it; return the cells searched.
 
@@ -167,7 +167,7 @@ def _augment(graph: Bipartite, pairing: Pairing, source: int, search: int) -> in
     return head
 
 
-@kernel
+@inner_kernel
 def _switch(graph: Bipartite, pairing: Pairing, source: int, end: int) -> None:
     """Exchange matched and unmatched links on the path from ``source`` to ``end``."""
     mate, here = pairing.mate, end
@@ -180,7 +180,7 @@ def _switch(graph: Bipartite, pairing: Pairing, source: int, end: int) -> None:
         here = released
 
 
-@kernel
+@inner_kernel
 def choose_independent(
     graph: Bipartite, pairing: Pairing, side: int, first: int, chosen: NDArray[np.uint8]
 ) -> int:

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.bound.feasible import NO_SIDE, make_feasible
 from fasaco_edge.kernels.bound.lines import ALONG_COLS, ALONG_ROWS, Lines, StepPrices
-from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel, lean_kernel
 
 # Weights, of 256, of the running mean of directions and of a new one. Trials on grids of 170 to
 # 9,000 cells: 230 is slower at first, 160 no better in the end.
@@ -69,7 +69,7 @@ def _copy(source: NDArray[np.int64], target: NDArray[np.int64]) -> None:
             target[axis, index] = source[axis, index]
 
 
-@lean_kernel
+@lean_inner_kernel
 def _relaxed(lines: Lines, prices: StepPrices, step: int, turn: int) -> int:
     """Return the bound of feasible prices; count in ``use`` how its passages use each side."""
     use = prices.use
@@ -99,7 +99,7 @@ def _relaxed(lines: Lines, prices: StepPrices, step: int, turn: int) -> int:
     return total
 
 
-@lean_kernel
+@lean_inner_kernel
 def _follow(lines: Lines, prices: StepPrices, pace: int) -> None:
     """Move prices along the mean of the last directions, ``use`` being the newest one."""
     for axis in range(2):

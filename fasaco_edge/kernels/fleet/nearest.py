@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import as_value, kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, kernel, lean_inner_kernel
 
 NONE = -1
 
@@ -34,14 +34,14 @@ class _Ground(NamedTuple):
     queue: NDArray[np.int32]
 
 
-@lean_kernel
+@lean_inner_kernel
 def _quarters(before: int, after: int) -> int:
     """Return the quarter turns between two directions; 0 if either is NONE."""
     turn = (after - before) & 3
     return min(turn, 4 - turn) if min(before, after) > NONE else 0
 
 
-@lean_kernel
+@lean_inner_kernel
 def _nearest(ground: _Ground, robot: int, here: int, clock: int) -> int:
     """Return the robot's cell nearest to cell ``here``, NONE for none; ``came`` leads there."""
     steps, offsets, owner, seen, came, queue = ground
@@ -61,7 +61,7 @@ def _nearest(ground: _Ground, robot: int, here: int, clock: int) -> int:
     return NONE
 
 
-@lean_kernel
+@lean_inner_kernel
 def _walk(ground: _Ground, robot: int, here: int, count: int, clock: int) -> tuple[int, int, int]:
     """Walk over all ``count`` cells of a robot; return steps, quarter turns and the clock."""
     steps, offsets, owner = ground.steps, ground.offsets, ground.owner

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.detour import middle_left, nearest_place
 from fasaco_edge.kernels.floor.line import (
+    NO_MOVE,
     NONE,
     TRIED,
     Floor,
@@ -26,7 +27,7 @@ from fasaco_edge.kernels.floor.line import (
 )
 from fasaco_edge.kernels.floor.polish import slide
 from fasaco_edge.kernels.floor.sweeps import BLOCK
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.random import draw, draw_share
 
 # Initial temperature, as a share of the time to drive a tool's width.
@@ -37,8 +38,6 @@ FARTHEST, OCTAVES = 2.5, 5
 LEFT_OUT, MOVED, SHIFTED, CUT = 2, 4, 3, 3
 # A cut leaves at least this much of an edge.
 MOST_CUT = 0.95
-# Returned if no unswept floor is nearby, or if there are too few points for a move.
-NO_MOVE = -1
 # Unit exponential variates, rounded: the logarithm's last bits differ between machines.
 EXPONENTIAL = np.round(-np.log((np.arange(4096) + 0.5) / 4096) * 65536) / 65536
 
@@ -53,7 +52,7 @@ def _length(random: NDArray[np.uint64], farthest: float) -> float:
     return size if bits >> 40 & 1 else -size
 
 
-@lean_kernel
+@lean_inner_kernel
 def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
     """Move the point after ``begin``: along either edge, or in any direction."""
     points, new = line.points, memory.new
@@ -72,7 +71,7 @@ def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, fa
     return 1
 
 
-@lean_kernel
+@lean_inner_kernel
 def _shift(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
     """Shift the edge after ``begin``'s next point; its ends may slide along the edges beside it."""
     points, new = line.points, memory.new
@@ -91,7 +90,7 @@ def _shift(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, f
     return 2
 
 
-@lean_kernel
+@lean_inner_kernel
 def _shift_lanes(
     line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float
 ) -> tuple[int, int]:
@@ -110,7 +109,7 @@ def _shift_lanes(
     return 4, end
 
 
-@lean_kernel
+@lean_inner_kernel
 def _cut(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
     """Cut the corner behind ``begin``."""
     points, new = line.points, memory.new
@@ -124,7 +123,7 @@ def _cut(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far
     return 2
 
 
-@lean_kernel
+@lean_inner_kernel
 def _round_left(
     line: Line, floor: Floor, memory: Memory, random: NDArray[np.uint64], begin: int, far: float
 ) -> int:
@@ -159,7 +158,7 @@ def _round_left(
     return 3
 
 
-@lean_kernel
+@lean_inner_kernel
 def _draw_move(
     line: Line, floor: Floor, memory: Memory, random: NDArray[np.uint64], begin: int
 ) -> tuple[int, int]:
@@ -217,8 +216,8 @@ def anneal(
         heat: first and last temperature, as shares of the initial one.
         most_tried: limit on the moves tried, including those tried before.
 
-        Returns:
-            The total gain [s]; it may be negative.
+    Returns:
+        The total gain [s]; it may be negative.
     """
     following = line.next
     hottest_s = HOTTEST * 2.0 * floor.tool * price.drive_s

@@ -7,7 +7,7 @@ A row is padded to whole words with pixels outside of the raster. Column j of a 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel
 
 Bits = NDArray[np.uint64]
 WORD = 64
@@ -52,7 +52,7 @@ def any_between(row: NDArray[np.uint64], first: int, last: int) -> bool:
     return bool(found | (row[end] & high))
 
 
-@lean_kernel
+@lean_inner_kernel
 def _widen(row: NDArray[np.uint64], times: int) -> None:
     """Mark the neighbours of marked pixels in a row, a number of times."""
     words = len(row)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.bits import any_between, is_marked
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 
 # Tolerance of contact: a robot exactly as wide as a door fits.
 TOUCH = 1e-3
@@ -148,7 +148,7 @@ def is_clear(
     return row == CLEAR
 
 
-@lean_kernel
+@lean_inner_kernel
 def is_clear_but(
     blocked: NDArray[np.uint64],
     ay: float,

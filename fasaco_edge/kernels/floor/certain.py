@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel
 
 # Edge of a tile [pixels], and of a block, as shifts too.
 TILE_SHIFT, BLOCK_SHIFT = 7, 3
@@ -98,7 +98,7 @@ def _tile_at(places: NDArray[np.int64], row: int, col: int) -> int:
     return -1
 
 
-@lean_kernel
+@lean_inner_kernel
 def _find_deep(
     tiles: FloorTiles,
     whole: NDArray[np.uint64],
@@ -141,7 +141,7 @@ def _find_deep(
             deep[tile, i] &= np.uint64((1 << BLOCKS) - 1)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _find_bounds(place: NDArray[np.float64], row: int, col: int, bounds: NDArray[np.int64]) -> None:
     """Find the window, int64 (4,), that the pixels of the tile from pixel (row, col) on lie in."""
     least_i, least_j, most_i, most_j = np.inf, np.inf, -np.inf, -np.inf
@@ -156,7 +156,7 @@ def _find_bounds(place: NDArray[np.float64], row: int, col: int, bounds: NDArray
     bounds[2], bounds[3] = int(np.floor(most_i)) + 2, int(np.floor(most_j)) + 2
 
 
-@lean_kernel
+@lean_inner_kernel
 def _put_together(
     tiles: FloorTiles, deep: NDArray[np.uint64], row: int, col: int, around: _Around
 ) -> None:
@@ -185,7 +185,7 @@ def _pixel(lookup: _Lookup, row: float, col: float) -> tuple[np.uint64, np.uint6
     return np.uint64(int(i) + lookup.rows), np.uint64(int(j) + lookup.cols)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _leave_at(
     lookup: _Lookup, around: _Around, row: int, col: int, left: NDArray[np.uint8]
 ) -> bool:

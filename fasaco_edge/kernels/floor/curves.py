@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.bits import is_marked
 from fasaco_edge.kernels.floor.words import PIECES, find_words
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel, lean_kernel
 
 # Points on a word are this far apart where it is checked [pixels]; their number at most.
 CHECK_PX = 2.0
@@ -54,9 +54,9 @@ class Base(NamedTuple):
         radius: of arcs [pixels].
         reverses: whether the robot drives backward, too.
         straight_s, arc_s: for a pixel [s].
-        back: backward counts this many times as much.
+        back: factor of the cost of driving backward.
         stop_s: for a change between forward and backward [s].
-        steered: a bend between two straights up to this is steered [rad].
+        steered: largest bend between two straights that is steered [rad].
         spot_s: for a turn on the spot [s].
         near_s: for a pixel without clearance [s].
         width: of the tool [pixels].
@@ -125,7 +125,7 @@ def _word_s(
     return seconds
 
 
-@lean_kernel
+@lean_inner_kernel
 def _trace(
     pose: NDArray[np.float64],
     turned: float,
@@ -162,7 +162,7 @@ def _trace(
     return count, near
 
 
-@lean_kernel
+@lean_inner_kernel
 def _left_s(
     line: Line,
     first: int,
@@ -221,7 +221,7 @@ def _step(
         ways.lengths[state, 0] = (-way if back else way) / base.radius
 
 
-@lean_kernel
+@lean_inner_kernel
 def _link(
     line: Line,
     base: Base,

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.bits import is_marked
 from fasaco_edge.kernels.floor.line import (
+    LEAST_GAIN_S,
     NONE,
     TRIED,
     Floor,
@@ -12,12 +13,12 @@ from fasaco_edge.kernels.floor.line import (
     Memory,
     Price,
     copy_point,
-    gain_of,
+    gain_above,
     has_room,
     replace_points,
 )
 from fasaco_edge.kernels.floor.sweeps import BLOCK, Sweeps
-from fasaco_edge.kernels.jit import as_value, inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, kernel, lean_inner_kernel, lean_kernel
 
 # A detour leaves its edge this far before the spot, and joins it this far after [pixels].
 SPREAD = 6.0
@@ -25,7 +26,7 @@ SPREAD = 6.0
 LEAST_LEFT = 3
 
 
-@lean_kernel
+@lean_inner_kernel
 def middle_left(sweeps: Sweeps, i: int, j: int, place: NDArray[np.float64]) -> bool:
     """Find the middle of a block's unswept floor; False if there is none."""
     rows, cols = sweeps.counts.shape
@@ -42,7 +43,7 @@ def middle_left(sweeps: Sweeps, i: int, j: int, place: NDArray[np.float64]) -> b
     return True
 
 
-@lean_kernel
+@lean_inner_kernel
 def nearest_place(places: NDArray[np.uint64], place: NDArray[np.float64], reach: int) -> bool:
     """Move a point to the nearest place within reach; False if there is none."""
     rows, cols = places.shape[0], places.shape[1] << 6
@@ -59,7 +60,7 @@ def nearest_place(places: NDArray[np.uint64], place: NDArray[np.float64], reach:
     return found
 
 
-@lean_kernel
+@lean_inner_kernel
 def _round_over(
     line: Line, floor: Floor, price: Price, memory: Memory, begin: int, best: float
 ) -> tuple[float, int]:
@@ -104,7 +105,7 @@ def _round_over(
             new[0, 0], new[0, 1] = by, bx
             new[1, 0], new[1, 1] = qy, qx
             count = 2
-        gain = gain_of(line, floor, price, memory, begin, end, count)
+        gain = gain_above(line, floor, price, memory, begin, end, count, LEAST_GAIN_S)
         if gain > best:
             best, counted = gain, count
             for number in range(count):
@@ -112,7 +113,7 @@ def _round_over(
     return best, counted
 
 
-@lean_kernel
+@lean_inner_kernel
 def detour(
     line: Line,
     floor: Floor,

@@ -27,7 +27,7 @@ from fasaco_edge.kernels.floor.line import (
 from fasaco_edge.kernels.floor.nearness import near_px
 from fasaco_edge.kernels.floor.seconds import edge_s, turn_s
 from fasaco_edge.kernels.floor.sweeps import exchange, swept_more
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 
 
 class Exchange(NamedTuple):
@@ -54,7 +54,7 @@ def _behind(line: Line, number: int) -> int:
     return NONE if number == NONE else line.next[number]
 
 
-@lean_kernel
+@lean_inner_kernel
 def _seconds(
     points: NDArray[np.float64], quads: NDArray[np.int64], count: int, price: Price
 ) -> float:
@@ -73,7 +73,7 @@ def _seconds(
     return seconds
 
 
-@lean_kernel
+@lean_inner_kernel
 def _copy_edges(
     points: NDArray[np.float64], quads: NDArray[np.int64], count: int, ends: NDArray[np.float64]
 ) -> int:
@@ -87,7 +87,7 @@ def _copy_edges(
     return copied
 
 
-@lean_kernel
+@lean_inner_kernel
 def _prepare(floor: Floor, memory: Memory, olds: int, news: int) -> tuple[int, int]:
     """Prepare the capsules of the edges copied; return how many there are before and after."""
     scratch, taken, given = memory.capsules, 0, 0
@@ -98,7 +98,7 @@ def _prepare(floor: Floor, memory: Memory, olds: int, news: int) -> tuple[int, i
     return taken, given
 
 
-@lean_kernel
+@lean_inner_kernel
 def _near_px(floor: Floor, ends: NDArray[np.float64], count: int) -> float:
     length = 0.0
     for at in range(0, count, 2):
@@ -106,10 +106,10 @@ def _near_px(floor: Floor, ends: NDArray[np.float64], count: int) -> float:
     return length
 
 
-@lean_kernel
+@lean_inner_kernel
 def _gain(line: Line, floor: Floor, price: Price, memory: Memory, edges: Exchange) -> float:
-    """Return the gain of an exchange [s]; 0.0 if a new edge is blocked, or there is none without
-    what is gained in clearance."""
+    """Return the gain of an exchange [s]; 0.0 for none, for a blocked edge, or if clearance alone
+    would gain."""
     points, old, new, count = line.points, memory.before, memory.after, edges.size[0]
     longer_s = _seconds(points, edges.news, count, price)
     longer_s -= _seconds(points, edges.olds, count, price)
@@ -132,7 +132,7 @@ def _gain(line: Line, floor: Floor, price: Price, memory: Memory, edges: Exchang
     return gain if gain >= LEAST_GAIN_S else 0.0
 
 
-@lean_kernel
+@lean_inner_kernel
 def _sweep(line: Line, floor: Floor, memory: Memory, edges: Exchange) -> None:
     """Count the edges of an exchange out and in."""
     olds = _copy_edges(line.points, edges.olds, edges.size[0], memory.before)
@@ -141,7 +141,7 @@ def _sweep(line: Line, floor: Floor, memory: Memory, edges: Exchange) -> None:
     exchange(floor.sweeps, memory.capsules, taken, given, floor.tool)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _turn_round(line: Line, first: int, last: int) -> None:
     """Exchange next and previous of all points from one to another."""
     following, preceding = line.next, line.previous
@@ -161,38 +161,8 @@ def _link(line: Line, a: int, b: int) -> None:
         line.previous[b] = a
 
 
-@lean_kernel
-def reverse_stretch(
-    line: Line,
-    floor: Floor,
-    price: Price,
-    memory: Memory,
-    edges: Exchange,
-    a: int,
-    c: int,
-) -> float:
-    """Reverse the stretch from behind ``a`` to ``c``, if that gains; return the gain [s]."""
-    following, preceding = line.next, line.previous
-    b, d = following[a], following[c]
-    if b == c or (d == NONE and line.is_end_fixed):
-        return 0.0
-    edges.size[0] = 2
-    _set(edges.olds, 0, preceding[a], a, b, following[b])
-    _set(edges.olds, 1, preceding[c], c, d, _behind(line, d))
-    _set(edges.news, 0, preceding[a], a, c, preceding[c])
-    _set(edges.news, 1, following[b], b, d, _behind(line, d))
-    gain = _gain(line, floor, price, memory, edges)
-    if gain == 0.0:
-        return 0.0
-    _sweep(line, floor, memory, edges)
-    _turn_round(line, b, c)
-    _link(line, a, c)
-    _link(line, b, d)
-    return gain
-
-
-@lean_kernel
-def move_stretch(
+@lean_inner_kernel
+def exchange_stretch(
     line: Line,
     floor: Floor,
     price: Price,
@@ -203,26 +173,46 @@ def move_stretch(
     e: int,
     is_turned: bool,
 ) -> float:
-    """Move the stretch from ``b`` to ``c`` behind ``e``, if that gains; return the gain [s].
+    """Move the stretch from ``b`` to ``c`` behind ``e``, or reverse it, if that gains.
 
-    The stretch has two points or more, and a point before it; it is neither next to ``e`` nor to
-    the point behind ``e``.
+    A stretch that moves has two points or more; it is neither next to ``e`` nor to the point behind
+    ``e``.
+
+    Args:
+        line, floor, price, memory: as for ``gain_above``.
+        edges: working memory.
+        b, c: first and last point of the stretch; there is one before it.
+        e: the point to move it behind; NONE to reverse it where it is.
+        is_turned: whether it is driven backward.
+
+    Returns:
+        The gain [s]; 0.0 if the line is as before.
     """
     following, preceding = line.next, line.previous
-    a, d, g = preceding[b], following[c], following[e]
-    if line.is_end_fixed and min(d, g) == NONE:
-        return 0.0
-    edges.size[0] = 3
-    _set(edges.olds, 0, preceding[a], a, b, following[b])
-    _set(edges.olds, 1, preceding[c], c, d, _behind(line, d))
-    _set(edges.olds, 2, preceding[e], e, g, _behind(line, g))
-    _set(edges.news, 0, preceding[a], a, d, _behind(line, d))
-    if is_turned:
-        _set(edges.news, 1, preceding[e], e, c, preceding[c])
-        _set(edges.news, 2, following[b], b, g, _behind(line, g))
+    a, d, g = preceding[b], following[c], NONE
+    if e == NONE:
+        if b == c or (d == NONE and line.is_end_fixed):
+            return 0.0
+        edges.size[0] = 2
+        _set(edges.olds, 0, preceding[a], a, b, following[b])
+        _set(edges.olds, 1, preceding[c], c, d, _behind(line, d))
+        _set(edges.news, 0, preceding[a], a, c, preceding[c])
+        _set(edges.news, 1, following[b], b, d, _behind(line, d))
     else:
-        _set(edges.news, 1, preceding[e], e, b, following[b])
-        _set(edges.news, 2, preceding[c], c, g, _behind(line, g))
+        g = following[e]
+        if line.is_end_fixed and min(d, g) == NONE:
+            return 0.0
+        edges.size[0] = 3
+        _set(edges.olds, 0, preceding[a], a, b, following[b])
+        _set(edges.olds, 1, preceding[c], c, d, _behind(line, d))
+        _set(edges.olds, 2, preceding[e], e, g, _behind(line, g))
+        _set(edges.news, 0, preceding[a], a, d, _behind(line, d))
+        if is_turned:
+            _set(edges.news, 1, preceding[e], e, c, preceding[c])
+            _set(edges.news, 2, following[b], b, g, _behind(line, g))
+        else:
+            _set(edges.news, 1, preceding[e], e, b, following[b])
+            _set(edges.news, 2, preceding[c], c, g, _behind(line, g))
     gain = _gain(line, floor, price, memory, edges)
     if gain == 0.0:
         return 0.0
@@ -230,7 +220,11 @@ def move_stretch(
     if is_turned:
         _turn_round(line, b, c)
         b, c = c, b
-    _link(line, a, d)
-    _link(line, e, b)
-    _link(line, c, g)
+    if e == NONE:
+        _link(line, a, b)
+        _link(line, c, d)
+    else:
+        _link(line, a, d)
+        _link(line, e, b)
+        _link(line, c, g)
     return gain

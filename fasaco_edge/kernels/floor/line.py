@@ -23,7 +23,7 @@ from fasaco_edge.kernels.floor.sweeps import (
     swept_more,
 )
 from fasaco_edge.kernels.floor.turning import Turning
-from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel
 
 # Least gain of a move [s]: rounding of sums must not cause cycles.
 LEAST_GAIN_S = 1e-3
@@ -36,6 +36,8 @@ MOST_CHAIN = MOST_NEW + 4
 # Limit on the capsules compared: edges of the chains before and after.
 MOST_CAPSULES = 2 * (MOST_CHAIN - 1)
 NONE = -1
+# Number of new points of an attempt that is no move.
+NO_MOVE = -1
 
 
 class Line(NamedTuple):
@@ -111,7 +113,7 @@ def copy_point(source: NDArray[np.float64], at: int, target: NDArray[np.float64]
     target[to, 0], target[to, 1] = source[at, 0], source[at, 1]
 
 
-@lean_kernel
+@lean_inner_kernel
 def left_around(
     left: NDArray[np.int32], points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
@@ -149,7 +151,7 @@ class Chains(NamedTuple):
     last_new: int
 
 
-@lean_kernel
+@lean_inner_kernel
 def _chains(line: Line, memory: Memory, begin: int, end: int, count: int) -> Chains:
     points, following, preceding = line.points, line.next, line.previous
     old, new = memory.before, memory.after
@@ -182,7 +184,7 @@ def _chains(line: Line, memory: Memory, begin: int, end: int, count: int) -> Cha
     return Chains(lead, olds, news, olds - 1 - behind, news - 1 - behind)
 
 
-@lean_kernel
+@lean_inner_kernel
 def is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> bool:
     """Return whether the edges between two points of a chain are clear, and none is too short."""
     for number in range(first, last):
@@ -195,7 +197,7 @@ def is_way(floor: Floor, points: NDArray[np.float64], first: int, last: int) -> 
     return True
 
 
-@lean_kernel
+@lean_inner_kernel
 def prepare_edges(
     scratch: Scratch, at: int, points: NDArray[np.float64], first: int, last: int, tool: float
 ) -> int:
@@ -207,7 +209,7 @@ def prepare_edges(
     return max(last - first, 0)
 
 
-@lean_kernel
+@lean_inner_kernel
 def gain_above(
     line: Line,
     floor: Floor,
@@ -255,15 +257,7 @@ def gain_above(
     return gain if gain >= least_s else -np.inf
 
 
-@lean_kernel
-def gain_of(
-    line: Line, floor: Floor, price: Price, memory: Memory, begin: int, end: int, count: int
-) -> float:
-    """Return the gain of ``gain_above`` [s]; 0.0 if it is less than LEAST_GAIN_S."""
-    return max(gain_above(line, floor, price, memory, begin, end, count, LEAST_GAIN_S), 0.0)
-
-
-@lean_kernel
+@lean_inner_kernel
 def note_change(line: Line, begin: int, tool: float, hops: int, now: int) -> int:
     """Return when the line was last changed around some points, beginning with the point before
     ``begin``; with ``now`` above 0 note a change there."""
@@ -302,7 +296,7 @@ def has_room(line: Line) -> bool:
     return bool(line.state[USED] <= len(line.points) - MOST_NEW)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _sweep_between(
     line: Line, floor: Floor, memory: Memory, begin: int, end: int, times: int
 ) -> None:
@@ -315,7 +309,7 @@ def _sweep_between(
         number = following[number]
 
 
-@lean_kernel
+@lean_inner_kernel
 def replace_points(
     line: Line, floor: Floor, memory: Memory, begin: int, end: int, count: int
 ) -> None:

@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.capsule import is_clear
-from fasaco_edge.kernels.jit import lean_kernel
+from fasaco_edge.kernels.jit import lean_inner_kernel
 
 # Edges are checked in pieces of at most this length [pixels].
 PIECE = 4.0
 
 
-@lean_kernel
+@lean_inner_kernel
 def near_px(
     blocked: NDArray[np.uint64],
     points: NDArray[np.float64],

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.floor.bits import NONE, ONE, WORD, Bits, is_marked, spread
 from fasaco_edge.kernels.floor.capsule import TOUCH, is_clear, is_clear_but, is_near
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.lattice.footprint import Box, Placement
 
 # Bends are searched at every n-th pixel.
@@ -150,7 +150,7 @@ def _pixels_of(placement: Placement, row: int, col: int, shape: tuple[int, int])
     )
 
 
-@lean_kernel
+@lean_inner_kernel
 def _step_aside(
     blocked: NDArray[np.uint64],
     places: NDArray[np.uint64],
@@ -246,7 +246,7 @@ def choose_stands(
             _step_aside(blocked, places, placement, cell, clear, stands[row, col])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _bend(
     blocked: NDArray[np.uint64],
     places: NDArray[np.uint64],

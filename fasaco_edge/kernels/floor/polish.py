@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.floor.detour import detour
 from fasaco_edge.kernels.floor.line import (
     HOPS,
+    LEAST_GAIN_S,
+    NO_MOVE,
     NONE,
     TIME,
     TRIED,
@@ -19,12 +21,12 @@ from fasaco_edge.kernels.floor.line import (
     Line,
     Memory,
     Price,
-    gain_of,
+    gain_above,
     has_room,
     note_change,
     replace_points,
 )
-from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel, lean_kernel
 
 # A pass that gains less is the last [s].
 LEAST_PASS_S = 0.2
@@ -33,6 +35,11 @@ SHIFTS = (1.0, -1.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0)
 HALF_ROOT = 0.7071067811865476
 # Points move along both axes, both diagonals, and their two edges.
 DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (HALF_ROOT, HALF_ROOT), (HALF_ROOT, -HALF_ROOT))
+# Attempts at a point: from 0 on the next one or two points are left out; from MOVES on the next one
+# moves; at MEETING it moves to a crossing of lines; then the edge after it shifts.
+MOVES = 2
+MEETING = MOVES + (len(DIRECTIONS) + 2) * len(SHIFTS)
+ATTEMPTS = MEETING + 1 + 2 * len(SHIFTS)
 # Longest move of a point to a crossing of lines, and longest slide of an edge's end.
 FARTHEST_MEETING, FARTHEST_SLIDE = 16.0, 12.0
 # Least value of unswept floor around a block for a detour [s].
@@ -60,66 +67,49 @@ def meeting(
     return True
 
 
-@lean_kernel
-def _leave_out(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -> float:
-    """Remove the next point, or the next two, while that gains; return the gain [s]."""
-    gained = 0.0
-    while line.next[begin] != NONE:
-        end, gain = line.next[begin], 0.0
-        for _ in range(2):
-            end = line.next[end]
-            gain = gain_of(line, floor, price, memory, begin, end, as_value(0))
-            if gain > 0.0 or end == NONE:
-                break
-        if gain == 0.0:
-            break
-        replace_points(line, floor, memory, begin, end, as_value(0))
-        gained += gain
-    return gained
+@lean_inner_kernel
+def _move(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, int]:
+    """Move the point after ``begin`` by a shift in one of six directions."""
+    points, new = line.points, memory.new
+    middle = line.next[begin]
+    end = line.next[middle]
+    direction = attempt // len(SHIFTS)
+    if direction < len(DIRECTIONS):
+        dy, dx = DIRECTIONS[direction]
+    else:
+        other = begin if direction == len(DIRECTIONS) else end
+        if other == NONE:
+            return NO_MOVE, end
+        dy, dx = points[other, 0] - points[middle, 0], points[other, 1] - points[middle, 1]
+        length = np.sqrt(dy * dy + dx * dx)
+        dy, dx = dy / length, dx / length
+    shift = SHIFTS[attempt % len(SHIFTS)]
+    new[0, 0] = points[middle, 0] + shift * dy
+    new[0, 1] = points[middle, 1] + shift * dx
+    return 1, end
 
 
-@lean_kernel
-def _move(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -> float:
-    """Move the point after ``begin``; return the gain [s]."""
+@lean_inner_kernel
+def _move_to_meeting(line: Line, memory: Memory, begin: int) -> tuple[int, int]:
+    """Move the point after ``begin`` to where the edges before and after its own would meet."""
     points, following, preceding, new = line.points, line.next, line.previous, memory.new
     middle = following[begin]
     end = following[middle]
-    gained = 0.0
-    for direction in range(6):
-        if direction < 4:
-            dy, dx = DIRECTIONS[direction]
-        else:
-            other = begin if direction == 4 else end
-            if other == NONE:
-                continue
-            dy, dx = points[other, 0] - points[middle, 0], points[other, 1] - points[middle, 1]
-            length = np.sqrt(dy * dy + dx * dx)
-            dy, dx = dy / length, dx / length
-        for shift in SHIFTS:
-            new[0, 0] = points[middle, 0] + shift * dy
-            new[0, 1] = points[middle, 1] + shift * dx
-            gain = gain_of(line, floor, price, memory, begin, end, as_value(1))
-            if gain > 0.0:
-                replace_points(line, floor, memory, begin, end, as_value(1))
-                gained += gain
-                break
     if end == NONE or preceding[begin] == NONE or following[end] == NONE:
-        return gained
+        return NO_MOVE, end
     first, last = points[preceding[begin]], points[following[end]]
     ay, ax = points[begin, 0], points[begin, 1]
-    if meeting(first[0], first[1], ay, ax, points[end], last, memory.place):
-        dy = memory.place[0] - points[middle, 0]
-        dx = memory.place[1] - points[middle, 1]
-        if dy * dy + dx * dx <= FARTHEST_MEETING * FARTHEST_MEETING:
-            new[0, 0], new[0, 1] = memory.place[0], memory.place[1]
-            gain = gain_of(line, floor, price, memory, begin, end, as_value(1))
-            if gain > 0.0:
-                replace_points(line, floor, memory, begin, end, as_value(1))
-                gained += gain
-    return gained
+    if not meeting(first[0], first[1], ay, ax, points[end], last, memory.place):
+        return NO_MOVE, end
+    dy = memory.place[0] - points[middle, 0]
+    dx = memory.place[1] - points[middle, 1]
+    if dy * dy + dx * dx > FARTHEST_MEETING * FARTHEST_MEETING:
+        return NO_MOVE, end
+    new[0, 0], new[0, 1] = memory.place[0], memory.place[1]
+    return 1, end
 
 
-@lean_kernel
+@lean_inner_kernel
 def slide(
     place: NDArray[np.float64],
     a: NDArray[np.float64],
@@ -140,34 +130,58 @@ def slide(
     return True
 
 
-@lean_kernel
-def _shift(line: Line, floor: Floor, price: Price, memory: Memory, begin: int) -> float:
-    """Shift the edge after ``begin``'s next point as a whole; return the gain [s]."""
+@lean_inner_kernel
+def _shift(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, int]:
+    """Shift the edge after ``begin``'s next point; then also slide its ends."""
     points, following, new = line.points, line.next, memory.new
-    gained = 0.0
-    for slides in range(2):
-        for shift in SHIFTS:
-            a = following[begin]
-            b = following[a]
-            end = following[b]
-            dy, dx = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
-            length = np.sqrt(dy * dy + dx * dx)
-            dy, dx = -shift * dx / length, shift * dy / length
-            ay, ax = points[a, 0] + dy, points[a, 1] + dx
-            by, bx = points[b, 0] + dy, points[b, 1] + dx
-            new[0, 0], new[0, 1], new[1, 0], new[1, 1] = ay, ax, by, bx
-            if slides:
-                moved = slide(new[0], points[begin], points[a], memory, ay, ax, by, bx)
-                if end != NONE:
-                    moved |= slide(new[1], points[b], points[end], memory, ay, ax, by, bx)
-                if not moved:
-                    continue
-            gain = gain_of(line, floor, price, memory, begin, end, as_value(2))
-            if gain > 0.0:
-                replace_points(line, floor, memory, begin, end, as_value(2))
-                gained += gain
-                break
-    return gained
+    a = following[begin]
+    b = following[a]
+    if b == NONE:
+        return NO_MOVE, b
+    end = following[b]
+    shift = SHIFTS[attempt % len(SHIFTS)]
+    dy, dx = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
+    length = np.sqrt(dy * dy + dx * dx)
+    dy, dx = -shift * dx / length, shift * dy / length
+    ay, ax = points[a, 0] + dy, points[a, 1] + dx
+    by, bx = points[b, 0] + dy, points[b, 1] + dx
+    new[0, 0], new[0, 1], new[1, 0], new[1, 1] = ay, ax, by, bx
+    if attempt >= len(SHIFTS):
+        moved = slide(new[0], points[begin], points[a], memory, ay, ax, by, bx)
+        if end != NONE:
+            moved |= slide(new[1], points[b], points[end], memory, ay, ax, by, bx)
+        if not moved:
+            return NO_MOVE, end
+    return 2, end
+
+
+@lean_inner_kernel
+def _propose(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, int]:
+    """Write the points of an attempt at a point into ``memory.new``.
+
+    Returns:
+        Number of points to insert, or NO_MOVE; the point after these.
+    """
+    if attempt < MOVES:
+        end = line.next[line.next[begin]]
+        if attempt == 0:
+            return 0, end
+        return (NO_MOVE, end) if end == NONE else (0, line.next[end])
+    if attempt < MEETING:
+        return _move(line, memory, begin, attempt - MOVES)
+    if attempt == MEETING:
+        return _move_to_meeting(line, memory, begin)
+    return _shift(line, memory, begin, attempt - MEETING - 1)
+
+
+@inlined
+def _after_gain(attempt: int) -> int:
+    """Return the attempt that follows one that gained."""
+    if attempt < MOVES:
+        return 0
+    first = MOVES if attempt < MEETING else MEETING + 1
+    # A point or an edge is moved once in each direction.
+    return attempt + len(SHIFTS) - (attempt - first) % len(SHIFTS) if attempt != MEETING else first
 
 
 @lean_kernel
@@ -201,13 +215,19 @@ def polish(
                 continue
             line.state[TIME] += 1
             line.seen[begin] = line.state[TIME]
-            gain = _leave_out(line, floor, price, memory, begin)
+            gain, attempt = 0.0, as_value(0)
+            while attempt < ATTEMPTS and line.next[begin] != NONE:
+                count, end = _propose(line, memory, begin, attempt)
+                more = -np.inf
+                if count != NO_MOVE:
+                    more = gain_above(line, floor, price, memory, begin, end, count, LEAST_GAIN_S)
+                attempt = _after_gain(attempt) if more > 0.0 else attempt + 1
+                if more > 0.0:
+                    replace_points(line, floor, memory, begin, end, count)
+                    gain += more
             if line.next[begin] == NONE:
                 pass_s += gain
                 break
-            gain += _move(line, floor, price, memory, begin)
-            if line.next[line.next[begin]] != NONE:
-                gain += _shift(line, floor, price, memory, begin)
             # Detours follow once the other moves have converged, otherwise they would stay.
             if passes > 0:
                 gain += detour(line, floor, price, memory, begin, farthest, least)

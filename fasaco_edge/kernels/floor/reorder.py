@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.exchange import Exchange, move_stretch, reverse_stretch
+from fasaco_edge.kernels.floor.exchange import Exchange, exchange_stretch
 from fasaco_edge.kernels.floor.line import NONE, Floor, Line, Memory, Price
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 from fasaco_edge.kernels.random import draw
 
 # Farthest point that a new edge leads to, in radii of the tool.
@@ -35,7 +35,7 @@ class Order(NamedTuple):
     other: NDArray[np.int64]
 
 
-@lean_kernel
+@lean_inner_kernel
 def _number(line: Line, at: NDArray[np.int64]) -> int:
     """Fill in the positions of a line's points; return how many there are."""
     number, count = 0, 0
@@ -46,14 +46,14 @@ def _number(line: Line, at: NDArray[np.int64]) -> int:
     return count
 
 
-@lean_kernel
+@lean_inner_kernel
 def _square(order: Order, line: Line, number: int, side: float) -> tuple[int, int]:
     rows, cols = order.first.shape
     i, j = int(line.points[number, 0] / side), int(line.points[number, 1] / side)
     return min(max(i, 0), rows - 1), min(max(j, 0), cols - 1)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _stretch(line: Line, order: Order, bits: int, c: int, e: int) -> tuple[int, int]:
     """Return the first and last point of a stretch that begins or ends at ``c``, to move behind
     ``e``; NONE if there is none."""
@@ -76,39 +76,27 @@ def _stretch(line: Line, order: Order, bits: int, c: int, e: int) -> tuple[int, 
     return first, last
 
 
-@lean_kernel
-def _try(
-    line: Line,
-    floor: Floor,
-    price: Price,
-    memory: Memory,
-    order: Order,
-    edges: Exchange,
-    bits: int,
-    a: int,
-    c: int,
-) -> float:
-    """Make a move drawn by ``bits``, if it gains; return the gain [s].
+@lean_inner_kernel
+def _draw_move(line: Line, order: Order, bits: int, a: int, c: int) -> tuple[int, int, int, bool]:
+    """Draw a move by ``bits``.
 
     A stretch that begins or ends at ``c`` moves next to ``a``, three times in four; otherwise the
     two points, or those before them, are joined by a reversal.
+
+    Returns:
+        The last four arguments of ``exchange_stretch``; its first point is NONE for no move.
     """
     if bits & 3:
         e = a if bits & 4 else line.previous[a]
         if e == NONE:
-            return 0.0
+            return NONE, NONE, NONE, False
         first, last = _stretch(line, order, bits >> 5, c, e)
-        if first == NONE:
-            return 0.0
-        is_turned = bits >> 4 & 1 == 1
-        return move_stretch(line, floor, price, memory, edges, first, last, e, is_turned)
+        return first, last, e, bits >> 4 & 1 == 1
     if order.at[a] > order.at[c]:
         a, c = c, a
     if bits & 4:
         a, c = line.previous[a], line.previous[c]
-    if a == NONE:
-        return 0.0
-    return reverse_stretch(line, floor, price, memory, edges, a, c)
+    return (NONE if a == NONE else line.next[a]), c, NONE, True
 
 
 @kernel
@@ -132,8 +120,8 @@ def reorder(
     capacity, side = len(line.points), FARTHEST * floor.tool
     rows, cols = floor.sweeps.counts.shape
     edges = Exchange(np.empty((3, 4), np.int64), np.empty((3, 4), np.int64), np.zeros(1, np.int64))
-    first = np.full((int(rows / side) + 1, int(cols / side) + 1), NONE, np.int64)
-    order = Order(np.zeros(capacity, np.int64), first, np.full(capacity, NONE, np.int64))
+    squares = np.full((int(rows / side) + 1, int(cols / side) + 1), NONE, np.int64)
+    order = Order(np.zeros(capacity, np.int64), squares, np.full(capacity, NONE, np.int64))
     along = np.empty(_number(line, order.at), np.int64)
     number = 0
     for place in range(len(along)):
@@ -153,7 +141,12 @@ def reorder(
                     dy = line.points[c, 0] - line.points[a, 0]
                     dx = line.points[c, 1] - line.points[a, 1]
                     if c != a and bits & 1 and dy * dy + dx * dx <= side * side:
-                        gain = _try(line, floor, price, memory, order, edges, bits >> 1, a, c)
+                        first, last, e, is_turned = _draw_move(line, order, bits >> 1, a, c)
+                        gain = 0.0
+                        if first != NONE:
+                            gain = exchange_stretch(
+                                *(line, floor, price, memory, edges, first, last, e, is_turned)
+                            )
                         if gain > 0.0:
                             gained += gain
                             _number(line, order.at)

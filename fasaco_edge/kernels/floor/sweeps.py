@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.floor.capsule import right_of, right_side
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 
 # A pixel's centre on the rim counts as covered.
 RIM = 1e-7
@@ -189,7 +189,7 @@ def _over(stretches: NDArray[np.int64], count: int, col: int, end: int) -> tuple
     return times, end
 
 
-@lean_kernel
+@lean_inner_kernel
 def swept_more(
     counts: NDArray[np.int16],
     scratch: Scratch,
@@ -238,7 +238,7 @@ def swept_more(
     return more - lost
 
 
-@lean_kernel
+@lean_inner_kernel
 def exchange(sweeps: Sweeps, scratch: Scratch, taken: int, given: int, radius: float) -> None:
     """Count the first ``taken`` capsules out and the next ``given`` in, where they differ."""
     before, after = scratch.before, scratch.after
@@ -261,7 +261,7 @@ def exchange(sweeps: Sweeps, scratch: Scratch, taken: int, given: int, radius: f
             col = end
 
 
-@lean_kernel
+@lean_inner_kernel
 def sweep(
     sweeps: Sweeps,
     ay: float,

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 
 # Limits on the pieces of a word, and on the words to a goal.
 PIECES, MOST_WORDS = 5, 44
@@ -220,7 +220,7 @@ def _turn_round(sides: NDArray[np.int8], lengths: NDArray[np.float64]) -> None:
         lengths[piece], lengths[other] = lengths[other], lengths[piece]
 
 
-@lean_kernel
+@lean_inner_kernel
 def find_words(
     x: float,
     y: float,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 
 
 class Areas(NamedTuple):
@@ -30,7 +30,7 @@ class Areas(NamedTuple):
     inner: NDArray[np.int32]
 
 
-@lean_kernel
+@lean_inner_kernel
 def root(parents: NDArray[np.integer], piece: int) -> int:
     """Return the root of ``piece`` (union-find with path compression).
 
@@ -42,7 +42,7 @@ def root(parents: NDArray[np.integer], piece: int) -> int:
     return piece
 
 
-@lean_kernel
+@lean_inner_kernel
 def _join_pieces(
     kinds: NDArray[np.uint8], labels: NDArray[np.int32], parents: NDArray[np.int32]
 ) -> int:
@@ -73,7 +73,7 @@ def _join_pieces(
     return pieces
 
 
-@lean_kernel
+@lean_inner_kernel
 def _number(parents: NDArray[np.int32], pieces: int) -> int:
     """Replace the parent of each piece by its area's number; return how many areas there are."""
     areas = 0
@@ -87,7 +87,7 @@ def _number(parents: NDArray[np.int32], pieces: int) -> int:
     return areas
 
 
-@lean_kernel
+@lean_inner_kernel
 def _measure(
     kinds: NDArray[np.uint8], parents: NDArray[np.int32], areas: Areas, longest: NDArray[np.int32]
 ) -> None:
@@ -128,7 +128,7 @@ def find_areas(kinds: NDArray[np.uint8]) -> Areas:
     return areas
 
 
-@lean_kernel
+@lean_inner_kernel
 def _beside(labels: NDArray[np.int32], row: int, col: int, found: NDArray[np.int32]) -> int:
     """Fill in the areas beside a cell, each once; return their number."""
     rows, cols = labels.shape

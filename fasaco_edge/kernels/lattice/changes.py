@@ -1,14 +1,14 @@
 """Differences of two maps on one raster, and the lattice cells that they may change.
 
-Most of two maps is equal. So strips as wide as the map are compared first, in memory order, then
-segments of those that differ, and pixels last. Beyond its window a map is unknown: a map that has
-grown differs where it is known now.
+Two maps of one building are mostly equal. So strips as wide as the map are compared first, in
+memory order, then segments of the strips that differ, and pixels last. Beyond its window a map is
+unknown: a map that has grown differs where it is known now.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.lattice.footprint import (
     Box,
     Pixels,
@@ -37,7 +37,7 @@ def _shows(pixels: Pixels, box: Box) -> bool:
     )
 
 
-@lean_kernel
+@lean_inner_kernel
 def _rows_differ(old: NDArray[np.int8], new: NDArray[np.int8]) -> bool:
     # Without an early end the loop is vectorised; the same below.
     differ = False
@@ -46,7 +46,7 @@ def _rows_differ(old: NDArray[np.int8], new: NDArray[np.int8]) -> bool:
     return differ
 
 
-@lean_kernel
+@lean_inner_kernel
 def _row_is_blank(values: NDArray[np.int8]) -> bool:
     found = False
     for index in range(len(values)):
@@ -54,7 +54,7 @@ def _row_is_blank(values: NDArray[np.int8]) -> bool:
     return not found
 
 
-@lean_kernel
+@lean_inner_kernel
 def _is_blank(pixels: Pixels, box: Box) -> bool:
     """Return whether a box in the window holds only unknown pixels."""
     left, right = box.col0 - pixels.col, box.col1 - pixels.col
@@ -64,7 +64,7 @@ def _is_blank(pixels: Pixels, box: Box) -> bool:
     return True
 
 
-@lean_kernel
+@lean_inner_kernel
 def are_equal(before: Pixels, after: Pixels, box: Box) -> bool:
     """Return whether two maps are the same in a box; False where one shows a part of it alone."""
     if not _shows(before, box):
@@ -79,7 +79,7 @@ def are_equal(before: Pixels, after: Pixels, box: Box) -> bool:
     return True
 
 
-@lean_kernel
+@lean_inner_kernel
 def _changed_box(before: Pixels, after: Pixels, box: Box, thresholds: Thresholds) -> Box:
     """Return the smallest box around the changed pixels of a box; without rows if none has.
 
@@ -100,7 +100,7 @@ def _changed_box(before: Pixels, after: Pixels, box: Box, thresholds: Thresholds
     return Box(row0, col0, row1, col1)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _mark_around(
     box: Box, placement: Placement, stale: NDArray[np.bool_], row: int, col: int
 ) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import COVERABLE, EAST, NORTH, SOUTH, UNKNOWN, WEST
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel
 from fasaco_edge.kernels.lattice.footprint import (
     Box,
     Pixels,
@@ -66,7 +66,7 @@ class _Map(NamedTuple):
     cells: Cells
 
 
-@lean_kernel
+@lean_inner_kernel
 def _stale_block(stale: NDArray[np.bool_], row0: int, col0: int, side: int) -> Box:
     """Return the block of a tile's stale cells; without rows where there are none."""
     row1, col1 = min(row0 + side, stale.shape[0]), min(col0 + side, stale.shape[1])
@@ -79,7 +79,7 @@ def _stale_block(stale: NDArray[np.bool_], row0: int, col0: int, side: int) -> B
     return Box(top, left, bottom, right)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _classify_states(given: _Map, block: Box, table: PixelSums) -> None:
     pixels, placement, cells = given.pixels, given.placement, given.cells
     radius = placement.radius
@@ -132,7 +132,7 @@ def _classify_step(given: _Map, row: int, col: int, towards: int, table: PixelSu
     cells.steps[row, col] = others | legal << towards
 
 
-@lean_kernel
+@lean_inner_kernel
 def _classify_tile(
     given: _Map, tile: Box, weights: NDArray[np.int64], sums: NDArray[np.int64]
 ) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import BLOCKED, COVERABLE, UNKNOWN
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 
 
 class Placement(NamedTuple):
@@ -92,7 +92,7 @@ def reach_of(placement: Placement) -> float:
     return max(abs(placement.ux), abs(placement.uy)) + placement.radius
 
 
-@lean_kernel
+@lean_inner_kernel
 def lane_is_free(
     pixels: Pixels,
     x: float,

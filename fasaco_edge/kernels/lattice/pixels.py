@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import BLOCKED, COVERABLE, UNKNOWN
-from fasaco_edge.kernels.jit import inlined, kernel, lean_kernel
+from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel
 from fasaco_edge.kernels.lattice.footprint import Pixels, Placement, Thresholds, state_of
 
 
-@lean_kernel
+@lean_inner_kernel
 def _count(values: NDArray[np.int8], free: int) -> int:
     # Without a branch the loop vectorises.
     count = 0
@@ -27,7 +27,7 @@ def _count(values: NDArray[np.int8], free: int) -> int:
     return count
 
 
-@lean_kernel
+@lean_inner_kernel
 def _stretches_beside(
     placement: Placement,
     reached: NDArray[np.bool_],
@@ -119,7 +119,7 @@ class PixelSums(NamedTuple):
     width: int
 
 
-@lean_kernel
+@lean_inner_kernel
 def weigh(thresholds: Thresholds, weights: NDArray[np.int64]) -> None:
     """Fill in the weight of a pixel of occupancy v in a count: int64 (256,), at ``v & 255``."""
     for value in range(-128, 128):
@@ -127,7 +127,7 @@ def weigh(thresholds: Thresholds, weights: NDArray[np.int64]) -> None:
         weights[value & 255] = (state != COVERABLE) + ((state != UNKNOWN) << KNOWN_BIT)
 
 
-@lean_kernel
+@lean_inner_kernel
 def sums_around(
     pixels: Pixels, x: float, y: float, reach_x: float, reach_y: float, sums: NDArray[np.int64]
 ) -> PixelSums:
@@ -140,7 +140,7 @@ def sums_around(
     return PixelSums(sums, row0, col0, max(row1 - row0, 0), max(col1 - col0, 0))
 
 
-@lean_kernel
+@lean_inner_kernel
 def sum_up(pixels: Pixels, weights: NDArray[np.int64], table: PixelSums) -> None:
     """Fill in the sums."""
     stride = table.width + 1
@@ -185,7 +185,7 @@ def _is_off(col: int, x: float, dy: float, radius: float) -> bool:
     return bool(dx * dx + dy * dy >= radius * radius)
 
 
-@lean_kernel
+@lean_inner_kernel
 def disc_state(pixels: Pixels, x: float, y: float, radius: float, table: PixelSums) -> int:
     """Return the worst state under a disc: blocked before unknown before free.
 

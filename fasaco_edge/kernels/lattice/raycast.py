@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel
+from fasaco_edge.kernels.jit import inner_kernel, kernel
 
 
 class Scanner(NamedTuple):
@@ -34,7 +34,7 @@ class Scanner(NamedTuple):
     free_at_most: int
 
 
-@kernel
+@inner_kernel
 def _reveal(
     truth: NDArray[np.int8],
     known: NDArray[np.int8],
@@ -49,7 +49,7 @@ def _reveal(
         changed[2], changed[3] = max(changed[2], row + 1), max(changed[3], col + 1)
 
 
-@kernel
+@inner_kernel
 def _cast_ray(
     truth: NDArray[np.int8],
     known: NDArray[np.int8],
@@ -109,7 +109,7 @@ def cast_rays(
     return changed[0], changed[1], changed[2], changed[3]
 
 
-@kernel
+@inner_kernel
 def _range_of(
     truth: NDArray[np.int8],
     thin: NDArray[np.bool_],
@@ -220,7 +220,7 @@ def count_rays(
     return changed[0], changed[1], changed[2], changed[3]
 
 
-@kernel
+@inner_kernel
 def _touches(x: float, y: float, radius: float, row: int, col: int) -> bool:
     dx, dy = max(col - x, 0.0, x - col - 1), max(row - y, 0.0, y - row - 1)
     return bool(dx * dx + dy * dy < radius * radius)

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
-from fasaco_edge.kernels.jit import as_value, kernel, lean_kernel
+from fasaco_edge.kernels.jit import as_value, kernel, lean_inner_kernel, lean_kernel
 
 UNSEEN = 255
 ROOT = 254
 
 
-@lean_kernel
+@lean_inner_kernel
 def search(
     steps: NDArray[np.uint8],
     offsets: NDArray[np.int64],
@@ -59,7 +59,7 @@ def search(
     return tail
 
 
-@lean_kernel
+@lean_inner_kernel
 def steps_to(offsets: NDArray[np.int64], came_from: NDArray[np.uint8], goal: int) -> int:
     """Return the number of steps to a ``goal`` that ``search`` reached."""
     count = 0
@@ -151,7 +151,7 @@ class _Part(NamedTuple):
     col: int
 
 
-@lean_kernel
+@lean_inner_kernel
 def _holds(part: _Part, row: int, col: int) -> bool:
     """Return whether a cell of the lattice belongs to the part."""
     rows, cols = part.inside.shape
@@ -159,7 +159,7 @@ def _holds(part: _Part, row: int, col: int) -> bool:
     return bool(0 <= row < rows and 0 <= col < cols and part.inside[row, col])
 
 
-@lean_kernel
+@lean_inner_kernel
 def _label(steps: NDArray[np.uint8], part: _Part) -> int:
     """Number the connected pieces of a part; return how many there are."""
     rows, cols = part.inside.shape
@@ -188,7 +188,7 @@ def _label(steps: NDArray[np.uint8], part: _Part) -> int:
     return pieces
 
 
-@lean_kernel
+@lean_inner_kernel
 def _is_rim(steps: NDArray[np.uint8], part: _Part, row: int, col: int) -> bool:
     """Return whether a step leads out of the part from a cell of its rectangle."""
     row, col = part.row + row, part.col + col
@@ -200,7 +200,7 @@ def _is_rim(steps: NDArray[np.uint8], part: _Part, row: int, col: int) -> bool:
     return False
 
 
-@lean_kernel
+@lean_inner_kernel
 def _match(
     steps: NDArray[np.uint8],
     old: _Part,

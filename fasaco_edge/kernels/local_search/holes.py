@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH
-from fasaco_edge.kernels.jit import as_value, kernel
+from fasaco_edge.kernels.jit import as_value, inner_kernel, kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw
 
 
-@kernel
+@inner_kernel
 def _has(ground: Ground, cell: int, direction: int) -> bool:
     return bool(ground.steps[cell] >> direction & 1)
 
 
-@kernel
+@inner_kernel
 def _is_whole(ground: Ground, corner: int) -> bool:
     """Return whether the square north-east of ``corner`` has all four steps."""
     north = ground.offsets[NORTH]
@@ -36,7 +36,7 @@ def _is_whole(ground: Ground, corner: int) -> bool:
     )
 
 
-@kernel
+@inner_kernel
 def _flood(
     ground: Ground, first: int, seen: NDArray[np.uint8], queue: NDArray[np.int32], bound: int
 ) -> None:

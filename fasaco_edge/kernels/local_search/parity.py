@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import NORTH
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 from fasaco_edge.kernels.local_search.walk_array import LENGTH, Ground, Walk, axis_of
 from fasaco_edge.kernels.random import draw, index_of
 
@@ -88,7 +88,7 @@ def _direction(ground: Ground, one: int, other: int) -> int:
     return -1
 
 
-@lean_kernel
+@lean_inner_kernel
 def note_order(ground: Ground, walk: Walk, tally: Tally) -> None:
     """Set ``order_of_old`` from the walk."""
     bound, cells = ground.bound, walk.cells
@@ -100,7 +100,7 @@ def note_order(ground: Ground, walk: Walk, tally: Tally) -> None:
             tally.order_of_old[here, came] = _direction(ground, here, before)
 
 
-@lean_kernel
+@lean_inner_kernel
 def count_steps(ground: Ground, walk: Walk, tally: Tally) -> None:
     """Set ``times`` from the walk; jumps are not steps."""
     bound = ground.bound
@@ -111,7 +111,7 @@ def count_steps(ground: Ground, walk: Walk, tally: Tally) -> None:
             tally.times[min(one, other), axis_of(one, other)] += 1
 
 
-@lean_kernel
+@lean_inner_kernel
 def search_ways(
     ground: Ground, tally: Tally, root: int, limit: int, random: NDArray[np.uint64]
 ) -> int:
@@ -177,13 +177,13 @@ def _odds(growth: int) -> int:
 
 
 @inlined
-def change_step(ground: Ground, tally: Tally, one: int, other: int) -> None:
+def change_step(times: NDArray[np.int16], one: int, other: int) -> None:
     """Decrease the multiplicity of a step that is walked twice, else increase it."""
     edge, axis = min(one, other), axis_of(one, other)
-    tally.times[edge, axis] += -1 if tally.times[edge, axis] >= 2 else 1
+    times[edge, axis] += -1 if times[edge, axis] >= 2 else 1
 
 
-@lean_kernel
+@lean_inner_kernel
 def draw_end(tally: Tally, settled: int, random: NDArray[np.uint64]) -> int:
     """Draw another end for the walk, with odds by the walk's growth."""
     total = 0
@@ -197,7 +197,7 @@ def draw_end(tally: Tally, settled: int, random: NDArray[np.uint64]) -> int:
     return int(tally.order[settled - 1])
 
 
-@lean_kernel
+@lean_inner_kernel
 def common_ancestor(tally: Tally, one: int, other: int) -> int:
     """Return the last common cell of the paths to two settled cells."""
     tally.clock[1] += 1
@@ -210,7 +210,7 @@ def common_ancestor(tally: Tally, one: int, other: int) -> int:
     return other
 
 
-@lean_kernel
+@lean_inner_kernel
 def find_loops(ground: Ground, tally: Tally, settled: int) -> int:
     """List the steps that close a loop around a hole in ``loops``; return their number."""
     now, found = tally.clock[0], 0
@@ -238,7 +238,7 @@ def find_loops(ground: Ground, tally: Tally, settled: int) -> int:
     return found
 
 
-@lean_kernel
+@lean_inner_kernel
 def draw_loop(tally: Tally, found: int, random: NDArray[np.uint64]) -> int:
     """Return one of the loops found, by its odds."""
     total = 0
@@ -265,7 +265,7 @@ def _heading(ground: Ground, tally: Tally, depth: int) -> int:
     return int(known) if known >= 0 else came
 
 
-@lean_kernel
+@lean_inner_kernel
 def _list_jumps(tally: Tally) -> None:
     """Build the list of jumps of each cell, which begins with the cell's ``links``."""
     for jump in range(tally.counts[JUMPS]):
@@ -302,7 +302,7 @@ def _next_jump(tally: Tally, here: int) -> int:
     return -1
 
 
-@lean_kernel
+@lean_inner_kernel
 def euler_walk(
     ground: Ground,
     walk: Walk,

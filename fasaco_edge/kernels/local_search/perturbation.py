@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.disc import cohort, rebuild_disc, strengthen
 from fasaco_edge.kernels.ants.fold import Colony
-from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.local_search.parity import (
     Tally,
     change_step,
@@ -120,25 +120,26 @@ def remember(walk: Walk, memory: Memory) -> None:
 
 
 @inlined
-def _load(search: Search, cells: NDArray[np.int32], length: int) -> None:
+def _load(
+    ground: Ground, walk: Walk, prices: Prices, cells: NDArray[np.int32], length: int
+) -> None:
     """Set the walk to ``cells[:length]``, int32 (capacity,)."""
-    copy(cells, search.walk.cells, length)
-    recount(search.ground, search.walk, length, search.prices)
+    copy(cells, walk.cells, length)
+    recount(ground, walk, length, prices)
 
 
 @lean_kernel
-def recall(search: Search) -> None:
+def recall(ground: Ground, walk: Walk, prices: Prices, memory: Memory) -> None:
     """Go back to the best walk."""
-    _load(search, search.memory.best, search.memory.best_counts[LENGTH])
+    _load(ground, walk, prices, memory.best, memory.best_counts[LENGTH])
 
 
 @inlined
-def _change_way(search: Search, cell: int, root: int, at: int) -> int:
+def _change_way(tally: Tally, touched: NDArray[np.int32], cell: int, root: int, at: int) -> int:
     """Change the steps on the way from ``root`` to ``cell``; list it from ``touched[at]`` on."""
-    tally, touched = search.tally, search.memory.touched
     while cell != root:
         before = tally.parent[cell]
-        change_step(search.ground, tally, cell, before)
+        change_step(tally.times, cell, before)
         touched[at] = cell
         at += 1
         cell = before
@@ -146,21 +147,33 @@ def _change_way(search: Search, cell: int, root: int, at: int) -> int:
     return at + 1
 
 
-@lean_kernel
-def _move_end(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
+@lean_inner_kernel
+def _move_end(
+    ground: Ground,
+    walk: Walk,
+    tally: Tally,
+    touched: NDArray[np.int32],
+    limit: int,
+    random: NDArray[np.uint64],
+) -> int:
     """Move the walk's end elsewhere; return how many cells were touched."""
-    walk, tally = search.walk, search.tally
     root = walk.cells[walk.counts[LENGTH] - 1]
-    settled = search_ways(search.ground, tally, root, limit, random)
+    settled = search_ways(ground, tally, root, limit, random)
     if settled < 2:
         return 0
-    return _change_way(search, draw_end(tally, settled, random), root, as_value(0))
+    return _change_way(tally, touched, draw_end(tally, settled, random), root, as_value(0))
 
 
-@lean_kernel
-def _add_loop(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
+@lean_inner_kernel
+def _add_loop(
+    ground: Ground,
+    walk: Walk,
+    tally: Tally,
+    touched: NDArray[np.int32],
+    limit: int,
+    random: NDArray[np.uint64],
+) -> int:
     """Add a loop round a hole near some visit; return how many cells were touched."""
-    ground, walk, tally = search.ground, search.walk, search.tally
     root = walk.cells[index_of(draw(random), walk.counts[LENGTH])]
     if root >= ground.bound:
         return 0
@@ -172,43 +185,57 @@ def _add_loop(search: Search, limit: int, random: NDArray[np.uint64]) -> int:
     one = step >> 1
     other = one + ground.offsets[step & 1]
     shared = common_ancestor(tally, one, other)
-    change_step(ground, tally, one, other)
-    touched = _change_way(search, one, shared, as_value(0))
-    return _change_way(search, other, shared, touched)
+    change_step(tally.times, one, other)
+    listed = _change_way(tally, touched, one, shared, as_value(0))
+    return _change_way(tally, touched, other, shared, listed)
 
 
-@lean_kernel
-def _change_parity(search: Search, rules: PerturbationRules, random: NDArray[np.uint64]) -> int:
+@lean_inner_kernel
+def _change_parity(
+    ground: Ground,
+    walk: Walk,
+    prices: Prices,
+    tally: Tally,
+    touched: NDArray[np.int32],
+    limit: int,
+    random: NDArray[np.uint64],
+) -> int:
     """Move the end or add a loop; return how many cells were touched, 0 if nothing was."""
-    ground, walk, tally = search.ground, search.walk, search.tally
     length = walk.counts[LENGTH]
     count_steps(ground, walk, tally)
     note_order(ground, walk, tally)
     end = walk.cells[length - 1]
-    if search.prices.free_end and draw(random) & 1:
-        touched = _move_end(search, rules.limit, random)
-        end = search.memory.touched[0]
+    if prices.free_end and draw(random) & 1:
+        count = _move_end(ground, walk, tally, touched, limit, random)
+        end = touched[0]
     else:
-        touched = _add_loop(search, rules.limit, random)
-    if touched == 0 or length + touched + 1 > walk.cells.size:
+        count = _add_loop(ground, walk, tally, touched, limit, random)
+    if count == 0 or length + count + 1 > walk.cells.size:
         return 0
     length = euler_walk(ground, walk, tally, end, random)
-    recount(ground, walk, length, search.prices)
-    return touched
+    recount(ground, walk, length, prices)
+    return count
 
 
-@lean_kernel
+@lean_inner_kernel
 def _settle(
-    search: Search, rules: PerturbationRules, touched: int, radius: int, random: NDArray[np.uint64]
+    ground: Ground,
+    walk: Walk,
+    prices: Prices,
+    memory: Memory,
+    rules: PerturbationRules,
+    touched: int,
+    radius: int,
+    random: NDArray[np.uint64],
 ) -> None:
     """Improve the walk after a perturbation: all of it, or the surroundings, cooling down.
 
     Args:
-        search, rules, random: as for ``perturb``.
+        ground, walk, prices, memory: see above.
+        rules, random: as for ``perturb``.
         touched: number of cells in ``memory.touched``.
         radius: steps from these to the rim of the surroundings; -1 for the whole walk.
     """
-    ground, walk, prices, memory = search.ground, search.walk, search.prices, search.memory
     if radius < 0:
         proposals = rules.proposals * walk.counts[LENGTH]
         improve(ground, walk, prices, memory.area[:0], as_value(0), proposals, random)
@@ -238,7 +265,7 @@ def perturb(
             to draw what is changed.
         random: stream, uint64 (1,), not 0; advanced.
     """
-    ground, walk, prices, _, memory, colony = search
+    ground, walk, prices, tally, memory, colony = search
     for _ in range(times):
         length, cost = walk.counts[LENGTH], walk.counts[COST]
         copy(walk.cells, memory.saved, length)
@@ -247,7 +274,9 @@ def perturb(
             kind = draw(random) & 255
             touched = as_value(0)
             if kind < rules.loops_of_256:
-                touched = _change_parity(search, rules, random)
+                touched = _change_parity(
+                    ground, walk, prices, tally, memory.touched, rules.limit, random
+                )
             elif kind < rules.loops_of_256 + rules.ants_of_256:
                 touched = by_ants = rebuild_disc(ground, walk, prices, colony, memory.saved, random)
                 copy(colony.area, memory.touched, touched)
@@ -259,7 +288,7 @@ def perturb(
                     memory.touched[0] = spot
                     touched = 1
         radius = AROUND_DISC if by_ants else rules.radius
-        _settle(search, rules, touched, radius, random)
+        _settle(ground, walk, prices, memory, rules, touched, radius, random)
         memory.work[PERTURBATIONS] += 1
         if walk.counts[COST] < memory.best_counts[COST]:
             if by_ants:
@@ -267,6 +296,6 @@ def perturb(
                 colony.saved_us[cohort(colony)] += gain_us
             remember(walk, memory)
         elif rules.strict or not accepts(walk.counts[COST] - cost, rules.acceptance_us, random):
-            _load(search, memory.saved, length)
+            _load(ground, walk, prices, memory.saved, length)
         if by_ants:
             strengthen(ground, walk, colony)

@@ -83,8 +83,8 @@ def neighbourhood(
         found: out, int32 (capacity,), the labelled cells, nearest first; no more are
             labelled than fit.
 
-        Returns:
-            The number labelled.
+    Returns:
+        The number labelled.
     """
     size = 0
     for cell in cells:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, kernel
+from fasaco_edge.kernels.jit import inlined, inner_kernel, kernel
 from fasaco_edge.kernels.lattice.reach import UNSEEN, search, steps_to
 from fasaco_edge.kernels.local_search.walk_array import Ground, leads
 
@@ -114,7 +114,7 @@ def _insert(walk: _Walk, after: int, cell: int) -> int:
     return visit
 
 
-@kernel
+@inner_kernel
 def _visit(walk: _Walk, wave: _Wave, goal: int, free_end: bool) -> None:
     """Visit a cell from the nearest one on the walk: there and back, or there from a free end."""
     length, cell = 0, goal
@@ -135,7 +135,7 @@ def _visit(walk: _Walk, wave: _Wave, goal: int, free_end: bool) -> None:
     _insert(walk, at, cell)
 
 
-@kernel
+@inner_kernel
 def _begin(wave: _Wave, visits: NDArray[np.int32], first: int, end: int, tail: int) -> int:
     """Queue the cells of visits ``first`` to ``end``, the last one first; return the tail."""
     for index in range(end - 1, first - 1, -1):
@@ -147,7 +147,7 @@ def _begin(wave: _Wave, visits: NDArray[np.int32], first: int, end: int, tail: i
     return tail
 
 
-@kernel
+@inner_kernel
 def _spread(
     ground: Ground, walk: _Walk, wave: _Wave, tail: int, over_all: bool, free_end: bool
 ) -> int:

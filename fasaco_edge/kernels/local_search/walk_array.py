@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.lattice.reach import walk_cost
 
 LENGTH, SPARE_CELLS, COST = 0, 1, 2
@@ -188,7 +188,7 @@ def is_at(walk: Walk, cell: int, index: int) -> bool:
     return bool(0 <= index < walk.counts[LENGTH] and walk.cells[index] == cell)
 
 
-@lean_kernel
+@lean_inner_kernel
 def find_visit(ground: Ground, walk: Walk, cell: int) -> None:
     """Set ``place`` of a cell that is visited: beside its neighbours' visits, else by search."""
     if is_at(walk, cell, walk.place[cell]):
@@ -238,7 +238,7 @@ def put(ground: Ground, walk: Walk, index: int, cell: int) -> None:
         find_visit(ground, walk, before)
 
 
-@lean_kernel
+@lean_inner_kernel
 def drop(ground: Ground, walk: Walk, index: int, visits: int) -> None:
     """Leave out one or two visits from ``index`` on."""
     cells, place = walk.cells, walk.place

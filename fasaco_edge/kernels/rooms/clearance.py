@@ -8,10 +8,10 @@ row. All in integers, thus equal on all machines.
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 
 
-@lean_kernel
+@lean_inner_kernel
 def _along_columns(solid: NDArray[np.bool_], most: int, ways: NDArray[np.int32]) -> None:
     """Set the distance to the nearest solid pixel, or to the rim, of the same column [pixels]."""
     rows, cols = solid.shape
@@ -25,7 +25,7 @@ def _along_columns(solid: NDArray[np.bool_], most: int, ways: NDArray[np.int32])
             ways[row, col] = min(ways[row, col], after + 1)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _envelope(ways: NDArray[np.int32], at: NDArray[np.int32], begins: NDArray[np.int32]) -> int:
     """Find the lower envelope of the parabolas of a row; return how many it has.
 

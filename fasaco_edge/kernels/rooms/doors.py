@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 
 # Kinds of jambs, the better the higher: no wall; thick, or a corner; thin as far as it has been
 # seen; thin.
@@ -73,12 +73,12 @@ class _Place(NamedTuple):
     right: float
 
 
-@lean_kernel
+@lean_inner_kernel
 def _holds(row: int, col: int, shape: tuple[int, int]) -> bool:
     return 0 <= row < shape[0] and 0 <= col < shape[1]
 
 
-@lean_kernel
+@lean_inner_kernel
 def _is_ridge(clearance: NDArray[np.int32], row: int, col: int) -> bool:
     """Return whether a pixel is as far from walls as its neighbours on two opposite sides."""
     here = clearance[row, col]
@@ -89,7 +89,7 @@ def _is_ridge(clearance: NDArray[np.int32], row: int, col: int) -> bool:
     return False
 
 
-@lean_kernel
+@lean_inner_kernel
 def _way(solid: NDArray[np.bool_], place: _Place, most: float) -> float:
     """Return how far free pixels reach from a place in its direction, at most ``most`` [pixels]."""
     way = 0.5
@@ -102,7 +102,7 @@ def _way(solid: NDArray[np.bool_], place: _Place, most: float) -> float:
     return way
 
 
-@lean_kernel
+@lean_inner_kernel
 def _face(pixels: Pixels, place: _Place, most: float) -> float:
     """Return how far a wall reaches from a place inside it, in the place's direction [pixels].
 
@@ -120,7 +120,7 @@ def _face(pixels: Pixels, place: _Place, most: float) -> float:
     return 0.0
 
 
-@lean_kernel
+@lean_inner_kernel
 def _nearest_solid(pixels: Pixels, row: float, col: float) -> tuple[int, int, bool]:
     """Return the solid pixel at a point, or the nearest beside it, and whether one is occupied.
 
@@ -144,7 +144,7 @@ def _nearest_solid(pixels: Pixels, row: float, col: float) -> tuple[int, int, bo
     return found_row, found_col, is_wall
 
 
-@lean_kernel
+@lean_inner_kernel
 def _jamb_along(pixels: Pixels, end: _Place, wall: float) -> int:
     """Return the kind of the jamb that begins at the end of a chord, in that direction."""
     marks, kind = 0, THIN
@@ -181,7 +181,7 @@ def _jamb_along(pixels: Pixels, end: _Place, wall: float) -> int:
     return kind if marks >= LEAST_MARKS else NONE
 
 
-@lean_kernel
+@lean_inner_kernel
 def _jamb(pixels: Pixels, end: _Place, wall: float) -> int:
     """Return the kind of the jamb at the end of a chord."""
     best = _jamb_along(pixels, end, wall)
@@ -201,7 +201,7 @@ def _jamb(pixels: Pixels, end: _Place, wall: float) -> int:
     return best
 
 
-@lean_kernel
+@lean_inner_kernel
 def _widest(clearance: NDArray[np.int32], place: _Place, reach: int) -> int:
     """Return the largest squared clearance along a line from a place [pixels^2]."""
     widest = 0
@@ -214,7 +214,7 @@ def _widest(clearance: NDArray[np.int32], place: _Place, reach: int) -> int:
     return widest
 
 
-@lean_kernel
+@lean_inner_kernel
 def _door_at(
     pixels: Pixels, centre: tuple[int, int], directions: NDArray[np.float64], limits: DoorLimits,
     door: NDArray[np.float64],

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import kernel, lean_kernel
+from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 from fasaco_edge.kernels.lattice.areas import root
 
 
@@ -28,7 +28,7 @@ class Limits(NamedTuple):
     thick: float
 
 
-@lean_kernel
+@lean_inner_kernel
 def _join(solid: NDArray[np.bool_], labels: NDArray[np.int32], parents: NDArray[np.int32]) -> int:
     """Give each solid pixel the number of a piece; return the number of pieces."""
     rows, cols = solid.shape

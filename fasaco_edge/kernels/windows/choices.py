@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 from fasaco_edge.kernels.local_search.walk_array import ROOM_BIT, Ground
 from fasaco_edge.kernels.random import draw, index_of
 from fasaco_edge.kernels.windows.memory import (
@@ -53,7 +53,7 @@ def _price(
     return int(terms.step // 2 + terms.prices[cell, one] + terms.end_price)
 
 
-@lean_kernel
+@lean_inner_kernel
 def price_cells(
     ground: Ground,
     passages: Passages,
@@ -67,7 +67,7 @@ def price_cells(
     """Write the cells' reduced costs; return the present cost by them, and the last needed cell."""
     now, last = 0, -1
     for index in range(count):
-        cell = program.cells[index]
+        cell = program.cells.listed[index]
         mask = ground.steps[cell]
         least = MUCH
         for one in range(6):
@@ -93,7 +93,7 @@ def price_cells(
     return now, last
 
 
-@lean_kernel
+@lean_inner_kernel
 def list_choices(
     program: Program,
     here: Here,
@@ -107,8 +107,8 @@ def list_choices(
     """List a cell's choices below a cost, cheapest first."""
     keys = program.choice.keys[kind]
     reduced, kinds, pairs = program.reduced[here.number], program.kinds, program.pairs
-    at_ahead = at_rim(program, here.cell, here.ahead)
-    at_below = at_rim(program, here.cell, here.below)
+    at_ahead = at_rim(program.cells.ident, here.cell, here.ahead)
+    at_below = at_rim(program.cells.ident, here.cell, here.below)
     last_ahead = 2 if here.to_ahead else at_ahead
     last_below = 2 if here.to_below else at_below
     listed = 0
@@ -181,14 +181,14 @@ def _added(ground: Ground, terms: Terms, cell: int, side: int) -> int:
     return price
 
 
-@lean_kernel
+@lean_inner_kernel
 def real_cost(
-    ground: Ground, passages: Passages, terms: Terms, program: Program, count: int
+    ground: Ground, passages: Passages, terms: Terms, cells: NDArray[np.int32], count: int
 ) -> int:
-    """Return the cost of the window's passages, without prices."""
+    """Return the cost of the passages of the first ``count`` cells, without prices."""
     total = 0
     for index in range(count):
-        cell = program.cells[index]
+        cell = cells[index]
         for slot in range(SLOTS):
             other = passages.partner[cell, slot]
             if other != NONE and other > slot:

@@ -71,12 +71,10 @@ class Parts(NamedTuple):
     sizes: NDArray[np.int64]
 
 
-class Program(NamedTuple):
-    """Memory of the program.
+class States(NamedTuple):
+    """States before and after a cell.
 
     Attributes:
-        pairs: int8 (PAIRINGS, 2 * MOST_PAIRS), the slots that each pairing joins.
-        choice: of the cell that is decided.
         mates: int16 (2, states, MOST_IDS), for each state and each identifier at an end of a piece,
             the identifier at the other end; one layer before the cell and one after it.
         words: int64 (2, states, MOST_IDS / 4), the same memory.
@@ -84,19 +82,58 @@ class Program(NamedTuple):
         closed: uint8 (2, states), whether the ring is closed.
         parent, code: int32, int64 (states,): predecessor and choice of the states of the layer
             after.
-        kept_parent, kept_code: int32, int64 (most cells + 1, beam), the same of all layers.
         hash: int64 (states,), of the states of the layer after.
         table: int64 (slots,), stamp of the layer and number of a state, by its hash.
         order: int64 (states,), costs while the most expensive are dropped.
         scratch, base: int16 (MOST_IDS,), the new state with the cell's ends, and without them;
             scratch_words, base_words int64 (MOST_IDS / 4,), the same memory.
-        ident: int16 (n, SLOTS), identifier of a slot at the rim.
+        clock: int64 (2,): stamp of the layer; states expanded so far.
+    """
+
+    mates: NDArray[np.int16]
+    words: NDArray[np.int64]
+    cost: NDArray[np.int64]
+    closed: NDArray[np.uint8]
+    parent: NDArray[np.int32]
+    code: NDArray[np.int64]
+    hash: NDArray[np.int64]
+    table: NDArray[np.int64]
+    order: NDArray[np.int64]
+    scratch: NDArray[np.int16]
+    scratch_words: NDArray[np.int64]
+    base: NDArray[np.int16]
+    base_words: NDArray[np.int64]
+    clock: NDArray[np.int64]
+
+
+class Cells(NamedTuple):
+    """The cells of the window, and the slots at its rim.
+
+    Attributes:
+        listed: int32 (most cells,), in order.
         inside: uint8 (n,), 1 in the window.
-        cells: int32 (most cells,), of the window, in order.
+        ident: int16 (n, SLOTS), identifier of a slot at the rim.
         rim: int32 (MOST_IDS, 2), cell and slot of each identifier at the rim.
+    """
+
+    listed: NDArray[np.int32]
+    inside: NDArray[np.uint8]
+    ident: NDArray[np.int16]
+    rim: NDArray[np.int32]
+
+
+class Program(NamedTuple):
+    """Memory of the program.
+
+    Attributes:
+        pairs: int8 (PAIRINGS, 2 * MOST_PAIRS), the slots that each pairing joins.
+        choice: of the cell that is decided.
+        states: the states before and after it.
+        kept_parent, kept_code: int32, int64 (most cells + 1, beam), predecessors and choices of
+            the states of all layers.
+        cells: of the window.
         reduced: int64 (most cells, 6, 6), costs of passages by the directions of their sides.
         left: int64 (most cells + 1,), least cost of the cells from here on.
-        clock: int64 (2,): stamp of the layer; states expanded so far.
         taken: int16 (12,), identifiers of the slots that a cell has; kinds int64 (12,), their
             directions.
         at: int64 (11,), its progress: entries NUMBER to RING_PRICE.
@@ -105,28 +142,12 @@ class Program(NamedTuple):
 
     pairs: NDArray[np.int8]
     choice: Choice
-    mates: NDArray[np.int16]
-    words: NDArray[np.int64]
-    cost: NDArray[np.int64]
-    closed: NDArray[np.uint8]
-    parent: NDArray[np.int32]
-    code: NDArray[np.int64]
+    states: States
     kept_parent: NDArray[np.int32]
     kept_code: NDArray[np.int64]
-    hash: NDArray[np.int64]
-    table: NDArray[np.int64]
-    order: NDArray[np.int64]
-    scratch: NDArray[np.int16]
-    scratch_words: NDArray[np.int64]
-    base: NDArray[np.int16]
-    base_words: NDArray[np.int64]
-    ident: NDArray[np.int16]
-    inside: NDArray[np.uint8]
-    cells: NDArray[np.int32]
-    rim: NDArray[np.int32]
+    cells: Cells
     reduced: NDArray[np.int64]
     left: NDArray[np.int64]
-    clock: NDArray[np.int64]
     taken: NDArray[np.int16]
     kinds: NDArray[np.int64]
     at: NDArray[np.int64]
@@ -259,8 +280,8 @@ class Ends(NamedTuple):
 
 
 @inlined
-def at_rim(program: Program, cell: int, direction: int) -> int:
+def at_rim(ident: NDArray[np.int16], cell: int, direction: int) -> int:
     """Return how many lanes of a side lead out of the window; the first lanes are used first."""
-    if program.ident[cell, 2 * direction] == NO_END:
+    if ident[cell, 2 * direction] == NO_END:
         return 0
-    return 1 if program.ident[cell, 2 * direction + 1] == NO_END else 2
+    return 1 if ident[cell, 2 * direction + 1] == NO_END else 2

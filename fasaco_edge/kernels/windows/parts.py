@@ -6,10 +6,13 @@ cover has at least one open end, unless it may have a ring of its own. A state t
 is infeasible and is dropped.
 """
 
-from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel
 from fasaco_edge.kernels.lattice.areas import root
 from fasaco_edge.kernels.local_search.walk_array import Ground
-from fasaco_edge.kernels.windows.memory import NO_END, Program
+from fasaco_edge.kernels.windows.memory import NO_END, Cells, Parts
 from fasaco_edge.kernels.windows.passages import END
 
 # Limit on the parts that are checked: bits of a word.
@@ -20,41 +23,42 @@ FEW_CELLS = 3
 PARTS, LEADS = 0, 1
 
 
-@lean_kernel
+@lean_inner_kernel
 def prepare_parts(
-    ground: Ground, program: Program, count: int, ahead: int, below: int, begin: int
+    ground: Ground, parts: Parts, cells: Cells, count: int, ahead: int, below: int, begin: int
 ) -> None:
     """Find the cut vertices of parts; label the parts of the whole window."""
-    parts, cells = program.parts, program.cells
     for number in range(count):
-        parts.root[cells[number]] = cells[number]
-        parts.number[cells[number]] = number
+        cell = cells.listed[number]
+        parts.root[cell] = cell
+        parts.number[cell] = number
     for number in range(count - 1, -1, -1):
-        cell = cells[number]
+        cell = cells.listed[number]
         joined = 0
         for direction in (ahead, below):
             beside = cell + ground.offsets[direction]
-            if ground.steps[cell] >> direction & 1 and program.inside[beside]:
+            if ground.steps[cell] >> direction & 1 and cells.inside[beside]:
                 top = root(parts.root, beside)
                 if top != cell:
                     parts.root[top] = cell
                     joined += 1
         parts.splits[number] = joined > 1
-    label_parts(ground, program, as_value(0), count, begin)
+    label_parts(ground, parts, cells, as_value(0), count, begin)
 
 
-@lean_kernel
-def label_parts(ground: Ground, program: Program, first: int, count: int, begin: int) -> None:
+@lean_inner_kernel
+def label_parts(
+    ground: Ground, parts: Parts, cells: Cells, first: int, count: int, begin: int
+) -> None:
     """Label the parts of the cells from number ``first`` on."""
-    parts, cells = program.parts, program.cells
     for number in range(first, count):
-        parts.label[cells[number]] = NO_END
+        parts.label[cells.listed[number]] = NO_END
     labels = 0
     for number in range(first, count):
-        if parts.label[cells[number]] != NO_END:
+        if parts.label[cells.listed[number]] != NO_END:
             continue
-        parts.label[cells[number]] = labels
-        parts.queue[0] = cells[number]
+        parts.label[cells.listed[number]] = labels
+        parts.queue[0] = cells.listed[number]
         head, tail, needed = 0, 1, 0
         while head < tail:
             cell = parts.queue[head]
@@ -62,7 +66,7 @@ def label_parts(ground: Ground, program: Program, first: int, count: int, begin:
             needed += int(ground.needed[cell] > 0 or cell == begin)
             for direction in range(4):
                 beside = cell + ground.offsets[direction]
-                if not ground.steps[cell] >> direction & 1 or not program.inside[beside]:
+                if not ground.steps[cell] >> direction & 1 or not cells.inside[beside]:
                     continue
                 if parts.number[beside] >= first and parts.label[beside] == NO_END:
                     parts.label[beside] = labels
@@ -74,39 +78,40 @@ def label_parts(ground: Ground, program: Program, first: int, count: int, begin:
 
 
 @inlined
-def leads_to(program: Program, identifier: int, cell: int) -> None:
+def leads_to(parts: Parts, identifier: int, cell: int) -> None:
     """Note that an identifier leads into the part of a cell."""
-    parts = program.parts
     parts.leads[parts.sizes[LEADS], 0] = identifier
     parts.leads[parts.sizes[LEADS], 1] = parts.label[cell]
     parts.sizes[LEADS] += 1
 
 
-@lean_kernel
-def list_rim(program: Program, number: int, first: int, ids: int, is_free: bool) -> None:
+@lean_inner_kernel
+def list_rim(
+    parts: Parts, rim: NDArray[np.int32], number: int, first: int, ids: int, is_free: bool
+) -> None:
     """Note which part each identifier of the rim leads into, if its cell comes after a number."""
     for identifier in range(first, ids):
-        cell = program.rim[identifier, 0]
-        if is_free and program.rim[identifier, 1] == END:
+        cell = rim[identifier, 0]
+        if is_free and rim[identifier, 1] == END:
             continue
-        if program.parts.number[cell] > number:
-            leads_to(program, identifier, cell)
+        if parts.number[cell] > number:
+            leads_to(parts, identifier, cell)
 
 
 @inlined
-def is_stuck(program: Program, is_open: bool, may_ring: bool) -> bool:
-    """Return whether the state in ``scratch`` cannot cover the remaining cells.
+def is_stuck(parts: Parts, state: NDArray[np.int16], is_open: bool, may_ring: bool) -> bool:
+    """Return whether a state cannot cover the remaining cells.
 
     Args:
-        program: the memory.
+        parts: of these cells.
+        state: int16 (MOST_IDS,), its mates.
         is_open: whether the walk may end in any remaining cell.
         may_ring: whether a part of two cells or more may have a ring of its own.
     """
-    parts = program.parts
     odd, met = 0, 0
     for index in range(parts.sizes[LEADS]):
         label = int(parts.leads[index, 1])
-        if label < MOST_PARTS and program.scratch[parts.leads[index, 0]] != NO_END:
+        if label < MOST_PARTS and state[parts.leads[index, 0]] != NO_END:
             bit = 1 << label
             odd ^= bit
             met |= bit

@@ -19,7 +19,7 @@ rings may close there at a price (``ring_price``), and ``kernels.windows.rings``
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import as_value, inlined, lean_kernel
+from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.windows.choices import price_cells, real_cost
 from fasaco_edge.kernels.windows.decide import decide
@@ -41,8 +41,10 @@ from fasaco_edge.kernels.windows.memory import (
     PAIRING,
     RING_PRICE,
     STATES,
+    Cells,
     Ends,
     Here,
+    Parts,
     Program,
     Terms,
     Window,
@@ -86,23 +88,23 @@ def begin_window(
         random: state of the stream, uint64 (1,).
     """
     lines, wide = shape_of(window)
-    at, count = program.at, as_value(0)
+    at, cells, count = program.at, program.cells, as_value(0)
     for line in range(lines):
         for place in range(wide):
             cell = cell_at(window, line, place)
             if ground.steps[cell]:
-                program.cells[count] = cell
-                program.inside[cell] = 1
+                cells.listed[count] = cell
+                cells.inside[cell] = 1
                 count += 1
     first = 2 * wide + 2
-    ids = _name_rim(ground, passages, program, first, count)
+    ids = _name_rim(ground, passages, cells, first, count)
     at[LINE], at[NUMBER], at[LAYER], at[STATES] = 0, 0, 0, 0
     at[COUNT], at[IDS], at[BEGIN_ID], at[END_ID] = count, ids, -1, -1
     at[RING_PRICE] = ring_price
     for index in range(first, ids):
-        if program.rim[index, 1] == BEGIN:
+        if cells.rim[index, 1] == BEGIN:
             at[BEGIN_ID] = index
-        if program.rim[index, 1] == END:
+        if cells.rim[index, 1] == END:
             at[END_ID] = index
     if ids < 0:
         return
@@ -111,17 +113,18 @@ def begin_window(
     at[LIMIT], at[LAST] = now + allowance - (0 if noise else 1), last
     if at[LIMIT] <= program.left[0]:
         return
-    _join_outside(ground, passages, program, first, ids)
-    program.cost[0, 0], program.closed[0, 0] = 0, 0
+    _join_outside(ground, passages, cells, program.states.mates[0, 0], first, ids)
+    program.states.cost[0, 0], program.states.closed[0, 0] = 0, 0
     ahead, below = directions_of(window)
-    prepare_parts(ground, program, count, ahead, below, _begin_of(passages, program))
+    begin = _begin_of(passages, at)
+    prepare_parts(ground, program.parts, cells, count, ahead, below, begin)
     at[STATES] = 1
 
 
 @inlined
-def _begin_of(passages: Passages, program: Program) -> int:
+def _begin_of(passages: Passages, at: NDArray[np.int64]) -> int:
     """Return the cell the walk begins in, if that is in the window, else -1."""
-    return int(passages.ends[0]) if program.at[BEGIN_ID] >= 0 else -1
+    return int(passages.ends[0]) if at[BEGIN_ID] >= 0 else -1
 
 
 @lean_kernel
@@ -130,26 +133,27 @@ def advance_window(
 ) -> bool:
     """Decide the next line of cells; return whether any are left. ``beam``: most states kept."""
     lines, wide = shape_of(window)
-    at = program.at
+    at, parts, cells = program.at, program.parts, program.cells
     line = at[LINE]
     if line == lines or not at[STATES]:
         return False
     ahead, below = directions_of(window)
-    begin, end_id, count = _begin_of(passages, program), at[END_ID], at[COUNT]
+    begin, end_id, count = _begin_of(passages, at), at[END_ID], at[COUNT]
     is_free = end_id >= 0 and terms.free_end
     for place in range(wide):
         cell = cell_at(window, line, place)
         if not ground.steps[cell] or not at[STATES]:
             continue
         number = at[NUMBER]
-        here = _here(ground, program, cell, number, 2 * place, 2 * wide, ahead, below, at[IDS])
+        inside, ids = cells.inside, at[IDS]
+        here = _here(ground, inside, cell, number, 2 * place, 2 * wide, ahead, below, ids)
         begins = at[BEGIN_ID] if cell == begin else -1
         is_needed = ground.needed[cell] > 0 or begins >= 0
-        is_checked = _part_with(ground, program, cell, number, count, begin)
+        is_checked = _part_with(ground, parts, cells, cell, number, count, begin)
         if is_checked:
-            program.parts.sizes[LEADS] = 0
-            _list_frontier(ground, program, window, line, place, here)
-            list_rim(program, number, 2 * wide + 2, at[IDS], is_free)
+            parts.sizes[LEADS] = 0
+            _list_frontier(ground, parts, window, line, place, here)
+            list_rim(parts, cells.rim, number, 2 * wide + 2, ids, is_free)
         price = at[RING_PRICE]
         may_close = price > 0 or number >= at[LAST]
         is_given = end_id >= 0 and not is_free and cell == passages.ends[1]
@@ -170,84 +174,87 @@ def end_window(
     Returns:
         The change of the walk's cost [half us], 0 for none.
     """
-    at, (_, wide) = program.at, shape_of(window)
+    at, cells, states, (_, wide) = program.at, program.cells, program.states, shape_of(window)
     layer, end_id, count = at[LAYER], at[END_ID], at[COUNT]
     best, cost = as_value(-1), at[LIMIT]
     for state in range(at[STATES]):
-        is_whole = program.closed[layer, state] == 1
-        if end_id >= 0 and program.mates[layer, state, end_id] != NO_END:
+        is_whole = states.closed[layer, state] == 1
+        if end_id >= 0 and states.mates[layer, state, end_id] != NO_END:
             is_whole = False
-        if is_whole and program.cost[layer, state] < cost:
-            best, cost = state, program.cost[layer, state]
+        if is_whole and states.cost[layer, state] < cost:
+            best, cost = state, states.cost[layer, state]
     for index in range(2 * wide + 2, at[IDS]):
-        program.ident[program.rim[index, 0], program.rim[index, 1]] = NO_END
+        cells.ident[cells.rim[index, 0], cells.rim[index, 1]] = NO_END
     for index in range(count):
-        program.inside[program.cells[index]] = 0
+        cells.inside[cells.listed[index]] = 0
     if best < 0:
         return 0
-    before = real_cost(ground, passages, terms, program, count)
+    before = real_cost(ground, passages, terms, cells.listed, count)
     _put_back(passages, program, window, best, count)
-    return real_cost(ground, passages, terms, program, count) - before
+    return real_cost(ground, passages, terms, cells.listed, count) - before
 
 
-@lean_kernel
-def _name_rim(ground: Ground, passages: Passages, program: Program, first: int, count: int) -> int:
+@lean_inner_kernel
+def _name_rim(ground: Ground, passages: Passages, cells: Cells, first: int, count: int) -> int:
     """Give identifiers to the slots that lead out of the window; return their number, or -1."""
     ids = first
     for index in range(count):
-        cell = program.cells[index]
+        cell = cells.listed[index]
         for slot in range(SLOTS):
             if passages.partner[cell, slot] == NONE:
                 continue
-            if slot < BEGIN and program.inside[cell + ground.offsets[slot >> 1]]:
+            if slot < BEGIN and cells.inside[cell + ground.offsets[slot >> 1]]:
                 continue
             if ids >= MOST_IDS - 8:
                 for other in range(first, ids):
-                    program.ident[program.rim[other, 0], program.rim[other, 1]] = NO_END
+                    cells.ident[cells.rim[other, 0], cells.rim[other, 1]] = NO_END
                 return -1
-            program.ident[cell, slot] = ids
-            program.rim[ids, 0], program.rim[ids, 1] = cell, slot
+            cells.ident[cell, slot] = ids
+            cells.rim[ids, 0], cells.rim[ids, 1] = cell, slot
             ids += 1
     return ids
 
 
-@lean_kernel
+@lean_inner_kernel
 def _join_outside(
-    ground: Ground, passages: Passages, program: Program, first: int, ids: int
+    ground: Ground,
+    passages: Passages,
+    cells: Cells,
+    mates: NDArray[np.int16],
+    first: int,
+    ids: int,
 ) -> None:
     """Write the first state: how the walk outside joins the slots at the rim."""
-    mates = program.mates[0, 0]
     for index in range(MOST_IDS):
         mates[index] = NO_END
     for index in range(first, ids):
         if mates[index] != NO_END:
             continue
-        cell, slot = across(passages, ground.offsets, program.rim[index, 0], program.rim[index, 1])
-        while not program.inside[cell] or program.ident[cell, slot] == NO_END:
+        cell, slot = across(passages, ground.offsets, cells.rim[index, 0], cells.rim[index, 1])
+        while not cells.inside[cell] or cells.ident[cell, slot] == NO_END:
             slot = passages.partner[cell, slot]
             cell, slot = across(passages, ground.offsets, cell, slot)
-        other = program.ident[cell, slot]
+        other = cells.ident[cell, slot]
         mates[index], mates[other] = other, index
 
 
-@lean_kernel
+@lean_inner_kernel
 def _part_with(
-    ground: Ground, program: Program, cell: int, index: int, count: int, begin: int
+    ground: Ground, parts: Parts, cells: Cells, cell: int, index: int, count: int, begin: int
 ) -> bool:
     """Take a cell out of its part; return whether to check states for it."""
-    parts = program.parts
     label = parts.label[cell]
     parts.left[label] -= 1
     parts.needed[label] -= int(ground.needed[cell] > 0 or cell == begin)
     if parts.splits[index]:
-        label_parts(ground, program, index + 1, count, begin)
+        label_parts(ground, parts, cells, index + 1, count, begin)
         return True
     return bool(0 < parts.left[label] <= FEW_CELLS)
 
 
-@lean_kernel
+@lean_inner_kernel
 def _list_frontier(
-    ground: Ground, program: Program, window: Window, line: int, place: int, here: Here
+    ground: Ground, parts: Parts, window: Window, line: int, place: int, here: Here
 ) -> None:
     """Note which part each identifier of the frontier leads into, once the cell is decided."""
     lines, wide = shape_of(window)
@@ -258,16 +265,16 @@ def _list_frontier(
         cell = cell_at(window, after, column)
         if ground.steps[cell] >> here.above & 1:
             for lane in range(2):
-                leads_to(program, 2 * column + lane, cell)
+                leads_to(parts, 2 * column + lane, cell)
     if here.to_ahead:
         for lane in range(2):
-            leads_to(program, here.ahead_id + lane, here.cell + ground.offsets[here.ahead])
+            leads_to(parts, here.ahead_id + lane, here.cell + ground.offsets[here.ahead])
 
 
 @inlined
 def _here(
     ground: Ground,
-    program: Program,
+    inside: NDArray[np.uint8],
     cell: int,
     index: int,
     below_id: int,
@@ -277,7 +284,7 @@ def _here(
     spare_id: int,
 ) -> Here:
     behind, above, mask = (ahead + 2) & 3, (below + 2) & 3, ground.steps[cell]
-    inside, offsets = program.inside, ground.offsets
+    offsets = ground.offsets
     return Here(
         cell,
         index,
@@ -295,7 +302,7 @@ def _here(
     )
 
 
-@lean_kernel
+@lean_inner_kernel
 def _put_back(
     passages: Passages,
     program: Program,
@@ -308,7 +315,7 @@ def _put_back(
     behind, above = (ahead + 2) & 3, (below + 2) & 3
     taken, partner = program.taken, passages.partner
     for index in range(count, 0, -1):
-        cell, code = program.cells[index - 1], program.kept_code[index, state]
+        cell, code = program.cells.listed[index - 1], program.kept_code[index, state]
         swaps, size = code >> 24, 0
         for lane in range(code >> 20 & 3):
             taken[size] = 2 * behind + lane

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import as_value, lean_kernel
+from fasaco_edge.kernels.jit import as_value, lean_inner_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
 from fasaco_edge.kernels.random import draw, index_of
 from fasaco_edge.kernels.windows.memory import Aim, Window
@@ -37,7 +37,7 @@ class Seams(NamedTuple):
     cells: NDArray[np.int32]
 
 
-@lean_kernel
+@lean_inner_kernel
 def draw_seam(ground: Ground, aim: Aim, seams: Seams, random: NDArray[np.uint64]) -> Window:
     """Draw a window where two rings touch; one without rows if none do."""
     count = _list_seams(ground, aim, seams.rings, seams.cells)
@@ -52,7 +52,7 @@ def draw_seam(ground: Ground, aim: Aim, seams: Seams, random: NDArray[np.uint64]
     return laid_in(aim, row, col, rows, cols, as_value(0))
 
 
-@lean_kernel
+@lean_inner_kernel
 def label_rings(ground: Ground, passages: Passages, aim: Aim, seams: Seams) -> int:
     """Write each cell's ring and its visited slots; return the number of rings."""
     partner, rings = passages.partner, seams.rings
@@ -76,7 +76,7 @@ def label_rings(ground: Ground, passages: Passages, aim: Aim, seams: Seams) -> i
     return found
 
 
-@lean_kernel
+@lean_inner_kernel
 def _list_seams(
     ground: Ground, aim: Aim, rings: NDArray[np.int32], seams: NDArray[np.int32]
 ) -> int:

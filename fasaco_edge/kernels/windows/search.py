@@ -59,12 +59,12 @@ def solve_windows(
     Returns:
         Number of rings left; 1 if there are no ``seams``.
     """
-    until, left = program.clock[EXPANDED] + expansions, as_value(1)
+    until, left = program.states.clock[EXPANDED] + expansions, as_value(1)
     is_joining = seams.cells.size > 0
     if is_joining:
         left = label_rings(ground, passages, aim, seams)
     for _ in range(windows):
-        if program.clock[EXPANDED] >= until:
+        if program.states.clock[EXPANDED] >= until:
             break
         if is_joining:
             if left <= 1:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.jit import inlined, lean_kernel
+from fasaco_edge.kernels.jit import inlined, lean_inner_kernel
 from fasaco_edge.kernels.windows.memory import (
     AHEAD,
     BELOW,
@@ -15,9 +15,11 @@ from fasaco_edge.kernels.windows.memory import (
     NO_PAIR,
     PAIRING,
     SECOND_NEW,
+    Choice,
     Ends,
     Here,
     Program,
+    States,
 )
 
 # The lowest bits of a slot's entry are the state, the others the stamp of its layer.
@@ -38,11 +40,19 @@ def take_in(base: NDArray[np.int16], first: int, spare: int) -> int:
 
 
 @inlined
-def _name(program: Program, size: int, cell: int, direction: int, lanes: int, first: int) -> int:
+def _name(
+    taken: NDArray[np.int16],
+    ident: NDArray[np.int16],
+    size: int,
+    cell: int,
+    direction: int,
+    lanes: int,
+    first: int,
+) -> int:
     """Append the identifiers of a side to ``taken``: from ``first`` on; -1 for those at the rim."""
     for lane in range(lanes):
-        at_rim = program.ident[cell, 2 * direction + lane]
-        program.taken[size + lane] = at_rim if first < 0 else first + lane
+        at_rim = ident[cell, 2 * direction + lane]
+        taken[size + lane] = at_rim if first < 0 else first + lane
     return size + lanes
 
 
@@ -57,16 +67,20 @@ def name_ends(
     above: int,
 ) -> None:
     """Write which identifiers a choice pairs up, and which of them are new."""
-    taken, choice = program.taken, program.choice
+    taken, ident, choice = program.taken, program.cells.ident, program.choice
     code = choice.keys[kind, number]
     ahead, below = code >> AHEAD & 3, code >> BELOW & 3
     cell, spare = here.cell, here.spare_id
-    size = _name(program, 0, cell, here.behind, behind, spare if here.from_behind else -1)
-    size = _name(program, size, cell, here.above, above, spare + 2 if here.from_above else -1)
+    size = _name(taken, ident, 0, cell, here.behind, behind, spare if here.from_behind else -1)
+    size = _name(taken, ident, size, cell, here.above, above, spare + 2 if here.from_above else -1)
     first_new = size
-    size = _name(program, size, cell, here.ahead, ahead, here.ahead_id if here.to_ahead else -1)
+    size = _name(
+        taken, ident, size, cell, here.ahead, ahead, here.ahead_id if here.to_ahead else -1
+    )
     first_below = size
-    size = _name(program, size, cell, here.below, below, here.below_id if here.to_below else -1)
+    size = _name(
+        taken, ident, size, cell, here.below, below, here.below_id if here.to_below else -1
+    )
     last_new = size
     if ends.begin_id >= 0:
         taken[size] = ends.begin_id
@@ -89,14 +103,22 @@ def name_ends(
 
 
 @inlined
-def apply(program: Program, ends: Ends, kind: int, number: int, was_closed: int, words: int) -> int:
+def apply(
+    states: States,
+    choice: Choice,
+    ends: Ends,
+    kind: int,
+    number: int,
+    was_closed: int,
+    words: int,
+) -> int:
     """Write the state after a choice into ``scratch``; return how many rings are closed, or -1."""
-    choice, mates = program.choice, program.scratch
+    mates = states.scratch
     if was_closed and choice.how[kind, number, 0] != NO_PAIR and not ends.ring_price:
         return -1
     closed = was_closed
     for word in range(words):
-        program.scratch_words[word] = program.base_words[word]
+        states.scratch_words[word] = states.base_words[word]
     for pair in range(MOST_PAIRS):
         how = choice.how[kind, number, pair]
         if how == NO_PAIR:
@@ -161,7 +183,7 @@ def _same(one: NDArray[np.int64], other: NDArray[np.int64], words: int) -> bool:
 
 @inlined
 def file_state(
-    program: Program,
+    states: States,
     layer: int,
     made: int,
     words: int,
@@ -171,39 +193,39 @@ def file_state(
     code: int,
 ) -> int:
     """File the state in ``scratch``, or its lower cost; return the number of states."""
-    mask = program.table.size - 1
-    stamp = program.clock[LAYER_STAMP]
-    value = _hash(program.scratch_words, words)
+    mask = states.table.size - 1
+    stamp = states.clock[LAYER_STAMP]
+    value = _hash(states.scratch_words, words)
     slot = _slot_of(value, mask)
-    while program.table[slot] >> INDEX_BITS == stamp:
-        found = program.table[slot] & INDICES
-        is_same = program.hash[found] == value and program.closed[layer, found] == closed
-        if is_same and _same(program.words[layer, found], program.scratch_words, words):
-            if cost < program.cost[layer, found]:
-                program.cost[layer, found] = cost
-                program.parent[found], program.code[found] = parent, code
+    while states.table[slot] >> INDEX_BITS == stamp:
+        found = states.table[slot] & INDICES
+        is_same = states.hash[found] == value and states.closed[layer, found] == closed
+        if is_same and _same(states.words[layer, found], states.scratch_words, words):
+            if cost < states.cost[layer, found]:
+                states.cost[layer, found] = cost
+                states.parent[found], states.code[found] = parent, code
             return made
         slot = (slot + 1) & mask
-    program.table[slot] = stamp << INDEX_BITS | made
+    states.table[slot] = stamp << INDEX_BITS | made
     for word in range(words):
-        program.words[layer, made, word] = program.scratch_words[word]
-    program.cost[layer, made], program.closed[layer, made] = cost, closed
-    program.parent[made], program.code[made], program.hash[made] = parent, code, value
+        states.words[layer, made, word] = states.scratch_words[word]
+    states.cost[layer, made], states.closed[layer, made] = cost, closed
+    states.parent[made], states.code[made], states.hash[made] = parent, code, value
     return made + 1
 
 
-@lean_kernel
-def shrink(program: Program, layer: int, made: int, words: int, beam: int) -> tuple[int, int]:
+@lean_inner_kernel
+def shrink(states: States, layer: int, made: int, words: int, beam: int) -> tuple[int, int]:
     """Keep the ``beam`` cheapest states; return their number, and the least cost dropped."""
-    cost, order = program.cost[layer], program.order
+    cost, order = states.cost[layer], states.order
     for state in range(made):
         order[state] = cost[state]
     cut = _nth(order, made, beam)
     ties = beam
     for state in range(made):
         ties -= int(cost[state] < cut)
-    program.clock[LAYER_STAMP] += 1
-    stamp, mask = program.clock[LAYER_STAMP], program.table.size - 1
+    states.clock[LAYER_STAMP] += 1
+    stamp, mask = states.clock[LAYER_STAMP], states.table.size - 1
     kept = 0
     for state in range(made):
         if cost[state] > cut:
@@ -214,19 +236,19 @@ def shrink(program: Program, layer: int, made: int, words: int, beam: int) -> tu
             ties -= 1
         if kept != state:
             for word in range(words):
-                program.words[layer, kept, word] = program.words[layer, state, word]
-            cost[kept], program.closed[layer, kept] = cost[state], program.closed[layer, state]
-            program.parent[kept], program.code[kept] = program.parent[state], program.code[state]
-            program.hash[kept] = program.hash[state]
-        slot = _slot_of(program.hash[kept], mask)
-        while program.table[slot] >> INDEX_BITS == stamp:
+                states.words[layer, kept, word] = states.words[layer, state, word]
+            cost[kept], states.closed[layer, kept] = cost[state], states.closed[layer, state]
+            states.parent[kept], states.code[kept] = states.parent[state], states.code[state]
+            states.hash[kept] = states.hash[state]
+        slot = _slot_of(states.hash[kept], mask)
+        while states.table[slot] >> INDEX_BITS == stamp:
             slot = (slot + 1) & mask
-        program.table[slot] = stamp << INDEX_BITS | kept
+        states.table[slot] = stamp << INDEX_BITS | kept
         kept += 1
     return kept, cut
 
 
-@lean_kernel
+@lean_inner_kernel
 def _nth(values: NDArray[np.int64], size: int, place: int) -> int:
     """Return the value at ``place`` if the first ``size`` values were sorted (Hoare, 1961)."""
     first, last = 0, size - 1

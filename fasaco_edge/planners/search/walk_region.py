@@ -185,7 +185,8 @@ class WalkRegion:
 
     def go_back(self) -> None:
         """Continue from the best walk here."""
-        recall(self._search)
+        ground, walk, prices, _, memory, _ = self._search
+        recall(ground, walk, prices, memory)
 
     def put_back(self) -> NDArray[np.int32]:
         """Return the whole walk, int32 (m,), including the best walk here."""

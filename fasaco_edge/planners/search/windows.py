@@ -21,9 +21,11 @@ from fasaco_edge.kernels.windows.memory import (
     NO_END,
     PAIRINGS,
     Aim,
+    Cells,
     Choice,
     Parts,
     Program,
+    States,
     Terms,
     Window,
 )
@@ -272,17 +274,13 @@ def _program(size: int, beam: int, cells: int) -> Program:
         leads=np.zeros((MOST_IDS, 2), np.int16),
         sizes=np.zeros(2, np.int64),
     )
-    return Program(
-        pairs=PAIRS,
-        choice=choice,
+    of_states = States(
         mates=mates,
         words=mates.view(np.int64),
         cost=np.zeros((2, states), np.int64),
         closed=np.zeros((2, states), np.uint8),
         parent=np.zeros(states, np.int32),
         code=np.zeros(states, np.int64),
-        kept_parent=np.zeros((cells + 1, beam), np.int32),
-        kept_code=np.zeros((cells + 1, beam), np.int64),
         hash=np.zeros(states, np.int64),
         table=np.zeros(slots, np.int64),
         order=np.zeros(states, np.int64),
@@ -290,13 +288,23 @@ def _program(size: int, beam: int, cells: int) -> Program:
         scratch_words=scratch.view(np.int64),
         base=base,
         base_words=base.view(np.int64),
-        ident=np.full((size, SLOTS), NO_END, np.int16),
+        clock=np.zeros(2, np.int64),
+    )
+    of_window = Cells(
+        listed=np.zeros(cells, np.int32),
         inside=np.zeros(size, np.uint8),
-        cells=np.zeros(cells, np.int32),
+        ident=np.full((size, SLOTS), NO_END, np.int16),
         rim=np.zeros((MOST_IDS, 2), np.int32),
+    )
+    return Program(
+        pairs=PAIRS,
+        choice=choice,
+        states=of_states,
+        kept_parent=np.zeros((cells + 1, beam), np.int32),
+        kept_code=np.zeros((cells + 1, beam), np.int64),
+        cells=of_window,
         reduced=np.zeros((cells, 6, 6), np.int64),
         left=np.zeros(cells + 1, np.int64),
-        clock=np.zeros(2, np.int64),
         taken=np.zeros(12, np.int16),
         kinds=np.zeros(12, np.int64),
         at=np.zeros(11, np.int64),
