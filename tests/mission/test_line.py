@@ -219,6 +219,17 @@ def test_the_status_says_what_of_the_floor_is_left_and_why():
     assert told.reachable_m2 == pytest.approx(told.reached_m2 + sum(left.values()), abs=0.002)
 
 
+def test_after_a_restart_floor_left_by_a_finished_order_has_its_reasons():
+    grid, robot = room(3.0, 2.4), Robot(Mission(CONFIG))
+    robot.tell(MapReceived(grid))
+    robot.finish()
+    before = {left.reason for left in floor_report(robot.mission).left}
+    again = Robot(Mission(CONFIG), at=robot.at)
+    again.mission.restore(robot.mission.snapshot(), robot.mission.order_state)
+    again.tell(MapReceived(grid))
+    assert {left.reason for left in floor_report(again.mission).left} == before
+
+
 def test_no_floor_is_not_worth_the_way_before_the_first_path():
     mission = Mission(CONFIG)
     pose = PoseReceived(StampedPose(Pose2D(*START), "map"))

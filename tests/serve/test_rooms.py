@@ -203,3 +203,37 @@ def tap(tab: Tab, x: float, y: float) -> None:
     tab.js("canvas.scrollIntoView()")
     tab.touch(tab.on_screen(x, y))
     until(lambda: tab.js("find('room').offsetParent !== null"))
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
+def test_words_and_typed_numbers_are_of_the_right_room(tmp_path):
+    with (
+        daemon_process(tmp_path, mission={"autostart": False}) as daemon,
+        Outsider(daemon.endpoint) as outsider,
+        served(tmp_path, daemon.endpoint, "--allow-commands") as page,
+        browsing(page.url, tmp_path / "browser") as tab,
+    ):
+        outsider.put("map", map_bytes(two_rooms(door=True)))
+        outsider.put("pose", pose_bytes(1.05, 1.05))
+        until(lambda: tab.js("foundRooms().length") == 2 and tab.js("Boolean(model.map)"))
+        # On a page that is opened anew, rooms come after the state.
+        tab.js("start({ zones: foundRooms().map((room) => zoneOf(room.id)) })")
+        until(lambda: "room" in tab.js("find('share-of').textContent"))
+        rooms = tab.js("JSON.stringify(model.rooms)")
+        words = tab.js(
+            f"model.rooms = null; showState(); model.rooms = {rooms}; showRooms();"
+            "find('share-of').textContent"
+        )
+        assert "room" in words
+        one, other = (int(tab.js(f"roomAt([{x}, 2.5])")) for x in (1.05, 4.65))
+        tab.touch(tab.on_screen(1.05, 2.5))
+        until(lambda: tab.js("pickedRoom") == one)
+        # Another room is tapped before the field is left.
+        tab.js("find('roompasses').focus(); find('roompasses').select(); canvas.scrollIntoView()")
+        tab.call("Input.insertText", text="4")
+        tab.touch(tab.on_screen(4.65, 2.5))
+        until(lambda: tab.js("pickedRoom") == other)
+        until(lambda: tab.js("foundRooms().some((room) => room.passes === 4)"))
+        assert tab.js(f"roomOf({one}).passes") == 4
+        assert tab.js(f"roomOf({other}).passes") is None
+        assert tab.complaints == []

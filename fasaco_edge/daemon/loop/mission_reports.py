@@ -124,7 +124,8 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     if to_sweep is None:
         return FloorReport(swept_m2)
     # Before the first path no floor is planned; on the way home the line is set aside.
-    order, is_planned = mission.order_state, mission.route.revision > 0
+    order = mission.order_state
+    is_planned = mission.route.revision > 0 or mission.orders.is_over
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
     comes_later = (is_aside and order.is_open) or mission.orders.scope.worth.least

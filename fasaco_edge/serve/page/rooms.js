@@ -73,11 +73,14 @@ function roomAt(at) {
 
 // The card of the tapped room.
 function pickRoom(id) {
+  // What was typed is of the room picked until now: without focus, a field tells of its change.
+  if (find("room").contains(document.activeElement)) document.activeElement.blur();
   pickedRoom = id;
   showRooms();
 }
 
 function showRooms() {
+  if (model.state && model.state.state) showProgress(model.state);
   const room = roomOf(pickedRoom);
   if (!room) pickedRoom = 0;
   const mayCommand = model.role === "operator";
