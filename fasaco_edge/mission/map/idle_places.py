@@ -1,7 +1,7 @@
 """Places without effect: keep-outs that touch no free ground, home or dock off the map.
 
-Wrong units, signs or origins cause them. A zone of an order there is refused; these places are only
-reported, as the map may grow, and as they apply to later maps, too.
+Causes are wrong units, signs or origins. Orders with such a zone are refused. Places of the
+configuration are only reported: the map may grow, and later maps use them, too.
 """
 
 from __future__ import annotations

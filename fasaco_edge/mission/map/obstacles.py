@@ -28,9 +28,9 @@ WIDEN_AFTER_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
 # Assumed depth of an obstacle, away from the robot; spacing of its points; the follower's clearance
 # from it; width of the ring around the robot's disc that stays free [m].
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
-# Largest map on which obstacles are drawn [pixels], as it is then kept twice (``daemon.memory``).
+# Largest map on which obstacles are drawn [pixels]: such a map is kept twice (``daemon.memory``).
 MOST_PIXELS = 6_000_000
-# Limit on the obstacles kept, which are the newest; and on the points of each.
+# Limit on the obstacles kept, the newest ones; limit on the points of each.
 MOST, MOST_POINTS = 32, 192
 
 
@@ -96,7 +96,7 @@ class Obstacles:
         return True
 
     def open_due(self, now: float) -> bool:
-        """Open the floor whose time is up; return whether there was any."""
+        """Open floor when its time is up; return whether there was any."""
         self._past = [one for one in self._past if now - one.until < FORGET_S][-MOST:]
         due = [one for one in self._closed if now >= one.until]
         if due:
