@@ -27,8 +27,8 @@ def located(
     """Return an order with its named zones in place: standing zones first, then rooms.
 
     Raises:
-        OrderError: no zone or room has the name, and the order does not wait for one; or no room
-            has the number. An order never waits for a number, as any new room may get it.
+        OrderError: a name is unknown, and the order does not wait for a room; or no room has the
+            number. An order never waits for a number, as any new room may get it.
     """
     known = {zone.name: tuple(zone.polygon) for zone in standing}
     may_wait = order.unknown == "wait"

@@ -98,7 +98,7 @@ class PlanScope:
         return self._company.passable(area, cell, self._config.footprint.robot_radius_m)
 
     def puts_other_first(self, ahead_s: float) -> bool:
-        """Choose again if the path ahead, ``ahead_s`` [s], is too long; return whether it did."""
+        """Choose again if the path ahead takes too long; return whether the choice changed."""
         area = self._map.area
         if area is None:
             return False
