@@ -38,7 +38,7 @@ BEYOND_CELLS = 20
 EARLY, PLACES_AHEAD = 0.2, 8
 # Limit on the cells of a lattice on which these places are compared: larger ones take too long.
 MOST_CELLS = 200_000
-# The battery counts as full once its level has risen by less than RISE for this long [s].
+# The battery is full if its level has risen by less than RISE in FULL_AFTER_S [s].
 RISE, FULL_AFTER_S = 0.005, 1800.0
 
 
@@ -179,7 +179,7 @@ class Charging:
             return ""
         silent_s = self.policy.silent_s
         why = self.gauge.why_silent(now - silent_s)
-        return f"no charge of the battery for {silent_s:g} s{why}"
+        return f"no battery level for {silent_s:g} s{why}"
 
     def why_no_dock(self) -> str:
         """Return why the robot has no place to charge on this map; "" if it has one."""
@@ -266,7 +266,7 @@ class Charging:
         if why := self.silence(now):
             return f"{why}: waits for one"
         if self.gauge.level is None:
-            return "waits for the charge of the battery"
+            return "waits for the level of the battery"
         power = self.gauge.power
         but = f", but {power}" if power in ("discharging", "full") else ""
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"

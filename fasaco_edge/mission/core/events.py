@@ -130,7 +130,7 @@ class Part:
 
 
 SAME_LATTICE = Pose2D(0.0, 0.0)
-"""Pose of another robot's lattice in this robot's, if both have the same map."""
+"""Pose of another robot's lattice in this robot's lattice, if both have the same map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +146,8 @@ class MemberReceived:
         step_s: its time to sweep one cell [s].
         epoch: epoch number of its tiles, see ``fleet.shared``.
         division: number of its newest division.
-        tiles: places and bits of the cells it has swept; a subset of its tiles.
-        ground: places and bits of the cells it can reach; a subset of its tiles.
+        tiles: cells it has swept, as places and bits of tiles; each message has some of its tiles.
+        ground: cells it can reach, in the same form.
         by: name of the robot that made ``division``.
         parts: each robot's part of ``division``.
         radius_m: radius of its disc [m].

@@ -33,9 +33,9 @@ LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
 SAME_DEG, PLENTY_M = 1.5, 15.0
 # The least rotation that is worth a stop of the robot [deg].
 LEAST_ROTATION_DEG = 2.0
-# Distance driven between estimates [m]; limit on the number of estimates.
+# An estimate is due every BETWEEN_M of driving [m], at most MOST_LOOKS times.
 BETWEEN_M, MOST_LOOKS = 1.0, 40
-# Distance between poses that is a jump [m]; limit on a map's pixels, as estimates take long.
+# Poses farther apart than JUMP_M [m] are a jump. Maps of more than MOST_PIXELS take too long.
 JUMP_M, MOST_PIXELS = 1.0, 4_000_000
 
 
@@ -170,13 +170,12 @@ class LatticeLayout:
         return f"cells lie {along} at {self.deg:.1f} degrees to the map frame"
 
     def changes_for_pass(self, lay: Laid, grid: OccupancyGrid) -> bool:
-        """Take angle and edge of a pass's lanes if the map allows; return whether either
-        changed."""
+        """Take angle and edge of a pass's lanes if the map allows; return whether any changed."""
         wanted = self._usual_deg if lay.angle_deg is None else lay.angle_deg
         cell_m, tool_m = self._lane_and_tool_m(lay)
         if (wanted, cell_m) == (self.deg, self.cell_m):
             return False
-        # The map may grow.
+        # Leave room for the map to grow.
         if not self._fits(grid, wanted, cell_m, share=0.5):
             return False
         self.deg, self.cell_m, self._tool_m = wanted, cell_m, tool_m

@@ -135,7 +135,7 @@ class OrderChanges:
         return update
 
     def follow_rooms(self) -> None:
-        """Let the zones of the order follow their rooms; want a plan if cells to cover change."""
+        """Let zones of the order follow their rooms; want a plan if the cells to cover change."""
         book, state = self.rooms.book, self.orders.order_state
         if self._followed == (book.version, state.order) or state.order is None:
             return

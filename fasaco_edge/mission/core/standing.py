@@ -18,10 +18,10 @@ from fasaco_edge.mission.map.map_state import MapState
 # Minimum time between new plans for a robot that left its path or stands still at its end: a
 # flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
-# A robot that stands for this long on its path gets the path again: the follower may have lost it,
-# or stopped for an obstacle that is gone. A shorter time would interrupt a robot that waits for a
-# person to pass, or drives out of a corner. The time is by the robot's clock, as a simulation may
-# run at twenty times the real speed.
+# A robot that stands on its path, within STANDING_M [m] for STANDING_S [s], gets the path again:
+# the follower may have lost it, or stopped for an obstacle that is gone. A shorter time would
+# interrupt a robot that waits for a person to pass, or drives out of a corner. The time is by the
+# robot's clock, as a simulation may run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
 # Number of times that a standing robot gets its path again before its mission is degraded.
 TRIES = 2

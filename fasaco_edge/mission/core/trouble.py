@@ -142,7 +142,7 @@ class Troubles:
         return f"no map or update for {self.policy.stale_map_s:g} s: going on with the last one"
 
     def no_battery(self, state: State, now: float) -> str:
-        """Return why the charge of the battery is not known."""
+        """Return why the battery level is not known."""
         what = "how full it is" if state is State.CHARGING else "when to charge"
         why = self.charging.silence(now)
         return f"{why}: {what} is not known" if why else ""
