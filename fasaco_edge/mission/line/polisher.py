@@ -35,8 +35,8 @@ NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
 # Third pass: annealing of ANNEALED_PIECES pieces in turn, each ANNEALED_PIECE_M long [m]. They
 # begin ANNEALED_M ahead, or at the end of the held line if that is farther.
 ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
-# Moves for each piece; temperature of the farthest piece on a complete map, as a share of the full
-# temperature.
+# ANNEAL_MOVES are made for each piece. HOTTEST is the temperature of the farthest piece on a
+# complete map, as a share of the full temperature.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
 # Length of the line ahead that the second and third pass include [m].
 SEEN_M = 20.0

@@ -28,7 +28,7 @@ from fasaco_edge.mission.line.polyline import Points
 
 # A straight part of a way spans at most this many corners of the walk, enough to cross a hall.
 MOST_SPANNED = 40
-# Margin of a detour around its ends [m]; greatest distance from an end to a free pixel [pixels].
+# A detour stays within DETOUR_M [m] of its ends, and begins within BESIDE_PX [pixels] of them.
 DETOUR_M, BESIDE_PX = 2.0, 2.0
 # A robot nearer to an obstacle than this share of its radius has a wrong pose.
 LEAST_SHARE = 0.5
