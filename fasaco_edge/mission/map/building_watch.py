@@ -30,8 +30,8 @@ from fasaco_edge.mission.map.loop_closure import LEAST_CELLS, Motion
 
 # Two maps are alike if less than this share of the cells known to both differs.
 LEAST_SHARE = 0.05
-# Kappa below which two maps show different buildings; above ALIKE they show the same building, even
-# if covered cells are blocked.
+# Two maps show different buildings if kappa is below FOREIGN. Above ALIKE they show the same
+# building, even if covered cells are blocked.
 FOREIGN, ALIKE = 0.3, 0.7
 # A motion of the map explains the difference of two maps if it raises kappa by this much.
 BETTER = 0.1
@@ -43,7 +43,7 @@ GRACE_S = 0.5
 # for SETTLED_S before the robot drives again [s]. PATIENCE_S doubles with each change of building
 # within SOON_S, up to LONGEST-fold.
 PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
-# Age at which the reference is replaced [s], and least share of its cells that the new one knows.
+# The reference is replaced at age AGE_S [s], if the new map knows KNOWN_SHARE of its cells.
 AGE_S, KNOWN_SHARE = 5.0, 0.5
 # Longest time from a jump of the pose to the map that has moved with it [s].
 JUMP_S = 6.0

@@ -17,8 +17,7 @@ from fasaco_edge.mission.orders.zones import near_polygons
 
 # Least time between two checks of the same places [s], as a growing map changes often.
 PERIOD_S = 1.0
-# Limit on the pixels of a check, which takes some tens of milliseconds; fixed cost of a polygon, in
-# pixels.
+# A check covers up to MOST_PIXELS, some tens of milliseconds. Each polygon adds POLYGON_PIXELS.
 MOST_PIXELS, POLYGON_PIXELS = 1_000_000, 500
 # Limit on the places that are named.
 MOST_NAMED = 5

@@ -44,12 +44,12 @@ from fasaco_edge.mission.coverage.floor_tiles import (
 )
 from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 
-# A map has moved if this many cells, and this share of the known cells, change between free and
+# A map has moved if LEAST_CELLS, and LEAST_SHARE of the known cells, change between free and
 # blocked. Doors and passers-by change fewer.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
 # A map with this many coverable cells shows floor, and so gives evidence of walls.
 LEAST_FLOOR = LEAST_CELLS
-# Smaller motions are ignored: [m], [rad].
+# Motions up to STILL_M [m] and STILL_RAD [rad] are ignored.
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
 # A point this near to a row (or column) of cell centres needs only this row covered; another point
 # needs the rows on both sides [cells].
@@ -244,7 +244,7 @@ def _covered(
 
 # Fewest cells that a shift of the map closes; maps that close fewer are not compared.
 LEAST_CLOSED = 3
-# Largest shift along each axis [pixels], and number of pixels compared.
+# Shifts up to FARTHEST_PX along each axis are tried [pixels], on up to MOST_PIXELS.
 FARTHEST_PX, MOST_PIXELS = 4, 2000
 # A shift must move LEAST_ALIKE of these pixels into the previous walls, and BETTER more of them
 # than no shift.

@@ -23,7 +23,7 @@ from fasaco_edge.planners.passes import Pass
 if TYPE_CHECKING:
     from fasaco_edge.mission.map.loop_closure import Motion
 
-# Limits of one sheet; a number needs 16 bits.
+# Limits on the rooms and cuts of a sheet, and on the number of a room, which has 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
 # Least area of a room, and of a change that is more than noise of its border [m2].
 LEAST_M2 = 1.0

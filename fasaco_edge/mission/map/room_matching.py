@@ -37,7 +37,7 @@ from fasaco_edge.mission.map.room_raster import BLOCK, Ids, RoomRaster, cut_wind
 
 Labels = NDArray[np.int32]
 
-# Number of updates that a change must last.
+# A new region must last HOLD_NEW updates, another change HOLD_CHANGE updates.
 HOLD_NEW, HOLD_CHANGE = 4, 8
 # Squares have settled in a room after 1 to 2 times this number of updates.
 SETTLED = 2 * HOLD_CHANGE

@@ -36,8 +36,8 @@ ALIKE = MATCH = 0.5
 LEAST_SQUARE_M = 0.05
 
 
-# Least time between two searches [s], longer for large maps: a search takes some 0.2 s per million
-# pixels.
+# Searches are PERIOD_S apart [s], or 1 s for each PIXELS_PER_S pixels of a large map: a search
+# takes some 0.2 s per million pixels.
 PERIOD_S, PIXELS_PER_S = 2.0, 50_000
 # Larger maps are made coarser before a search, which takes some 20 bytes per pixel.
 MOST_PIXELS = 1_000_000
