@@ -26,9 +26,9 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 
 # Straight driving required before and after a turn [s].
 BESIDE_S = 1.5
-# Least rate of a turn [rad/s]; time over which the rate is measured, as headings are noisy [s].
+# Turns are faster than TURNS_RAD_S [rad/s], measured over OVER_S [s], as headings are noisy.
 TURNS_RAD_S, OVER_S = 0.12, 0.5
-# Longest time between poses of one track; poses closer than LEAST_S are ignored [s].
+# Poses of one track are at most GAP_S apart; poses closer than LEAST_S are ignored [s].
 GAP_S, LEAST_S = 1.0, 0.05
 # Time for which poses are kept [s]: a robot that turns for longer waits, or is lost.
 KEPT_S = 40.0
@@ -181,8 +181,8 @@ def _median(values: deque[float]) -> float | None:
     return median(values) if len(values) >= FEWEST else None
 
 
-# Largest ratio of a base's speed to the configured one; longest time between two poses for which
-# the track between them is known [s].
+# A base drives up to SPEED_MARGIN times as fast as configured. The track between two poses is known
+# if they are at most LONGEST_S apart [s].
 SPEED_MARGIN, LONGEST_S = 1.2, 3.0
 # By noise two poses may be this much farther apart than the distance driven [cells].
 NOISE_CELLS = 0.5

@@ -23,7 +23,7 @@ class Loss:
     Attributes:
         cells: their number, without cells under the tool, which stay covered.
         m2: their area [m2].
-        share: their share of the reachable cells; None if no reachable cells are known.
+        share: their share of the reachable cells; None if the reachable cells are unknown.
     """
 
     cells: int
