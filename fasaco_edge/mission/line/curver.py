@@ -159,7 +159,7 @@ class Curver:
         return np.append(yaw, yaw[-1])
 
     def _has_left(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
-        """Return whether the robot has left its curve, and no curve was made anew since."""
+        """Return whether the robot has left its curve; False where it last did so."""
         beside, here = ahead.beside, (pose.x, pose.y)
         edge_m = math.dist(*ahead.line.points[:2]) * floor.geometry.resolution
         if beside is None or edge_m < SHORT_M or math.dist(here, self._astray_at) < MOVED_M:

@@ -115,8 +115,7 @@ class FollowedLine:
         points, before = self._whole.points, self.tally.shape
         self._whole = self._whole.moved(by)
         moved = self._whole.points
-        # Sweeps outside a raster do not count: subtract edges at its rim before, and add them
-        # after.
+        # Sweeps outside a raster do not count: subtract edges at its rim before, add them after.
         margin = self._tool + 1.0
         beyond = is_outside(points, before, margin) | is_outside(moved, shape, margin)
         is_edge = beyond[:-1] | beyond[1:]

@@ -43,8 +43,8 @@ HOLD_NEW, HOLD_CHANGE = 4, 8
 SETTLED = 2 * HOLD_CHANGE
 # Decrease of a change's score with an update that does not show it.
 PENALTY = 2
-# A region shows a room if their common area is at least LEAST_SHOWN_M2 [m2], or half of a smaller
-# room, and at least LEAST_SHARE of the smaller of the two.
+# A region shows a room if they share LEAST_SHOWN_M2 [m2], or half of the room if that is less. They
+# must also share LEAST_SHARE of the smaller of the two.
 LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
 # A region with this share of a room's size shows the whole room: squares of the room outside the
 # region are then no floor.

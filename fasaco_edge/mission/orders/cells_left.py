@@ -179,7 +179,7 @@ class LeftBehind:
         self._area = area
 
     def is_open(self, unswept: NDArray[np.bool_], area: ReachableArea) -> bool:
-        """Return whether floor has opened since it set out: at least a square of two by two cells.
+        """Return whether floor has opened since departure: at least a square of two by two cells.
 
         Single rows of cells along walls are noise of the map. ``unswept``: bool (rows, cols) of the
         area.

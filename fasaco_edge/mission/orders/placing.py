@@ -70,7 +70,7 @@ def _looked_up(
 def restored(order: MissionOrder, book: RoomBook) -> MissionOrder:
     """Return an order from before a restart, without the rooms that the book has lost.
 
-    Their zones keep their polygons, and no other room gets their numbers.
+    Zones of lost rooms keep their polygons, and no other room gets the numbers of lost rooms.
     """
     lost = {zone.room for zone in order.as_given.zones if zone.room >= book.next_id}
     if not lost:
@@ -88,7 +88,7 @@ def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder
     Args:
         order: the order.
         book: the rooms.
-        begun: index of the zone being covered; up to it zones keep their sequence.
+        begun: index of the zone being covered; zones up to this one keep their sequence.
     """
     rooms = [room for room in book.rooms if room.outline]
     skipped = tuple(_area(room, book) for room in rooms if room.settings.skip)
