@@ -1,8 +1,8 @@
 """Company: the interface of a mission to other robots in its building, here for a single robot.
 
-A robot of a fleet has another ``Company``, that of ``fleet.mission``, which its mission gets by a
-``company_kind``; the mission knows nothing else of a fleet. The company of a fleet divides the area
-among robots, and decides which robot waits for which.
+The mission of a robot in a fleet gets the ``Company`` of ``fleet.mission`` instead, by a
+``company_kind``; it knows nothing else of the fleet. The company of a fleet divides the area among
+robots, and decides which robot waits for which.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 
 
 class OthersCells:
-    """The cells that others have swept, a part of the ledger: none.
+    """The cells that other robots have swept, a part of the ledger; here none.
 
-    Cells of others that the ledger has from a time in a fleet stay in it until this robot forgets
-    cells of its own: a fleet that the robot joins again would count the forgotten cells as swept.
+    The ledger keeps cells from an earlier fleet until this robot forgets cells of its own: a fleet
+    that it joins again would count the forgotten cells as swept.
 
     Attributes:
         version: counter of changes.
@@ -48,7 +48,7 @@ class OthersCells:
         return np.zeros((window.rows, window.cols), np.bool_)
 
     def begin(self, epoch: int) -> None:
-        """Start an epoch that no earlier ledger of this robot used, unless one was restored."""
+        """Start an epoch with a number new to this robot's ledgers; a restored epoch stays."""
 
     def note_forgotten(self) -> None:
         """Note that this robot has forgotten some of its own cells."""
@@ -100,7 +100,7 @@ class Company:
 
     @property
     def others_go_on(self) -> bool:
-        """Whether only parts of other robots are left, and these make progress."""
+        """Whether only parts of other robots are left, and those robots make progress."""
         return False
 
     def receive(self, event: MemberReceived, now: float) -> str:
@@ -154,7 +154,7 @@ class Company:
 
 
 class Waiting:
-    """When the robot waits for others, and makes way for them: never.
+    """Decides when the robot waits or makes way for others; here, never.
 
     Attributes:
         waits_for: name of the robot that it waits for; "" for none.

@@ -62,17 +62,17 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         retry_s: pause before each retry [s].
         lost_pose_s: the pose is lost after this time without one [s]; 0 for never.
         stale_map_s: the map is stale after this time without a map or an update [s]; 0 for never.
-        until_min: time after which an order ends, with the robot at home, unless it says itself
-            [min]; 0 for no limit.
+        until_min: time after which an order without a time limit of its own ends, with the robot at
+            home [min]; 0 for no limit.
         zones: named zones that orders refer to.
         keep_out: polygons (x, y) [m] in the map frame that the robot never touches.
         keep_out_mask: file of a mask with further keep-out areas, see ``orders.mask``; "" for none.
         keep_out_topic: whether the mask comes as a message; no mission starts before it arrives.
-        home: where the robot returns to; None for the dock, or without one the order's start.
+        home: where the robot returns to; None for the dock or, without a dock, the order's start.
         dock: where it charges; None if it does not.
         map_frame: frame of the map to which zones, keep_out, a mask of a file, home and dock
             belong; "" for the first map used with them.
-        by_room: whether a room is finished before the next is begun, where that costs little.
+        by_room: whether a room is finished before the next is begun, if that costs little.
     """
 
     autostart: bool = True
@@ -131,7 +131,7 @@ class Sweeping:
         ahead_m: distance of the tool's centre ahead of the robot's centre of rotation [m]: swept
             floor is computed with it, lines are planned as if it were 0.
         clearance_m: distance of lines from walls and furniture in addition to the radius [m].
-        curves: of a robot with a turning radius; None for one that turns on the spot.
+        curves: of a robot with a turning radius; None for a robot that turns on the spot.
     """
 
     tool_m: float
@@ -160,7 +160,7 @@ class MissionConfig:
         speed_m_s: speed of the robot; 0 if not known [m/s].
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg]; None to align
             them with the walls, once their direction is certain.
-        given: the policy with its places as configured, if those in ``policy`` are rotated.
+        given: the policy with its places as configured; None if ``policy`` has them unrotated.
     """
 
     footprint: Footprint

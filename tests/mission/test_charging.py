@@ -131,7 +131,7 @@ def test_a_silent_battery_is_reported_and_does_not_stop_the_way():
     drive.level = None
     drive.tell(pose_at(*drive.cell), after=61.0)
     assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason == "no charge of the battery for 45 s: when to charge is not known"
+    assert drive.mission.reason == "no battery level for 45 s: when to charge is not known"
     drive.finish()
 
 
@@ -151,7 +151,7 @@ def test_a_charge_that_jumps_to_and_fro_is_a_trouble():
         drive.tell(pose_at(*drive.cell))
     assert drive.mission.charging.gauge.level is None
     assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason.startswith("no charge of the battery for 45 s, it jumps to and fro")
+    assert drive.mission.reason.startswith("no battery level for 45 s, it jumps to and fro")
     # Once it holds it counts.
     drive.level = 0.1
     drive.run(State.CHARGING)
@@ -163,7 +163,7 @@ def test_silent_while_it_charges_it_stays_where_it_is():
     drive.level = None
     drive.tell(pose_at(*drive.cell), after=100.0)
     assert drive.mission.state is State.CHARGING
-    assert drive.mission.reason == "no charge of the battery for 45 s: waits for one"
+    assert drive.mission.reason == "no battery level for 45 s: waits for one"
     drive.level = 0.95
     for _ in range(8):
         drive.go()
@@ -312,7 +312,7 @@ def test_started_again_while_it_charges_it_stays_in_its_dock():
     note = drive.mission.snapshot().note
     again = Battery(None, drive.cell, OrderState.from_json(note))
     assert again.mission.state is State.CHARGING
-    assert again.mission.reason == "waits for the charge of the battery"
+    assert again.mission.reason == "waits for the level of the battery"
     again.level = 0.95
     for _ in range(8):
         again.go()

@@ -142,7 +142,7 @@ def test_a_mask_of_another_frame_than_the_maps_stops_the_robot(lattice_deg):
         decision = drive.tell(pose_at(0, 0, frame="odom"), after=1.0)
         assert drive.mission.grid.frame == "map" or drive.walk == []
     assert (drive.mission.grid.frame, decision.plan) == ("odom", None)
-    why = "the keep-out mask is in frame 'map', the map in 'odom': waits for one in the map's"
+    why = "the keep-out mask is in frame 'map', the map in 'odom': waits for a mask in 'odom'"
     assert (drive.mission.state, drive.mission.reason) == (State.BLOCKED, why)
     drive.command("home")
     assert (drive.mission.state, drive.walk) == (State.BLOCKED, [])

@@ -23,22 +23,22 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # A level that differs from the last accepted one by more than JUMP must be repeated for HOLD_S [s].
 JUMP, HOLD_S = 0.05, 5.0
-# The first level is accepted once a second one, HOLD_S later, differs by no more than this.
+# The first level is accepted if a level HOLD_S later differs by this much or less.
 COARSE = 0.2
-# A stretch of driving yields a drain once it has used this much charge and time [s].
+# The drain is measured over stretches of driving that use at least this much charge and time [s].
 STEP, LEAST_S = 0.01, 10.0
 # The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
 # Least difference between the level at which the robot turns back and the one at which it resumes.
 HYSTERESIS = 0.1
-# Number of unknown cells assumed beyond each cell at the border of the map, to estimate the rest.
+# The estimate of the rest assumes this many unknown cells beyond each cell at the map's border.
 BEYOND_CELLS = 20
-# A robot near its dock may go to charge up to this much above the level at which it turns back;
-# number of places on its path ahead that are compared.
+# A robot near its dock may go to charge at a level that is EARLY above the level at which it turns
+# back. PLACES_AHEAD places on its path ahead are compared.
 EARLY, PLACES_AHEAD = 0.2, 8
-# Largest lattice on which these places are compared [cells]: it takes too long on larger ones.
+# Limit on the cells of a lattice on which these places are compared: larger ones take too long.
 MOST_CELLS = 200_000
-# The battery counts as full once its level has risen by less than RISE for this long [s].
+# The battery is full if its level has risen by less than RISE in FULL_AFTER_S [s].
 RISE, FULL_AFTER_S = 0.005, 1800.0
 
 
@@ -55,7 +55,7 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.received_at = float("-inf")
-        # Time of the last message; time since which no level was accepted.
+        # Time of the last message; time of the last accepted level, or of ``begin`` before one.
         self._noted_at = float("-inf")
         self._accepted_at: float | None = None
         # A level not accepted yet, and the time of its first report.
@@ -70,11 +70,11 @@ class BatteryGauge:
 
     @property
     def drain_per_s(self) -> float | None:
-        """Charge used per second of driving; None before enough was measured."""
+        """Charge used per second of driving; None until enough is measured."""
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return the time since the last accepted level, at first since the beginning [s]."""
+        """Return the time since the last accepted level, or since ``begin`` before one [s]."""
         return 0.0 if self._accepted_at is None else now - self._accepted_at
 
     def why_silent(self, since: float) -> str:
@@ -84,7 +84,7 @@ class BatteryGauge:
         return ", its messages give none" if self._noted_at >= since else ""
 
     def begin(self, now: float) -> None:
-        """Start the timeout for the first level at ``now`` [s], unless it has begun."""
+        """Start the timeout for the first level at ``now`` [s], unless it runs already."""
         self._accepted_at = now if self._accepted_at is None else self._accepted_at
 
     def note(self, event: BatteryReceived, now: float, *, drives: bool) -> None:
@@ -95,8 +95,8 @@ class BatteryGauge:
         self.received_at = now
         if self.level is None or abs(event.level - self.level) > JUMP:
             claim, level = self._claim, self.level
-            # Reports are consistent if they jump in the same direction, as the level may drain
-            # meanwhile, or come in coarse steps.
+            # Reports are consistent if they jump in the same direction: the level may drain
+            # meanwhile, or change in coarse steps.
             is_new = claim is None or (
                 abs(event.level - claim[0]) > COARSE
                 if level is None
@@ -107,7 +107,7 @@ class BatteryGauge:
                 return
             self._since = None
         self._claim, self.level, self._accepted_at = None, event.level, now
-        # Stamps, not ``now``: under simulated time the robot drives by that clock.
+        # Use stamps, not ``now``: a simulated robot drives by the clock of its stamps.
         at_s = 1e-9 * event.stamp_ns if event.stamp_ns else now
         self._measure(event.level, at_s, drives=drives and event.power != "charging")
 
@@ -129,7 +129,7 @@ class Charging:
     orders: Sequencer
     route: Route
     gauge: BatteryGauge = field(default_factory=BatteryGauge)
-    # Time to the dock; time for the rest of the order, None if unknown [s]; the age of both.
+    # Time to the dock [s]; time for the rest of the order [s], None if unknown; their age.
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked: Lapse = field(init=False)
@@ -139,7 +139,7 @@ class Charging:
     _best: tuple[float, float] | None = field(default=None, init=False)
     # ``turns_back_at`` when the robot last went to charge.
     _turned_at: float = field(default=0.0, init=False)
-    # The level at which the battery last stopped charging; None if it sufficed to resume.
+    # The level at which charging last stopped, if that is too low to resume; else None.
     _most: float | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
@@ -169,7 +169,7 @@ class Charging:
         self._to_dock_s = (
             0.0 if is_charging else seconds_back("charge", self.config, self.map, self.orders)
         )
-        self._is_best_here = not is_charging and self._finds_nothing_better()
+        self._is_best_here = not is_charging and self._is_best_to_leave_here()
 
     def silence(self, now: float) -> str:
         """Return why the battery level is unknown; "" if it is known or not needed."""
@@ -179,7 +179,7 @@ class Charging:
             return ""
         silent_s = self.policy.silent_s
         why = self.gauge.why_silent(now - silent_s)
-        return f"no charge of the battery for {silent_s:g} s{why}"
+        return f"no battery level for {silent_s:g} s{why}"
 
     def why_no_dock(self) -> str:
         """Return why the robot has no place to charge on this map; "" if it has one."""
@@ -189,7 +189,7 @@ class Charging:
     def is_due(self, now: float) -> bool:
         """Return whether the robot has to go and charge now.
 
-        A robot that was stopped by a command, or whose order was cancelled, stays where it is.
+        After a stop by command, or without an order, the robot stays where it is.
         """
         order, level = self.orders.order_state, self.gauge.level
         if self.policy is None or level is None or self.silence(now):
@@ -256,7 +256,7 @@ class Charging:
         power, waited_s = self.gauge.power, now - self._best[1]
         is_full = power == "full" or (power != "discharging" and waited_s >= FULL_AFTER_S)
         is_charged = level >= self.goes_on_at
-        # From a lower level it would soon return.
+        # A robot that resumes at a lower level would soon return.
         least = max(self.policy.low, self._turned_at) + HYSTERESIS
         self._most = level if is_full and not is_charged else None
         return is_charged or (is_full and level >= least)
@@ -266,17 +266,17 @@ class Charging:
         if why := self.silence(now):
             return f"{why}: waits for one"
         if self.gauge.level is None:
-            return "waits for the charge of the battery"
+            return "waits for the level of the battery"
         power = self.gauge.power
         but = f", but {power}" if power in ("discharging", "full") else ""
         return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
 
-    def _finds_nothing_better(self) -> bool:
-        """Return whether charging is due soon, and no later place is better to leave for the dock.
+    def _is_best_to_leave_here(self) -> bool:
+        """Return whether charging is due soon, and this is the best place to leave the path.
 
-        The best place on the path, up to the level of turning back, has the shortest way to the
-        dock relative to the drive between two charges. The result is False for a path that ends
-        before that level, as it may be the last one.
+        Places on the path up to the level of turning back are compared. The best one has the
+        shortest way to the dock, relative to the charge used. The result is False if the path ends
+        before that level, as it may be the last path.
         """
         level, drain, area = self.gauge.level, self.gauge.drain_per_s, self.map.area
         goal = self.orders.goal("charge")

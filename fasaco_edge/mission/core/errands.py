@@ -19,8 +19,8 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# An errand ends once the robot has been in the last cell for this long [s], to drive to the centre
-# and turn there.
+# An errand ends this long after the robot enters the last cell [s]. Meanwhile the robot drives to
+# the centre of the cell and turns.
 ARRIVAL_S = 2.0
 NO_WAY = "no way {}: waits for a map that shows one"
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
@@ -39,7 +39,7 @@ class Errands:
     way_out: WayOut
 
     def consider_charging(self, state: State, now: float) -> None:
-        """Begin to charge if due, and end charging if it is enough."""
+        """Begin to charge if due, and end charging if the battery suffices."""
         orders, charging = self.orders, self.charging
         charging.look(now)
         errand, docked = orders.order_state.errand, state is State.CHARGING

@@ -146,7 +146,7 @@ class EventHandler:
             self.route.want(OTHERS_FIRST)
 
     def _open_floor(self) -> None:
-        """Reopen closed floor whose time is up, if the robot has work."""
+        """Reopen closed floor when its time is up, if the robot has work."""
         order = self.orders.order_state
         is_at_work = order.is_open or bool(order.errand)
         if is_at_work and self.map.grid is not None and self.map.obstacles.open_due(self._now):
@@ -188,7 +188,7 @@ class EventHandler:
         return self.map.building.note_map(plain, pose, self._now, contradicts)
 
     def _note_frame(self) -> None:
-        """Assign the map's frame to places and orders without one; drop those in another frame."""
+        """Assign the map's frame to places and orders without one; drop those of other frames."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
             return
@@ -216,7 +216,7 @@ class EventHandler:
         self._change_building(misfit)
 
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
-        """Continue on a new map; if it shows another building, without the places of the last."""
+        """Continue on a new map; drop the places of the previous building if it shows another."""
         if misfit is not None:
             self.map.building.accept(self._now)
             self.map.places.leave_building(self.ledger.current.frame)
@@ -278,7 +278,7 @@ class EventHandler:
         self.drive.note(stamped)
         self.way_out.note_pose(stamped.pose)
         motion, uncertain = None, 0
-        # On the map of another building the pose is not valid, nor is the floor under it.
+        # While the map shows another building, poses are invalid: no floor under them is swept.
         is_known = self.map.building.note_pose(stamped.pose, self._now)
         if is_known:
             motion = self.ledger.map_motion(stamped.pose)
@@ -348,7 +348,7 @@ class EventHandler:
         self._path = self.changes.change_to(after, self._now) or self._path
 
     def _reset(self) -> None:
-        """Forget all coverage except under the tool, and the choice of a frame."""
+        """Forget the choice of a frame, and all coverage except under the tool."""
         self._is_forgotten = True
         self.map.places.begin_anew()
         self.map.frames.reset()

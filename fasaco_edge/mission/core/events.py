@@ -60,7 +60,7 @@ class PatchesLost:
 
 @dataclass(frozen=True, slots=True)
 class PoseReceived:
-    """A pose of the robot; ``at``: as for a map."""
+    """A pose of the robot; ``at``: as in ``MapReceived``."""
 
     pose: StampedPose
     at: float | None = None
@@ -130,7 +130,7 @@ class Part:
 
 
 SAME_LATTICE = Pose2D(0.0, 0.0)
-"""Pose of another robot's lattice in this robot's, if both have the same map."""
+"""Pose of another robot's lattice in this robot's lattice, if both have the same map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,15 +146,15 @@ class MemberReceived:
         step_s: its time to sweep one cell [s].
         epoch: epoch number of its tiles, see ``fleet.shared``.
         division: number of its newest division.
-        tiles: places and bits of the cells it has swept; a subset of its tiles.
-        ground: places and bits of the cells it can reach; a subset of its tiles.
+        tiles: cells it has swept, as places and bits of tiles; each message has some of its tiles.
+        ground: cells it can reach, in the same form.
         by: name of the robot that made ``division``.
         parts: each robot's part of ``division``.
         radius_m: radius of its disc [m].
         ahead: points (x, y) of its next metres [m].
         waits_for: name of the robot that it waits for; "" for none.
-        kept: as ``tiles``: cells of these that it swept before this epoch; None if not known.
-        lattice: pose of its lattice in this robot's [m], by which its cells were placed.
+        kept: the cells of ``tiles`` that it swept before this epoch; None if not known.
+        lattice: pose of its lattice in this robot's lattice [m], used to place its cells.
     """
 
     robot: str
@@ -231,7 +231,7 @@ def in_runs(events: Iterable[Event]) -> Iterator[Event | PatchRun]:
             yield from run
 
 
-# Reason of a path from an attempt in spare time.
+# Reason of a path that was improved in spare time.
 BETTER = "better further on"
 
 
@@ -263,10 +263,10 @@ class PathUpdate:
         reason: why it replaces the previous one.
         plan: the plan that it comes from; None if none was needed.
         plan_s: planning time [s].
-        changed: window of the cells whose change is the reason; None for another reason.
+        changed: window of the cells that changed, if they are the reason; else None.
         xy: float64 (m, 2), x, y [m]: the line to drive; None for the centres of the cells.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
-        yaw: float64 (m,), the robot's headings at ``xy`` [rad]; None for those along the line.
+        yaw: float64 (m,), the robot's headings at ``xy`` [rad]; None for headings along the line.
         may_wait: whether it may be published later: the robot can follow the previous path up to
             the first difference.
         speed_m_s: speed to drive it at [m/s]; None for the robot's usual one.

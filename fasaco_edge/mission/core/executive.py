@@ -25,7 +25,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# States of a robot that must not drive: by command, or because its order is over.
+# States in which the robot rests: by command, at the end of its order, or to charge.
 STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))
 
 
@@ -106,15 +106,13 @@ class Executive:
         return State.RETURNING if self._state is State.DONE and makes_way else self._state
 
     def decide(self, now: float) -> Decision:
-        """Return the decision at ``now`` [s], by the first rule that gives an activity."""
+        """Return the decision at ``now`` [s]: that of the first rule that returns an activity."""
         self._now, self._update = now, None
         self.way_out.end()
         doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
         self._state, self._reason = doing.state, doing.reason
         self.troubles.look(self.doing, now)
         return Decision(plan=doing.plan, path=doing.path)
-
-    # Rules.
 
     def _charge_in_time(self) -> None:
         """Begin or end an errand of charging, by the battery."""
@@ -175,7 +173,7 @@ class Executive:
             return ""
         return (
             f"the keep-out mask is in frame {self.mask_frame!r}, the map in {grid.frame!r}: "
-            "waits for one in the map's"
+            f"waits for a mask in {grid.frame!r}"
         )
 
     def _why_in_dock(self) -> tuple[State, str] | None:
@@ -199,7 +197,7 @@ class Executive:
         self._cell = cell
         self._standing.look(cell, self._now)
         if not len(route.path.cells):
-            self.monitor.clear_doubt()  # a robot without a path cannot be off its path
+            self.monitor.clear_doubt()  # without a path there is no doubt about it
         self._update = route.truncate(self._now)
         return None
 
@@ -269,7 +267,7 @@ class Executive:
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
 
 
-# The rules, in order. A rule returns the mission's activity, or None: then the next rule decides.
+# The rules, in order. A rule returns the mission's activity, or None to let the next rule decide.
 RULES: tuple[Callable[[Executive], Doing | None], ...] = (
     Executive._charge_in_time,
     Executive._end_in_time,

@@ -27,9 +27,9 @@ class InDock:
     gauge: BatteryGauge
 
     def holds(self, *, is_charging: bool) -> bool:
-        """Return whether the robot is in its dock, where its base may have driven it.
+        """Return whether the robot is in its dock.
 
-        The cell there may not be coverable.
+        Its base may have driven it there, to a cell that is not coverable.
 
         Args:
             is_charging: whether the mission already counts it as docked.
@@ -56,8 +56,8 @@ class InDock:
 # The level of a docked battery has to rise within FLAT_S [s], as most charge by 1 % in less than
 # ten minutes; without a report of charging it has to rise within PATIENCE_S [s].
 PATIENCE_S, FLAT_S = 45.0, 600.0
-# A battery whose level falls by more than this does not charge: a step of 1 % of a coarse gauge is
-# noise.
+# A battery does not charge if its level falls by more than this. A fall of 1 % is noise: one step
+# of a coarse gauge.
 FALL = 0.0125
 CHARGES = ("charging", "full")
 
@@ -112,7 +112,7 @@ class DockCurrent:
             self._extreme, self._falls, self._from = level, True, extreme
 
     def why_none(self, now: float) -> str:
-        """Return the evidence that the battery does not charge; "" if it does, or is not docked."""
+        """Return the evidence that a docked battery does not charge; "" for none."""
         docked_at, level = self._docked_at, self._gauge.level
         if docked_at is None or level is None:
             return ""

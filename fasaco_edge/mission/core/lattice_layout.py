@@ -1,14 +1,14 @@
 """Lattice layout: angle of the cells' rows to the map frame, edge of a cell, and their changes.
 
-Without a configured angle, rows are parallel to the axes of the map frame at first, and to the
-walls once their direction is certain. They return to the axes if a map does not fit otherwise. A
-pass whose lanes have an angle gets rows at that angle, and a pass with its own overlap narrower or
-wider cells, until the next pass begins.
+Without a configured angle, rows are at first parallel to the axes of the map frame, then to the
+walls, once the direction of the walls is certain. They return to the axes if a map does not fit
+otherwise. If a pass has lanes at an angle, its rows have that angle. If it has an overlap of its
+own, its cells are narrower or wider.
 
-The map frame's axes come from the robot's initial heading, so walls are rotated against them. Their
-direction is estimated once, as a lattice rotated with each map would lose coverage. In six
-buildings rotated by 30 degrees, LEAST_WALL_M of parallel walls were seen after 1 to 14 m, and gave
-the angle to 0.6 degrees.
+The robot's initial heading gives the axes of the map frame, so walls are at an angle to them. This
+angle is decided once, as each rotation of the lattice loses coverage. In six buildings rotated by
+30 degrees, LEAST_WALL_M of parallel walls were seen after 1 to 14 m of driving, and gave the angle
+to 0.6 degrees.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from fasaco_edge.planners.passes import Laid, lane_and_tool_m
 
 # Evidence required: length of parallel walls [m], and their share of all walls.
 LEAST_WALL_M, LEAST_SHARE = 5.0, 0.45
-# Two estimates must agree within this angle [deg]; one suffices with this length of walls [m].
+# Two estimates must agree within SAME_DEG [deg]; one suffices from PLENTY_M of walls on [m].
 SAME_DEG, PLENTY_M = 1.5, 15.0
 # The least rotation that is worth a stop of the robot [deg].
 LEAST_ROTATION_DEG = 2.0
-# Distance driven between estimates [m]; limit on the number of estimates.
+# An estimate is due every BETWEEN_M of driving [m], at most MOST_LOOKS times.
 BETWEEN_M, MOST_LOOKS = 1.0, 40
-# Distance between poses that is a jump [m]; limit on a map's pixels, as estimates take long.
+# Poses farther apart than JUMP_M [m] are a jump. Maps of more than MOST_PIXELS take too long.
 JUMP_M, MOST_PIXELS = 1.0, 4_000_000
 
 
@@ -89,7 +89,7 @@ class WallWatch:
 def _certain(grid: OccupancyGrid) -> WallDirection | None:
     """Return the wall direction of a map with enough evidence; else None."""
     walls = wall_direction(grid) if grid.cells.size <= MOST_PIXELS else None
-    # The border of free space may be the end of a scan.
+    # The rim of free space may be the end of a scan, not a wall.
     if walls is None or walls.is_of_rim:
         return None
     return walls if walls.share >= LEAST_SHARE and walls.wall_m >= LEAST_WALL_M else None
@@ -114,7 +114,7 @@ class LatticeLayout:
         self.deg = self._usual_deg = config.lattice_deg or 0.0
         self._is_given = config.lattice_deg is not None
         self.cell_m = self._usual_cell_m = config.footprint.cell_m
-        # Width of the tool, usual and as planned with at present [m].
+        # Usual width of the tool, and the width that plans assume at present [m].
         self._usual_tool_m = self._tool_m = config.tool_m
         self._most_cells = config.max_lattice_cells
         self._walls = WallWatch()
@@ -133,9 +133,9 @@ class LatticeLayout:
         return replace(config, footprint=footprint, cost=cost, sweeping=sweeping)
 
     def resume(self, before: LedgerSnapshot, lay: Laid) -> bool:
-        """Keep the cells of a ledger from before a restart; return whether that changes any.
+        """Keep angle and edge of a ledger's cells; return whether that changes the layout.
 
-        Cells of another edge are kept only if those of the present pass have it.
+        The ledger is from before a restart. Its edge is kept only if the present pass has it, too.
         """
         was, deg = (self.deg, self.cell_m), before.lattice_deg
         if deg == lay.angle_deg:
@@ -170,13 +170,12 @@ class LatticeLayout:
         return f"cells lie {along} at {self.deg:.1f} degrees to the map frame"
 
     def changes_for_pass(self, lay: Laid, grid: OccupancyGrid) -> bool:
-        """Change angle and edge to those of a pass's lanes, if they fit the newest map; return
-        whether that changes any."""
+        """Take angle and edge of a pass's lanes if the map allows; return whether any changed."""
         wanted = self._usual_deg if lay.angle_deg is None else lay.angle_deg
         cell_m, tool_m = self._lane_and_tool_m(lay)
         if (wanted, cell_m) == (self.deg, self.cell_m):
             return False
-        # The map may grow.
+        # Leave room for the map to grow.
         if not self._fits(grid, wanted, cell_m, share=0.5):
             return False
         self.deg, self.cell_m, self._tool_m = wanted, cell_m, tool_m

@@ -44,7 +44,7 @@ _AnyPlace = TypeVar("_AnyPlace", bound=Place)
 
 @dataclass(frozen=True, slots=True)
 class LatticeRotation:
-    """A lattice whose rows are at an angle to the x axis of the map frame.
+    """A lattice with its rows at an angle to the x axis of the map frame.
 
     Attributes:
         deg: the angle [deg].

@@ -137,12 +137,12 @@ class Mission:
     ) -> None:
         """Continue from before a restart; to be called before the first step.
 
-        If the map contradicts the ledger, see ``coverage.fit``, it is reported as a fault
-        (LedgerMismatchError) with the map that shows it, and coverage starts from zero.
+        If a map contradicts the ledger (``coverage.fit``), the step with that map reports the fault
+        LedgerMismatchError, and coverage starts from zero.
 
         Args:
             before: ledger, which may be empty; None for none.
-            order: order; None for the one that the mission started with.
+            order: order; None to keep the mission's order.
             rooms: rooms, which the mission changes; None for none.
         """
         if rooms is not None:
@@ -160,7 +160,7 @@ class Mission:
         restart: LedgerSnapshot | None = None,
         is_confirmed: bool = False,
     ) -> None:
-        """Continue an order with the ledger that belongs to it, and that of the last restart."""
+        """Continue an order with its ledger, and with the ledger of the last restart."""
         deg, cell_m = self._rotation.deg, self._layout.cell_m
         rotated_by_deg, scale = 0.0, 1.0
         if before is not None:
@@ -181,7 +181,7 @@ class Mission:
     def succeed(self, before: Mission) -> None:
         """Take over a predecessor's state of robot and inputs, and its doubt about the building.
 
-        To be called before the first step, whose events are those of the predecessor's ``held``.
+        To be called before the first step, which gets the events of the predecessor's ``held``.
         """
         self._executive.succeed(before._executive)
         if before.rotation != self.rotation or before._layout.cell_m != self._layout.cell_m:
@@ -232,8 +232,8 @@ class Mission:
         return replace(happened, plan=plan, path=path)
 
     def _look_for_rooms(self, happened: Decision, now: float) -> Decision:
-        """Find rooms if due, and let the order follow them; return the decision, with a fault if
-        that fails, as the robot can sweep without rooms."""
+        """Find rooms if due, and let the order follow them; return the decision. A failure is
+        reported as a fault, as the robot can sweep without rooms."""
         if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
             self._rooms.leave_building()
         try:
@@ -248,11 +248,11 @@ class Mission:
         return self._handler.handle(map(self._rotation.event, events), now)
 
     def _align(self, happened: Decision, now: float) -> Decision:
-        """Lay other cells if the pass or the walls ask for them; return the combined decision."""
+        """Lay other cells if the pass or the walls require them; return the combined decision."""
         state, grid, pose = self.order_state, self.grid, self.pose
         self._layout.note_faults(happened.faults)
-        # A path kept during an errand is in present cells; while the building is in doubt, the map
-        # may soon be another.
+        # Keep the cells in an errand (the kept path needs them), and while the building is in
+        # doubt.
         if state.errand or self.is_in_doubt or grid is None or pose is None:
             return happened
         lay = None if state.current_zone is None else state.current_pass

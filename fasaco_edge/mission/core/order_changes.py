@@ -37,9 +37,9 @@ class OrderChanges:
     route: Route
     line: LineLayer
     rooms: RoomWatch
-    # Whether the robot is in no fleet: robots of a fleet share cells.
+    # Whether the robot is in no fleet: the robots of a fleet have the same cells.
     is_alone: bool
-    # Keep-out polygons of every order.
+    # Keep-out polygons that apply to every order.
     _standing: tuple[Polygon, ...] = field(default=(), init=False)
     # The version of the rooms and the order at the last comparison.
     _followed: tuple[int, MissionOrder | None] = field(default=(-1, None), init=False)
@@ -54,7 +54,7 @@ class OrderChanges:
         return self.config.lattice_deg or 0.0
 
     def begin(self, order: OrderState) -> None:
-        """Begin another order, or none."""
+        """Begin another order; or end the present one, if the new state has none."""
         self.route.abandon()
         self._keep_out(order)
         self.orders.start(order)
@@ -105,7 +105,7 @@ class OrderChanges:
         return Answer(event.number, plan=plan), after
 
     def _check_passes(self, order: MissionOrder) -> None:
-        """Raise OrderError if passes of a fleet need cells of their own, or are too fast."""
+        """Raise OrderError if a pass is too fast, or, in a fleet, needs cells of its own."""
         kinds = [kind for zone in order.zones for kind in zone.kinds]
         fastest = max((kind.speed_m_s or 0.0 for kind in kinds), default=0.0)
         usual = self.config.speed_m_s
@@ -137,7 +137,7 @@ class OrderChanges:
         return update
 
     def follow_rooms(self) -> None:
-        """Let the zones of the order follow their rooms; want a plan if cells to cover change."""
+        """Let zones of the order follow their rooms; want a plan if the cells to cover change."""
         book, state = self.rooms.book, self.orders.order_state
         if self._followed == (book.version, state.order) or state.order is None:
             return
@@ -169,7 +169,7 @@ class OrderChanges:
         self.orders.note_keep_outs(before)
         if not self.map.is_kept_out:
             return None
-        # From near the border the robot may continue, but not along this path.
+        # Near the zone's border the robot may go on, but along another path.
         self.map.follow_path(None)
         return self.route.stop("robot is in a keep-out zone", now)
 

@@ -44,7 +44,7 @@ class OrderWork:
         """
         route, orders = self.route, self.orders
         orders.reopen()
-        # A robot that stands by, for others or for a map, needs no new division in each step.
+        # A robot that stands and waits for others or for a map needs no division in each step.
         stands = state is State.COVERING and not len(route.path.cells)
         self.share(cell, now, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:

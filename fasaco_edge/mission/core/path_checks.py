@@ -10,7 +10,7 @@ from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.orders.sequencer import Sequencer
 
-# Period of checks whether a path is worth driving [s].
+# Period of ``check_worth`` and ``check_time`` [s].
 WORTH_S = 1.0
 # While poses are too far apart, a path ends after this long without a newly covered cell [s].
 VAIN_S = 60.0
@@ -79,7 +79,7 @@ class PathChecks:
         if not self._monitor.are_poses_far_apart:
             self._progress = None
             return False
-        # Time at rest, as in a pause, does not count.
+        # Time at rest, for instance in a pause, does not count.
         if (
             self._progress is not None
             and now - max(self._progress[1], self._route.begun_at) < VAIN_S

@@ -42,11 +42,11 @@ class PublishedPath:
         xy: float64 (n, 2), x, y [m]; n = 0 stops the robot.
         steps: steps from cell to cell.
         end_yaw: heading at the end [rad]; None for the heading of the last segment.
-        yaw: float64 (n,), the robot's headings [rad]; None for those along the path.
+        yaw: float64 (n,), the robot's headings [rad]; None for headings along the path.
         map_stamp_ns, map_revision: stamp [ns] and revision of the map it was planned on.
         plan: the plan that it comes from; None if none was needed.
         plan_s: planning time [s].
-        changed: bounds of the cells whose change is the reason [m]; None for another reason.
+        changed: bounds of the cells that changed [m], if they are the reason; else None.
     """
 
     frame: str

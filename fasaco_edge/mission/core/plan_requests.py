@@ -21,14 +21,14 @@ BROKEN_S = 30.0
 SPARE_TIME = "spare time"
 # Longest time of an attempt: by repairs, and by a search of the whole rest [s].
 REPAIR_S, SEARCH_S = 0.05, 0.3
-# A path is replaced only if that saves this many steps and this share of the rest.
+# A better path replaces the path only if it saves this many steps and this share of the rest.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# The same share for a walk from a full search, whose line has to be made and polished again.
+# This share for a walk from a full search, as its line has to be made and polished again.
 NEW_WALK_SHARE = 0.01
 # The share of time is halved at most this many times.
 MOST_VAIN = 4
-# Pause after an attempt that could not begin [s]: this check may search the whole lattice, and its
-# result rarely changes between poses.
+# Pause after a check that found nothing to improve [s]: a check may search the whole lattice, and
+# its result rarely changes between poses.
 SKIPPED_S = 1.0
 
 
@@ -78,7 +78,7 @@ class Attempt:
     """An attempt to improve the path from one of its cells on.
 
     Attributes:
-        numbering: numbering of the path's cells that ``index`` and ``joint`` refer to.
+        numbering: number of the path that ``index`` and ``joint`` refer to.
         index: the robot's index on the path.
         joint: index of the cell where the improved rest begins.
         problem: the problem that the rest of the path solves.
@@ -142,7 +142,7 @@ class PlanRequests:
 
     Attributes:
         plans, attempts: count the returned plans, and the attempts at better paths.
-        wanted: why a new plan is wanted; "" where none is.
+        wanted: why a new plan is wanted; "" if none is.
         pending: the request under way.
     """
 
@@ -154,14 +154,14 @@ class PlanRequests:
         self._attempt: Attempt | None = None
         # Whether the result of the pending plan is to be discarded.
         self._is_abandoned = False
-        # Why a full plan is wanted; "" where none is.
+        # Why a full plan is wanted; "" if none is.
         self._full = ""
-        # Window of the cells that changed since the last request; whether they are its reason.
+        # Window of the cells that changed since the last request; whether ``wanted`` is for them.
         self._changed: Window | None = None
         self._is_by_map = False
         # Why the last plan failed, "" if it did not, and when [s].
         self._failure = "", 0.0
-        # Number of plans that failed in a row; whether a map has come since the last of them.
+        # Number of plans that failed in a row; whether a map has come since the last failure.
         self._failures = 0
         self._has_map = False
 

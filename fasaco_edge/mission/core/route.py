@@ -38,8 +38,8 @@ class Route(PlanRequests):
     Attributes:
         path: the published path, and the robot's progress on it.
         revision: counts the published paths.
-        unchanged, outdated: count the plans that were not published because they equal the current
-            path, or because they no longer hold.
+        unchanged, outdated: count the plans that were not published: they equal the current path,
+            or do not fit the newest map.
         published_at: when a path was last published or confirmed by a plan.
         aside: the rest of the path, int32 (n, 2), kept during an errand; None without an errand.
         is_way_out: whether the published path is a way out, along no cells.
@@ -55,14 +55,14 @@ class Route(PlanRequests):
         # The part of a path kept for later: beyond a block, or the whole rest after a stop.
         self._kept = PathProgress(NO_CELLS)
         self.aside: NDArray[np.int32] | None = None
-        # Heading at the end of the path [rad]; None for that of the last segment.
+        # Heading at the end of the path [rad]; None for the heading of the last segment.
         self._end_yaw: float | None = None
         # The path before a motion of the map, until the first pose on the moved map shows the
         # motion.
         self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
-        # Number of the path, whose cells are counted from 0; number of the walk, which a path over
-        # the same cells keeps; the last walk that was searched as a whole.
+        # Numbers of the path and of its walk (a new path over the same cells is the same walk), and
+        # of the last walk that was searched as a whole.
         self._numberings = self._walks = self._searched = 0
         self.unchanged = self.outdated = 0
         self.published_at = self.begun_at = 0.0
@@ -95,7 +95,7 @@ class Route(PlanRequests):
 
     @property
     def held(self) -> PathProgress:
-        """The path; for a stopped robot the kept part of the last one."""
+        """The path; if the robot was stopped, the kept part of its last path."""
         return self.path if len(self.path.cells) else self._kept
 
     def abandon(self) -> None:
@@ -104,7 +104,7 @@ class Route(PlanRequests):
         self._kept, self._before_motion, self.aside = PathProgress(NO_CELLS), None, None
 
     def set_aside(self) -> bool:
-        """Keep the path during an errand; return False if it was kept before."""
+        """Keep the path during an errand; return False if a path is kept already."""
         if self.aside is not None:
             return False
         self.pause()
@@ -245,7 +245,7 @@ class Route(PlanRequests):
         """Return a new plan without the cells that were covered while it was made.
 
         The robot joins it at the first cell that still needs a visit. The result is empty if no
-        path leads there, as after the robot was carried elsewhere.
+        path leads there, for instance if the robot was carried elsewhere.
         """
         first = self._first_open(cells, area.lattice.window)
         to = int(cells[first, 0]), int(cells[first, 1])

@@ -1,8 +1,8 @@
-"""Standing: the time the robot has been in its cell, and in one place with a path to drive; the
+"""Standing: how long the robot has been in its cell, and in one place with a path to drive; and the
 obstructions that its follower reports.
 
-Time in one place counts only with a path. Motion resets it, and so does a rest by command or at the
-end of an order, but not a new path. Times are [s].
+Time in one place counts only with a path. It starts again if the robot moves, or rests by command
+or at the end of an order; it continues with a new path. Times are [s].
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from fasaco_edge.mission.map.map_state import MapState
 # Minimum time between new plans for a robot that left its path or stands still at its end: a
 # flickering pose must not keep the planner busy.
 PATIENCE_S = 1.0
-# A robot that stands for this long on its path gets the path again: the follower may have lost it,
-# or stopped for an obstacle that is gone. A shorter time would interrupt a robot that waits for a
-# person to pass, or drives out of a corner. The time is by the robot's clock, as a simulation may
-# run at twenty times the real speed.
+# A robot that stands on its path, within STANDING_M [m] for STANDING_S [s], gets the path again:
+# the follower may have lost it, or stopped for an obstacle that is gone. A shorter time would
+# interrupt a robot that waits for a person to pass, or drives out of a corner. The time is by the
+# robot's clock, as a simulation may run at twenty times the real speed.
 STANDING_S, STANDING_M = 30.0, 0.1
 # Number of times that a standing robot gets its path again before its mission is degraded.
 TRIES = 2
@@ -42,8 +42,8 @@ class Standing:
         self._entered_at = 0.0
         # The robot's position, to within STANDING_M.
         self._place = math.inf, math.inf
-        # When it got a path there, or got it again, by our clock, and by the robot's [ns]; moved on
-        # by any time without a path.
+        # When it got a path at this place, by our clock, and by the robot's [ns]. A time without a
+        # path is added to it.
         self._since = 0.0, 0
         # The last time that it had a path to drive there, by both clocks.
         self._had_path = 0.0, 0
@@ -87,7 +87,7 @@ class Standing:
     def is_at(self, last: Cell | None) -> bool:
         """Return whether the robot stands in the last cell of a path that it did not complete.
 
-        It has missed a cell, so that its index on the path is not the last one.
+        Its index on the path is lower than the last, as it has missed a cell.
         """
         if self._cell != last or last == tuple(self._route.path.ahead[0].tolist()):
             return False

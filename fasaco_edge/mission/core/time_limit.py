@@ -19,7 +19,7 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 LOOK_EVERY_S = 5.0
 # Factor on estimated times, as lines are longer than walks over cells.
 LINE_FACTOR = 1.2
-# Largest ratio of simulated time to ours; if stamps advance faster, their clock was set.
+# Largest ratio of simulated to real time; if stamps advance faster, their clock was set.
 MOST_SPEED_UP = 30.0
 
 
@@ -31,8 +31,7 @@ class Lapse:
 
     def __init__(self, map_state: MapState) -> None:
         self._map = map_state
-        # At the last look: our time [s], and the stamp of the pose [ns], 0 without one; None before
-        # the first look.
+        # Our time [s] and the pose's stamp [ns] at the last look, 0 without a pose; None before it.
         self._since: tuple[float, int] | None = None
 
     @property

@@ -50,7 +50,7 @@ class TrailLayer:
         return replace(request, problem=replace(request.problem, trail=self.snapshot()))
 
     def take(self, plan: CoveragePath) -> None:
-        """Take over the trail that the ants of a plan have left, whether it is driven or not."""
+        """Take over the trail that the ants of a plan have left, even if the plan is not driven."""
         self._follow_map()
         if plan.trail is not None:
             self._trail.take(plan.trail, plan.work.ants)
@@ -70,7 +70,7 @@ class TrailLayer:
             self._before_motion = self._trail.snapshot()
 
     def note_motion(self, motion: Motion | None) -> None:
-        """Move the trail with the map; None if the map has not moved."""
+        """Move the trail with the map; ``motion`` is None if the map has not moved."""
         before, self._before_motion = self._before_motion, None
         if before is None or motion is None or motion.is_still:
             return

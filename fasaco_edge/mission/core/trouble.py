@@ -22,14 +22,14 @@ from fasaco_edge.mission.line.place_on_line import Offset
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 
-# Timeout of poses at rest, if longer than ``lost_pose_s``; timeout of the first map and pose [s].
+# Least timeout of poses at rest [s]; timeout of the first map and of the first pose [s].
 REST_S = 30.0
-# Time after which a place that is impossible on the map is a trouble [s].
+# A robot is in trouble after this time at a place that the map makes impossible [s].
 IMPOSSIBLE_S = 20.0
 
 # States of a robot that drives, or soon will.
 DRIVING = frozenset((State.PLANNING, State.COVERING, State.RETURNING))
-# States of a mission that is not over. A robot without an order may be switched off.
+# States of a mission under way. In the others the robot may be switched off.
 UNDER_WAY = frozenset(State) - {State.IDLE, State.DONE}
 
 
@@ -142,7 +142,7 @@ class Troubles:
         return f"no map or update for {self.policy.stale_map_s:g} s: going on with the last one"
 
     def no_battery(self, state: State, now: float) -> str:
-        """Return why the charge of the battery is not known."""
+        """Return why the battery level is not known."""
         what = "how full it is" if state is State.CHARGING else "when to charge"
         why = self.charging.silence(now)
         return f"{why}: {what} is not known" if why else ""
@@ -165,7 +165,7 @@ class Troubles:
         return f"{why}: pose or map is off" if now - self._possible_at > IMPOSSIBLE_S else ""
 
     def stands(self, _: State, now: float) -> str:
-        """Return the evidence that the robot is stuck; "" for none, as without poses."""
+        """Return the evidence that the robot is stuck; "" for none, or without poses."""
         if self.monitor.is_pose_lost(now):
             return ""
         return self.giving_way.why_stuck(now) or self.standing.why_stuck

@@ -31,11 +31,10 @@ TRACK_M, SPACING_M = 40.0, 0.05
 # On the way out the robot may come this much nearer to walls [pixels of the map]: a wall may be a
 # pixel thicker on the map than it is, and the pose off by half a pixel.
 SQUEEZE_PX = 1.5
-# A robot that has not moved this far [m] on its way out after this time [s] cannot drive it. It
-# tries again after the same time, which doubles with each failure.
+# A robot that moves less than STANDING_M [m] on its way out in STANDING_S [s] cannot drive it. It
+# tries again after that time, which doubles with each failure.
 STANDING_M, STANDING_S = 0.1, 15.0
-# Number of points of the track by which the way out leads past the first place where the robot can
-# continue.
+# The way out leads this many points of the track past the first place where the robot can continue.
 INTO_POINTS = 4
 # Lengths of loops that are left out, the longest first [points of the track].
 LEAPS = (256, 128, 64, 32, 16, 8, 4, 2)
@@ -89,7 +88,7 @@ class WayOut:
 
         Args:
             why: what shuts it in.
-            update: the path that this step has made so far; returned without a new one.
+            update: the path that this step has made so far; returned if there is no new one.
             now: time [s].
             goal: destination; None for the nearest work.
         """
@@ -172,7 +171,7 @@ class WayOut:
                 continue
             area = ReachableArea.around(lattice, cell)
             if leads_on(area):
-                # Well into the next cell: at its border the robot may count as in the cell before.
+                # Lead well into the cell: at its border the robot may still count as outside.
                 end = index
                 while end < min(index + INTO_POINTS, len(way) - 1) and is_clear_between(
                     floor, raster[end], raster[end + 1]

@@ -1,10 +1,10 @@
 """Driving by poses: the robot's speed and turn durations, and the poses it can have driven to.
 
-The duration of a turn is the time from ``BESIDE_S`` before it to ``BESIDE_S`` after it, minus the
-time of that distance at full speed, so it includes braking and starting, as
-``robot.quarter_turn_s`` does. Only turns between two straight stretches count, faster than
-``TURNS_RAD_S``. The results are medians, which waits at turns change little. Times are by the
-poses' stamps.
+A turn is measured from ``BESIDE_S`` before it to ``BESIDE_S`` after it. Its duration is this time
+minus the time of the distance at full speed. So it includes braking and starting, as
+``robot.quarter_turn_s`` does. Only turns faster than ``TURNS_RAD_S`` between two straight stretches
+count. The results are medians, so waits at a few turns change little. Times are by the poses'
+stamps.
 
 Swept floor uses only poses that the robot can have driven to. Localisation sometimes errs by more
 than its noise: one pose lies beside the track, and the next pose lies on it again. A pose farther
@@ -26,9 +26,9 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 
 # Straight driving required before and after a turn [s].
 BESIDE_S = 1.5
-# Least turning rate of a turn [rad/s]; time over which it is measured, as headings are noisy [s].
+# Turns are faster than TURNS_RAD_S [rad/s], measured over OVER_S [s], as headings are noisy.
 TURNS_RAD_S, OVER_S = 0.12, 0.5
-# Longest time between poses of one track; poses closer than LEAST_S are ignored [s].
+# Poses of one track are at most GAP_S apart; poses closer than LEAST_S are ignored [s].
 GAP_S, LEAST_S = 1.0, 0.05
 # Time for which poses are kept [s]: a robot that turns for longer waits, or is lost.
 KEPT_S = 40.0
@@ -44,7 +44,7 @@ NEWEST, FEWEST = 31, 5
 
 @dataclass(frozen=True, slots=True)
 class DriveTimes:
-    """Measured drive times; None before enough was measured.
+    """Measured drive times; None until enough is measured.
 
     Attributes:
         speed_m_s: speed in straight driving [m/s].
@@ -181,10 +181,10 @@ def _median(values: deque[float]) -> float | None:
     return median(values) if len(values) >= FEWEST else None
 
 
-# Largest ratio of a base's speed to the configured one; longest time between two poses for which
-# the track between them is known [s].
+# A base drives up to SPEED_MARGIN times as fast as configured. The track between two poses is known
+# if they are at most LONGEST_S apart [s].
 SPEED_MARGIN, LONGEST_S = 1.2, 3.0
-# Largest excess of the distance of two poses over the distance driven, by noise [cells].
+# By noise two poses may be this much farther apart than the distance driven [cells].
 NOISE_CELLS = 0.5
 
 
@@ -217,7 +217,7 @@ class DrivenPoses:
         return self._held is not None
 
     def break_track(self) -> None:
-        """Note that the next pose counts anywhere, as after a motion of the map."""
+        """Note that the next pose counts wherever it is: the map may have moved."""
         self._sure = self._held = None
 
     def farthest_m(self, before: StampedPose, after: StampedPose) -> float:

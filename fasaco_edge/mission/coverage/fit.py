@@ -3,21 +3,22 @@
 On a map of another building, obstacles are as frequent on covered cells as around them; on a map of
 the same building they are rare on covered cells. So the number of blocked covered cells is compared
 with the number expected by chance, from the share of obstacles among the other known cells around
-them. The ledger belongs to another building if the number exceeds ``OTHER_FROM`` times that, and is
-too large for new furniture; also if ``MANY_BLOCKED`` of the known covered cells are blocked.
+them. The ledger belongs to another building if the number exceeds ``OTHER_FROM`` times the expected
+one and is too large for new furniture, or if ``MANY_BLOCKED`` of the known covered cells are
+blocked.
 
 A map that changes during a mission is compared with the previous map (``map.building_watch``), and
 with the ledger if the walls do not decide.
 
-Unknown cells, and cells outside the map, do not contradict, as a restarted mapper has seen little.
-A map that knows half of the covered cells without contradiction confirms the ledger for good.
+Unknown cells, and cells outside the map, are no evidence, as a restarted mapper has seen little. A
+map that knows half of the covered cells without contradiction confirms the ledger for good.
 
 Measured on 13 buildings, 10 to 100 % of them covered, all robots starting at the same place of the
 frame. In another building, complete maps reject 66 % of the ledgers (most of the rest overlap too
 little), and single scans of 3.5 m and 8 m reject 32 % and 47 %, more as the map grows. In the same
-building, maps reject no ledger, also if moved by 0.1 m; 2 % if moved by 0.22 m and 1 degree; none
-and 8 % with obstacles on 3 and 10 % of the covered cells. On a map that has moved by more than a
-cell, a ledger is as wrong as in another building, and may be rejected.
+building, maps reject no ledger, even if moved by 0.1 m, and 2 % if moved by 0.22 m and 1 degree.
+With obstacles on 3 % of the covered cells they reject none, and on 10 % of them 8 %. On a map that
+has moved by more than a cell, a ledger is as wrong as in another building, and may be rejected.
 """
 
 from __future__ import annotations
@@ -57,8 +58,8 @@ class Fit:
 
     Attributes:
         covered: number of covered cells.
-        known: number of these that the map knows, blocked or coverable.
-        blocked: number of these that are blocked.
+        known: number of covered cells that the map knows, as blocked or coverable.
+        blocked: number of covered cells that are blocked.
         chance: share of blocked cells among the known uncovered cells around them.
     """
 

@@ -25,8 +25,8 @@ FLOOR_TILE = 128
 # Bytes in a row of a tile.
 ROW_BYTES = FLOOR_TILE // 8
 
-# Distance from a border of two pixels within which a centre of another raster is assigned to the
-# farther one, so that the result does not depend on the queried window [pixels].
+# A centre of another raster this near to the border of two pixels belongs to the pixel with the
+# higher index, so that the result does not depend on the queried window [pixels].
 TIE = 1e-6
 
 # Edges of the squares in which swept floor is published [pixels]: whole bytes that divide a tile.
@@ -172,8 +172,8 @@ class FloorSnapshot:
     def shown(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
         """Return the swept share of each square as a grid, in percent, rounded down.
 
-        The squares are the smallest that give at most ``most`` squares. None if even the largest
-        are too many.
+        The squares are as small as possible, but at most ``most``. None if even the largest are too
+        many.
         """
         rows, cols = zip(*(self.tiles or ((0, 0),)), strict=True)
         low, high = (min(rows), min(cols)), (max(rows) + 1, max(cols) + 1)

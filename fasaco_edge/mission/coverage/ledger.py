@@ -23,16 +23,16 @@ if TYPE_CHECKING:
     # For types only: a daemon reads its ledger before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
 
-# Distance of two poses above which they are a jump, unless the robot can have driven it [cells]:
-# the floor under the tool in between is unknown.
+# Two poses farther apart than this are a jump, unless the robot can have driven that far [cells]:
+# the track between them is unknown.
 JUMP_CELLS = 2.0
 
 TILE = 64
 # Lookups go by districts of DISTRICT x DISTRICT tiles.
 DISTRICT = 16
 
-# Limit on the tiles of a ledger: 8 million cells, more than any path. A tile takes 8 kB, and as
-# much in the copy last written. ``protocol/limits.yaml`` has the same number.
+# Limit on the tiles of a ledger: 8 million cells, more than any path. A tile takes 8 kB, and 8 kB
+# more in the copy last written. ``protocol/limits.yaml`` has the same number.
 MOST_TILES = 2048
 # Number of tiles dropped at once at the limit, the farthest first.
 DROPPED_TILES = MOST_TILES // 16
@@ -94,8 +94,8 @@ class CoverageLedger:
 
     A cell is visited when the tool, a disc as wide as a cell, passes over its centre. Leaving and
     returning counts as another visit; ``total`` counts all visits. ``frame`` names the frame of the
-    poses, "" while unknown. ``dropped`` counts the tiles dropped at the limit ``MOST_TILES``, which
-    are those farthest from the robot.
+    poses, "" while unknown. ``dropped`` counts the tiles dropped at the limit ``MOST_TILES``, the
+    farthest from the robot first.
     """
 
     def __init__(self, cell_m: float, frame: str = "") -> None:

@@ -23,7 +23,7 @@ class Loss:
     Attributes:
         cells: their number, without cells under the tool, which stay covered.
         m2: their area [m2].
-        share: their share of the reachable cells; None if those are unknown.
+        share: their share of the reachable cells; None if the reachable cells are unknown.
     """
 
     cells: int
@@ -75,7 +75,7 @@ def loss_in(zones: tuple[Zone, ...], ledger: MissionLedger, on: MapState) -> Los
 def _beyond(window: Window, zones: tuple[Zone, ...], own: LedgerSnapshot) -> int:
     """Return the number of covered cells in zones outside the map's window.
 
-    The map may have been larger, as before a restart of the mapper.
+    The map may have been larger before the mapper was restarted.
     """
     cells = 0
     for place in own.tiles:

@@ -5,8 +5,8 @@ stays valid, and is compared with each map, until a map knows enough to decide. 
 map is compared with the previous building (``map.building_watch``).
 
 In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
-the rest of its floor. The robot that has passed the cell keeps that floor, in any robot's part, and
-sweeps it when its line passes near again.
+the rest of its floor. The robot that has passed the cell remembers that floor, in any robot's part,
+and sweeps it when its line passes near again.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertai
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
-# New furniture does not block this share of the known covered cells, or more, on one map.
+# New furniture blocks less than this share of the known covered cells on one map.
 MANY_AT_ONCE = 0.2
 # Limit on the passed cells kept; the oldest are dropped.
 MOST_PASSED = 2_000
@@ -132,7 +132,6 @@ class MissionLedger:
         self.reopened = 0
         self.shared = shared or OthersCells()
         self.passed = PassedCells()
-        # Coverage from before a restart in the middle of an order.
         self.before: LedgerSnapshot | None = None
         self._opened_again: Counter[Cell] = Counter()
         # The ledger from before a restart; None once a map has confirmed it.
@@ -146,7 +145,7 @@ class MissionLedger:
         return self.current.total, self.shared.version, self.reopened
 
     def visits(self, window: Window) -> NDArray[np.uint16]:
-        """Return the visits to cells, uint16 (rows, cols); 1 if only another robot swept one."""
+        """Return the visits to cells, uint16 (rows, cols); 1 for a cell that only others swept."""
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
@@ -250,7 +249,7 @@ class MissionLedger:
         cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
         self.current.forget(cells)
         self.floor.leave(floor)
-        # Cells of other robots are as uncertain, as each robot records them on a map of its own.
+        # Cells of other robots become uncertain, too: each robot records on a map of its own.
         self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
         self.shared.note_forgotten()
         return before.cells - self.current.snapshot().cells
@@ -276,7 +275,7 @@ class MissionLedger:
         self.shared.note_forgotten()
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
-        """Move to ``frame``; start over and report it if the ledger has cells in another frame."""
+        """Move to ``frame``; start over, and return the fault, if cells lie in another frame."""
         self.shared.enter(frame)
         was = self.current.frame
         if was in ("", frame):
@@ -299,7 +298,7 @@ class MissionLedger:
         self.first_plan_reason = "first plan"
 
     def check(self, lattice: CoverageLattice, frame: str) -> LedgerMismatchError | None:
-        """Start over and report it if a map shows that the ledger belongs to another building."""
+        """Start over, and return the fault, if a map shows another building than the ledger's."""
         if frame == self.current.frame:
             self.shared.enter(frame)
         if self._resumed is None:
@@ -316,7 +315,7 @@ class MissionLedger:
         return fit.verdict is Verdict.OTHER and fit.blocked >= MANY_AT_ONCE * fit.known
 
     def begin_elsewhere(self, frame: str) -> LedgerMismatchError:
-        """Start over in another building, whose map is in ``frame``; return the fault to report."""
+        """Start over in another building, with its map in ``frame``; return the fault to report."""
         self.shared.leave_building(frame)
         return self._leave_building(frame)
 

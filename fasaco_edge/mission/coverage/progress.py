@@ -33,8 +33,8 @@ class Coverage:
 
     Attributes:
         coverable: cells that are reachable, or have been since the order began.
-        covered: number of them that the tool has passed over.
-        recovered: number of them that it has passed over at least twice.
+        covered: number of these cells that the tool has passed over.
+        recovered: number of these cells that it has passed over at least twice.
         unreachable: coverable cells that were never reachable.
         cell_m2: area of a cell [m2].
         free_out_of_reach_m2: free area outside the reachable cells [m2].
@@ -92,7 +92,7 @@ class FreeArea:
 
     def __init__(self, free_at_most: int) -> None:
         self._free_at_most = free_at_most
-        # The revision, as the map would stay in memory.
+        # The map's revision, as a reference would keep the map in memory.
         self._counted: tuple[int, NDArray[np.bool_] | None] = (-1, None)
         self._area_m2 = 0.0
 
@@ -182,7 +182,7 @@ class ZoneProgress:
         passes: number of passes ordered.
         begun: number of its newest pass; 0 before the first.
         cells: number of its reachable cells.
-        covered: number of these covered in that pass.
+        covered: number of these cells that are covered in that pass.
     """
 
     name: str

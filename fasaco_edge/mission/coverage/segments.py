@@ -78,7 +78,7 @@ def corner_between(start: Place, end: Place) -> Point | None:
     """Return where the robot turned between two places, x, y [m]; None if unknown."""
     one, other = _turns(start, end)
     if not one * other < 0.0 or abs(one) + abs(other) >= math.pi - LEAST_RAD:
-        return None  # it did not turn exactly once, or did not follow its heading
+        return None  # no single turn, or not driven along its heading
     one, other = abs(one), abs(other)
     length = math.dist(start.point, end.point)
     first_m = length * math.sin(other) / math.sin(one + other)
@@ -94,7 +94,7 @@ def _turns(start: Place, end: Place) -> tuple[float, float]:
 
 
 def window_around(segment: Segment) -> Window:
-    """Return a window around a segment's sweep whose columns are whole bytes."""
+    """Return a window around a segment's sweep; its columns are whole bytes."""
     start, end, reach = segment
     row0, row1 = span(start.y, end.y, reach, 1)
     col0, col1 = span(start.x, end.x, reach, 8)
@@ -108,7 +108,7 @@ def within(segments: Sequence[Segment], window: Window, most_m: float = math.inf
     """
     values = []
     for start, end, reach_m in segments:
-        # Relative to each start, as far from the origin rounding would exceed the differences.
+        # Coordinates are relative to each start: far from the origin, rounding would be too large.
         far_y, far_x = end.y - start.y, end.x - start.x
         length2 = far_x * far_x + far_y * far_y or 1.0
         reach2 = (min(reach_m, most_m) + TOUCH_M) ** 2

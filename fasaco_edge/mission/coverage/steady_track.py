@@ -5,12 +5,12 @@ quarter of a pixel, but not wider than the tool's reach. Exact poses become plac
 poses some poses later.
 
 The noise is estimated from three consecutive poses. A robot drives smoothly: within a tenth of a
-second it deviates by only some millimetres from the straight line between its neighbouring poses.
-A larger lateral deviation is localisation noise; a longitudinal one would be timestamp error. Three
+second it deviates by only some millimetres from the straight line between its neighbouring poses. A
+larger lateral deviation is localisation noise; a longitudinal one would be timestamp error. Three
 lateral errors of standard deviation s give a deviation with standard deviation sqrt(1 + 1/4 + 1/4)
-s, and with 0.674 times that as its median size. Corners are rare, so the median over the last
-deviations ignores them; between poses far apart they are frequent, and excluded. Drift, which is
-equal in consecutive poses, is not detected.
+s; its median size is 0.674 times that. Corners are rare, so the median over the last deviations
+ignores them. If poses are far apart, corners are frequent, and are excluded. Drift, which is equal
+in consecutive poses, is not detected.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class PoseScatter:
         self._before = (*self._before[-1:], pose)
 
     def _is_corner(self, first: Pose2D, middle: Pose2D, last: Pose2D) -> bool:
-        """Return whether the robot turned more sharply than noise appears to."""
+        """Return whether the robot turned more sharply than noise can explain."""
         ax, ay, bx, by = (
             middle.x - first.x,
             middle.y - first.y,

@@ -51,11 +51,11 @@ from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
 
-# Distance of two poses above which they are a jump, unless the robot can have driven it [tool
+# Two poses farther apart than this are a jump, unless the robot can have driven that far [tool
 # widths].
 JUMP_TOOLS = 2.0
-# Limit on the tiles of a floor: 100 million pixels, as for planning. A tile takes 2 kB, and as much
-# again if it has changed since the copy last written. ``protocol/limits.yaml`` has the same number.
+# Limit on the tiles of a floor: 100 million pixels, the limit of planning. A tile takes 2 kB, and 2
+# kB more if it has changed since it was last written. ``protocol/limits.yaml`` has the same number.
 MOST_FLOOR_TILES = 6144
 # Number of tiles dropped at once at the limit, the farthest first.
 DROPPED_FLOOR_TILES = MOST_FLOOR_TILES // 16
@@ -64,7 +64,7 @@ NOWHERE = Window(0, 0, 0, 0)
 MOST_AHEAD = 1 << 22
 # Limit on segments times pixels in one array operation, which bounds memory.
 MOST_TOGETHER = 1 << 16
-# Number of changes whose windows are remembered.
+# Number of the last changes with remembered windows.
 REMEMBERED = 64
 ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
 # Grids are processed in blocks of about BLOCK x BLOCK pixels of floor.
@@ -202,7 +202,7 @@ class SweptFloor:
         """Forget pixels of all tiles at once, except those under the tool now.
 
         Args:
-            left_of: returns the remaining pixels of those tiles that lose some.
+            left_of: returns the tiles that lose pixels, with their remaining pixels.
         """
         self._end_track()
         before = self.pixels
@@ -235,7 +235,7 @@ class SweptFloor:
             self._news.append((self.changes, window))
 
     def _keep(self, places: list[Place]) -> None:
-        """Store the sweeps to places."""
+        """Store the sweeps that lead to places."""
         for place in places:
             for segment in segments_between(self._kept_to or place, place, self._tool_m):
                 window = window_around(segment)
@@ -276,7 +276,7 @@ class SweptFloor:
         return self._ahead
 
     def _segments_ahead(self, places: list[Place]) -> list[Segment]:
-        """Return the sweeps from the stored ones along places."""
+        """Return the sweeps along places, from the last stored place on."""
         chain = [self._kept_to or places[0], *places] if places else []
         return [
             segment
@@ -292,7 +292,7 @@ class SweptFloor:
         return self._sight.of(under, within(segments, window, self._sight.radius_m), window)
 
     def _mark(self, window: Window, bits: Bits) -> None:
-        """Mark pixels of a window whose columns are whole bytes."""
+        """Mark pixels of a window; its columns are whole bytes."""
         has_changed = False
         for place in places_of(window):
             part = window_of(place)

@@ -17,7 +17,7 @@ from fasaco_edge.mission.map.room_raster import centres
 
 
 class ToolSight:
-    """Finds the part of the tool's disc that the tool touches, on the newest map.
+    """Finds the floor within the tool's disc that the tool touches, on the newest map.
 
     Attributes:
         radius_m: radius of the robot's disc [m].

@@ -1,4 +1,4 @@
-"""Unreached areas: cells of an order that stay uncovered, why, and viewpoints to check again."""
+"""Unreached areas: uncovered cells of an order, the causes, and viewpoints to look at them."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def _on(window: Window, cells: tuple[Window, NDArray[np.bool_]] | None) -> NDArr
 
 
 class OrderReach:
-    """Remembers which cells were reachable since an order began; finds those that stay uncovered.
+    """Remembers which cells were reachable since an order began; finds cells that stay uncovered.
 
     Attributes:
         order_state: the order and its progress.
@@ -147,7 +147,7 @@ class OrderReach:
 
     @property
     def reached(self) -> ReachedCells | None:
-        """The cells that have been reachable since the order began; None without open order."""
+        """The cells that have been reachable since the order began; None without an open order."""
         return self._reached_cells() if self.order_state.is_open else None
 
     def _reached_cells(self) -> ReachedCells | None:
@@ -163,8 +163,8 @@ class OrderReach:
             once = self._once_on(window)
             here = once[area.lattice.window.slices_in(window)]
             if self._have_moved:
-                # After a motion by a fraction of a cell, some moved cells lie in walls: those
-                # that are not coverable and lie beside reachable cells.
+                # A motion by a fraction of a cell moves some cells into walls: they are not
+                # coverable, and lie beside reachable cells.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
             self._once, self._newest, self._have_moved = (window, once), area, False
@@ -184,7 +184,7 @@ class OrderReach:
         self._before_motion = self._before_motion or self._once
 
     def move_reached(self, motion: Motion) -> None:
-        """Move the cells with the map; areas found since it moved were from an old pose."""
+        """Move the cells with the map; areas found since then are from an old pose."""
         before, self._before_motion = self._before_motion, None
         if before is not None and not motion.is_still:
             lattice = self._map.lattice
@@ -245,8 +245,8 @@ class OrderReach:
     def reached_m2(self, area: ReachableArea) -> tuple[float, float]:
         """Return the size of an area, and of all cells that were ever reachable [m2].
 
-        Covered cells count as ever reachable, as after a restart no others are known. Cells unknown
-        on the present map, as after a restart of the mapper, do not count.
+        Covered cells count as ever reachable: after a restart no others are known. Cells unknown on
+        the present map do not count: the mapper may have been restarted.
         """
         once = self.known(area.lattice) | (self._ledger.visits(area.lattice.window) > 0)
         once &= area.lattice.states != UNKNOWN

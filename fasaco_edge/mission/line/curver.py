@@ -1,8 +1,8 @@
 """Curver: converts the line just ahead of a robot that cannot turn on the spot into curves.
 
 The line further ahead may still change, and becomes a curve when the robot comes near. A curve
-begins at the end of the last one, with the heading there; after a change at the robot, it begins at
-the robot's pose. Curves are not polished.
+continues the one before it; after a change at the robot, it begins at the robot's pose. Curves are
+not polished.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import Curve, curve_along
 
-# Once the curve ahead is shorter than this, the next piece of the line becomes a curve; its length
-# is the sum of a distance and a number of turning radii [m], [m], [turning radii].
+# Once the curve ahead is shorter than AHEAD_M [m], the next piece of the line becomes a curve. The
+# piece is PIECE_M [m] and PIECE_RADII turning radii long.
 AHEAD_M, PIECE_M, PIECE_RADII = 6.0, 6.0, 6.0
 # Share of a piece's curve that is kept; the rest is made again together with the next piece.
 KEPT_SHARE = 0.6
-# If a turn does not fit at the end of the curve, the curve is made anew from this distance ahead of
-# the robot; the end of a curve shorter than the second value has no certain direction [m].
+# If a turn does not fit at the end of the curve, the curve is made anew from AGAIN_M ahead of the
+# robot. The end of a curve shorter than LEAST_M has no certain direction [m].
 AGAIN_M, LEAST_M = 0.5, 0.1
-# A robot whose heading or position is farther off its curve has left it [rad], [m]. The curve is
-# made anew from its pose, and again only after it has moved this far [m].
+# The robot has left its curve if its heading is off by ASTRAY_RAD [rad], or its position by
+# ASTRAY_M [m]. The curve is made anew from its pose, and again only after it has moved MOVED_M [m].
 ASTRAY_RAD, ASTRAY_M, MOVED_M = math.radians(35.0), 0.1, 0.05
 # Segments of the published line shorter than this have no direction of their own [m].
 SHORT_M = 2e-3
 # A robot that can drive backward changes between forward and backward at a sharper bend [rad].
 REVERSAL_RAD = math.radians(120.0)
-# A curve keeps within the sum of these distances of its line [turning radii], [m].
+# A curve stays within BESIDE_RADII turning radii and BESIDE_M [m] of its line.
 BESIDE_RADII, BESIDE_M = 5.0, 1.0
-# A robot that stands where its disc does not fit, as by an error of its pose, leaves with the
-# largest disc that fits there, within this distance [m].
+# If the robot's disc does not fit at its pose, for instance after a pose error, the largest disc
+# that fits there is used for the curve within this distance of the pose [m].
 LEAVES_M = 0.5
 
 
@@ -118,7 +118,7 @@ class Curver:
             or (curved and lengths[min(curved, len(lengths)) - 1] > AHEAD_M)
         ):
             return False
-        # From the end of the curve; from further back, or from the robot, if a turn does not fit.
+        # Begin at the end of the curve; if a turn does not fit, further back, or at the robot.
         begins = [curved - 1] if curved > 1 and lengths[curved - 1] >= LEAST_M else []
         near = int(np.searchsorted(lengths, AGAIN_M))
         begins += [near] if 1 < near < curved - 1 else []
@@ -159,7 +159,7 @@ class Curver:
         return np.append(yaw, yaw[-1])
 
     def _has_left(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
-        """Return whether the robot has left its curve, and no curve was made anew since."""
+        """Return whether the robot has left its curve; False where it last did so."""
         beside, here = ahead.beside, (pose.x, pose.y)
         edge_m = math.dist(*ahead.line.points[:2]) * floor.geometry.resolution
         if beside is None or edge_m < SHORT_M or math.dist(here, self._astray_at) < MOVED_M:
@@ -181,7 +181,7 @@ class Curver:
         xy = raster_to_map(floor.geometry, points)
         yaw = pose.yaw
         if first:
-            # The heading of the segment before it, as the line may bend there.
+            # Take the heading of the segment before ``first``, as the line may bend at that point.
             yaw = float(self.yaw(xy[: first + 1], pose)[-1])
         margin = (BESIDE_RADII * self._config.radius_m + BESIDE_M) / floor.geometry.resolution
         part = _Part.around(points[first:], floor, ahead, margin, leaves=not first)

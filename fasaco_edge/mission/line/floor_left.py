@@ -29,14 +29,14 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # The robot does not drive to a cell with less unswept floor than this [m2].
 LEAST_LEFT_M2 = 0.04
-# A passed cell is kept in the ledger while the unswept floor in it and in a rim around it is worth
-# this much [s]; width of the rim [m]; number of kept cells that are checked when the robot passes a
-# cell. The robot does not return to them: for four robots that took a tenth more time, for 0.1 % of
+# A passed cell is kept in the ledger while the unswept floor in it, and in a rim of RIM_M [m]
+# around it, is worth WORTH_S [s]. With each cell passed, CHECKED_CELLS kept cells are checked. The
+# robot does not return to kept cells: with four robots, returns took a tenth more time for 0.1 % of
 # the floor.
 WORTH_S, RIM_M, CHECKED_CELLS = 4.0, 0.1, 24
-# The robot returns for missed floor if that is more than this share of the floor asked for: a base
-# that drives beside its line misses more, and so do poses at a low rate. To return for less took an
-# eighth more time, for 0.3 % of the floor, on the map of a real scan matcher.
+# The robot returns for missed floor if it is more than this share of the floor asked for: the base
+# may have driven beside its line, or poses may be rare. On the map of a real scan matcher, returns
+# for less took an eighth more time for 0.3 % of the floor.
 LEAST_MISSED = 0.05
 # Least unswept floor that is reported at the end [m2]: less would be rounded to 0.
 LEAST_REPORTED_M2 = 0.05
@@ -83,7 +83,7 @@ class FloorLeft:
         self._tally: SweepTally | None = None
         # Window in which causes of unreachable floor may be outdated.
         self._unexplained: Window | None = None
-        # The newest reachable area, and its cells whose floor counts as reachable.
+        # The newest reachable area, and ``_reachable`` of it.
         self._reach: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
         # Window of the last update, with its asked-for and its reachable cells.
         self._asked: tuple[Window, NDArray[np.bool_], NDArray[np.bool_]] | None = None
@@ -162,8 +162,8 @@ class FloorLeft:
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Count passed cells as covered if hardly any of their floor is left.
 
-        A polished line may skip the stand of a cell. A cell without floor asked for, as in another
-        robot's part, seems swept but still needs a visit.
+        A polished line may skip the stand of a cell. A cell without floor asked for, for instance
+        in another robot's part, seems swept but needs a visit.
         """
         tally, floor, covered = self._tally, self._map.floor, self._ledger.current
         assert tally is not None
@@ -182,7 +182,7 @@ class FloorLeft:
                 self._ledger.credit(cell)
 
     def _keep(self, passed: NDArray[np.int32]) -> None:
-        """Keep the passed cells, and drop those whose floor is swept."""
+        """Keep the passed cells; drop cells once their floor is swept."""
         tally, floor, kept = self._tally, self._map.floor, self._ledger.passed
         assert tally is not None
         assert floor is not None
@@ -193,7 +193,7 @@ class FloorLeft:
                 kept.drop(cell)
 
     def open_missed(self) -> bool:
-        """Reopen covered cells whose missed floor is worth the drive; return whether there are any.
+        """Reopen covered cells if their missed floor is worth the drive; return whether any is.
 
         To be called at the end of a path, as the robot may have driven beside its line.
         """
@@ -281,10 +281,10 @@ class FloorLeft:
         return floor.pixels_of(changed) if changed.any() else None
 
     def _reachable(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells whose floor counts as reachable, bool (rows, cols) of an area.
+        """Return the cells with floor that counts as reachable, bool (rows, cols) of an area.
 
-        These are the area's reachable cells. For a robot that is shut in, they are all cells that
-        were reachable before: nearly all floor would seem swept while it waits in a corner.
+        These are the area's reachable cells. While the robot is shut in, they are all cells that
+        were reachable before, as nearly all floor would seem swept otherwise.
         """
         if self._reach[0] is not area:
             reachable = area.reachable

@@ -1,7 +1,7 @@
 """Followed line: the line that the robot drives along a walk, and its place on it.
 
-The line consists of points on the fine raster, which keep the index of their cell in the walk: so
-the robot's place on the line gives its place on the walk.
+Each point of the line lies on the fine raster, and has the index of its cell in the walk. So the
+robot's place on the line gives its place on the walk.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from fasaco_edge.mission.line.way import (
     is_clear_between,
 )
 
-# The nearest cell is the first of this many to whose stand the robot can drive straight.
+# The robot's cell is the first of this many nearest cells with a clear straight way to its stand.
 NEAREST_CELLS = 8
 
 
@@ -59,8 +59,8 @@ class FollowedLine:
         self.tally = SweepTally(floor)
         self.cell = 0
         self._floor, self._geometry, self._is_curved = floor, floor.geometry, is_curved
-        # The walk and its line, including the part that a map has cut off, as the next walk mostly
-        # leads there again; the number of the walk's cells before the cut.
+        # The walk and its line, with the part that a map has cut off, as the next walk mostly leads
+        # there again; and the number of cells before the cut.
         self._walk: Walk = np.empty((0, 2), np.int32)
         self._whole, self._until = Line(), 0
         self._place = PlaceOnLine()
@@ -103,7 +103,7 @@ class FollowedLine:
     def _carry(self, before: GridGeometry) -> None:
         """Convert to the floor's raster, which has another size or is shifted by part of a pixel.
 
-        The maps of some mappers begin at the farthest point seen, and their pixels shift with it.
+        Some mappers begin their maps at the farthest point seen, so that pixels shift with it.
         """
         carried = partial(raster_to_raster, before, self._geometry)
         self._whole = self._whole.at(carried(self._whole.points))
@@ -115,7 +115,7 @@ class FollowedLine:
         points, before = self._whole.points, self.tally.shape
         self._whole = self._whole.moved(by)
         moved = self._whole.points
-        # Sweeps beyond a raster are not counted: such edges are subtracted before and added after.
+        # Sweeps outside a raster do not count: subtract edges at its rim before, add them after.
         margin = self._tool + 1.0
         beyond = is_outside(points, before, margin) | is_outside(moved, shape, margin)
         is_edge = beyond[:-1] | beyond[1:]
@@ -125,7 +125,7 @@ class FollowedLine:
         self._place.here = self._place.here + np.array(by)
 
     def stop(self) -> None:
-        """Number the walk's cells from the robot's on: the path is kept while the robot stands."""
+        """Number the walk's cells from the robot's cell on, where the kept path begins."""
         self._whole = self._whole.renumbered(-self.cell)
         self._walk, self._until, self.cell = self._walk[self.cell :], self._until - self.cell, 0
 
@@ -230,8 +230,7 @@ class FollowedLine:
     def _nearest(self, begin: int, end: int) -> int:
         """Return the nearest cell of the walk from ``begin`` to ``end``.
 
-        The next walk begins there, so cells count first to whose stand the robot can drive
-        straight.
+        The next walk begins there. So cells with a clear straight way to their stand come first.
         """
         stands, here = self._stands(begin, end), self._place.here
         nearest: list[int] = by_distance(here, stands)[:NEAREST_CELLS].tolist()

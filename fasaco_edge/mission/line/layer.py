@@ -40,7 +40,7 @@ class AheadFigures(NamedTuple):
 
     @property
     def gap(self) -> float | None:
-        """How far the line is above the bound, as a share of it; None if that is 0."""
+        """Excess of the time over the bound, as a share of the bound; None if the bound is 0."""
         return max(self.seconds / self.least_s - 1.0, 0.0) if self.least_s > 0.0 else None
 
 
@@ -97,7 +97,7 @@ class LineLayer:
         self._touched = Window.around(touched, floor.touched)
 
     def note_pose(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
-        """Note the robot's pose, which may be on its line.
+        """Note the robot's pose, and find its place on the line.
 
         ``farthest_m``: the farthest it may have driven since the previous pose; 0 if unknown [m].
         """
@@ -127,7 +127,7 @@ class LineLayer:
         self._unchecked = Window.around(self._unchecked, touched)
         self.left.update(touched)
         reason, path = "", self._route.path
-        # The robot's cell may be ahead of its place on the line, which may skip cells.
+        # The line may skip cells, so the robot's cell may be ahead of its place on the line.
         is_further = path.index > ahead.cell
         if update is not None:
             is_kept = self._route.is_cut or self._route.aside is not None
@@ -141,7 +141,7 @@ class LineLayer:
                 why = "map on another raster" if self._is_dropped else "robot further on its path"
                 update = replace(self._route.publish_anew(why, now), may_wait=True)
         if ahead.is_cut and not self._route.is_cut:
-            ahead.end_at_cut()  # the next plan ends there, too, or the path was given up
+            ahead.end_at_cut()  # no path beyond the cut is kept
         self._is_dropped = False
         is_driven = len(self._route.path.cells) > 0
         if is_driven and self._unchecked is not None:
@@ -179,7 +179,7 @@ class LineLayer:
     def _is_way(self) -> bool:
         """Whether the path is only a way: home, to the dock or to a refuge.
 
-        At the usual end of an order the line home sweeps what floor is left beside it.
+        The path home at the usual end of an order is no way: it sweeps the floor beside it.
         """
         state = self._orders.order_state
         return bool(state.errand or state.late) or self._route.aside is not None
@@ -198,7 +198,7 @@ class LineLayer:
         return floor.geometry, self._ahead.tally.unswept()
 
     def ahead(self) -> AheadFigures | None:
-        """Return figures of the line ahead; None when only cells are counted, or without a line."""
+        """Return figures of the line ahead; None without a line."""
         to_sweep, floor = self.left.areas, self._map.floor
         if self._ahead is None or self._config is None or to_sweep is None or floor is None:
             return None

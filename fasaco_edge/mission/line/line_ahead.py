@@ -1,7 +1,7 @@
 """Line ahead: the line along the walk ahead, laid anew with each walk.
 
-A new walk is laid as a line over stands; where the previous line leads along the same cells, that
-line, already polished, is kept.
+The line along a new walk leads over stands. Where the previous line, already polished, leads along
+the same cells, it is kept.
 """
 
 from __future__ import annotations
@@ -48,18 +48,18 @@ class LineAhead(FollowedLine):
         keeps: bool = True,
         beside: NDArray[np.float64] | None = None,
     ) -> None:
-        """Lay the line along a walk; it stays where it leads along the same cells.
+        """Lay the line along a walk; parts of the line along the same cells stay.
 
         Args:
             walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
             pose: pose of the robot, in or near the first cell.
             is_cut: whether the walk ends where a map has cut off the previous one.
             keeps: whether to keep parts of the line; False for a way to a place, as a polished line
-                leads over the same cells on a much longer way.
+                over the same cells is much longer.
             beside: discs that such a way keeps clear of, see ``Route.beside``.
         """
         self._see(pose)
-        # A plan's cells are read-only: for that type numba would compile the kernels again.
+        # A plan's cells are read-only: numba would compile the kernels again for such arrays.
         walk = walk.copy()
         # Any line ends before a cell that is off the lattice.
         lattice = self._floor.stands.lattice
@@ -104,7 +104,7 @@ class LineAhead(FollowedLine):
         Args:
             pieces: in order.
             beyond: the line beyond a cut, which is not joined.
-            skips: whether it may skip the stand of the robot's cell, where that is swept.
+            skips: whether it may skip the stand of the robot's cell if the floor there is swept.
         """
         if not len(self._walk):
             self._take([])
@@ -127,7 +127,7 @@ class LineAhead(FollowedLine):
         self._take([*joiner.joined(pieces), *([beyond] if len(beyond.line) else [])])
 
     def check(self, touched: Window) -> bool:
-        """Lay parts that a new map blocks over stands again; return whether it blocks any.
+        """Lay the parts that a map blocks over stands again; return whether there are any.
 
         Args:
             touched: window of the raster that may have changed.

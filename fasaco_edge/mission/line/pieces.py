@@ -71,7 +71,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
 def exchanged(line: Line, pieces: list[Piece]) -> tuple[Line, Edges, Edges]:
     """Return the line that consists of pieces, with the edges removed and the edges added.
 
-    Points of new pieces, and those at joints of old pieces, are RAW, to be polished again.
+    Points of new pieces, and points at joints of old pieces, are RAW, to be polished again.
 
     Args:
         line: the previous line.
@@ -174,7 +174,7 @@ class Joiner:
     def _lead_in(self, at: int) -> bool:
         """Append a way round obstacles from the robot to a cell's stand; return whether it exists.
 
-        A polished line passes places without a clear straight way to any stand.
+        On a polished line the robot passes places with no clear straight way to any stand.
         """
         stand = self.stand(self.walk[at])
         corners = self.way(self.here.points[-1], stand)

@@ -6,9 +6,9 @@ Alignment: assigns a cell of the walk to each point of the line. The polisher mo
 inserts points, so their cells are found again by distance (dynamic time warping, Sakoe and Chiba
 1978).
 
-Offset: tracking errors at corners and after a push are to either side. A constant offset has a
-cause that the robot cannot detect: the pose is not that of the point that the base steers along the
-line, or the base pulls to a side.
+Offset: tracking errors at corners and after a push are to both sides. A constant offset shows a
+fault: the base steers another point along the line than the point of the pose, or it pulls to one
+side.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from fasaco_edge.mission.line.polyline import Numbers, Points
 # The robot's place is searched this far ahead on its line, or as far as it may have driven [m]:
 # beyond, another lane may be as near.
 LOOK_AHEAD_M = 0.8
-# A robot has arrived within this distance of the end of its line [m]. A robot beside its line has
-# arrived once its tool covers the end, and this many poses in a row come no nearer.
+# A robot has arrived within ARRIVED_M of the end of its line [m]. A robot beside its line has
+# arrived once its tool covers the end, and STANDING_POSES in a row come no nearer.
 ARRIVED_M, STANDING_POSES = 0.05, 10
-# Cosine of the largest angle between the edge and the heading of a robot that cannot turn on the
-# spot: its curve may cross itself within the searched distance.
+# Cosine of the largest angle between an edge and the heading of a robot that cannot turn on the
+# spot. Such a robot is on no other edge, even where its curve crosses itself.
 LEAST_COSINE = math.cos(math.radians(40.0))
 
-# Spacing of the samples of the offset, their least distance from corners, and the distance between
-# two poses that is a jump [m].
+# The offset is sampled every STEP_M, at least CORNER_M from corners. Poses farther apart than
+# JUMP_M are a jump [m].
 STEP_M, CORNER_M, JUMP_M = 0.05, 0.25, 1.0
 # A bend of more than this is a corner [rad].
 BEND_RAD = math.radians(10.0)
-# Greatest and least number of samples: of the last 10 m, and of 5 m.
+# Most samples kept, of 10 m of driving; fewest samples needed, of 5 m.
 MOST_SAMPLES, LEAST_SAMPLES = 200, 100
-# The least offset that counts is the larger of a share of the tool's width and the accuracy of a
-# follower [m].
+# The least offset that counts is TOOL_SHARE of the tool's width, but not less than LEAST_M [m], the
+# accuracy of a follower.
 TOOL_SHARE, LEAST_M = 0.1, 0.03
 # Least share of the samples on one side.
 ONE_SIDE = 0.8
@@ -231,7 +231,7 @@ def aligned(points: Points, stands: Points) -> Numbers:
     """
     apart = (points[:, :1] - stands[:, 0]) ** 2 + (points[:, 1:] - stands[:, 1]) ** 2
     apart[np.isnan(apart)] = NOWHERE_PX2
-    # Least sums of the points up to now, by the last point's stand.
+    # Least sum over the points so far, for each stand of the last point.
     sums = np.empty_like(apart)
     sums[0] = np.inf
     sums[0, 0] = 0.0

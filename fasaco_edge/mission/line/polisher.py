@@ -28,21 +28,21 @@ from fasaco_edge.planners.path import common_beginning
 HELD_M = 0.5
 # First pass: points are moved along the whole line, in pieces of this length [m].
 MOVED_M = 6.0
-# Second pass: detours to unswept floor, once all points are moved, or within NEAR_M of the robot;
-# at most AHEAD_M ahead, in pieces of PIECE_M [m]. Farther ahead the map of an exploring robot may
+# Second pass: detours to unswept floor, up to AHEAD_M ahead, in pieces of PIECE_M [m]. It begins
+# once all points are moved; within NEAR_M, at once. Farther ahead the map of an exploring robot may
 # still grow.
 NEAR_M, AHEAD_M, PIECE_M = 5.0, 8.0, 4.0
-# Third pass: annealing, from this distance ahead, or from the end of the held line; length of a
-# piece [m], and number of pieces, taken in turn.
+# Third pass: annealing of ANNEALED_PIECES pieces in turn, each ANNEALED_PIECE_M long [m]. They
+# begin ANNEALED_M ahead, or at the end of the held line if that is farther.
 ANNEALED_M, ANNEALED_PIECE_M, ANNEALED_PIECES = 2.0, 4.0, 2
-# Moves for each of them; and, on a complete map, the temperature of the farthest piece, as a share
-# of the full one.
+# ANNEAL_MOVES are made for each piece. HOTTEST is the temperature of the farthest piece on a
+# complete map, as a share of the full temperature.
 ANNEAL_MOVES, HOTTEST = 300, 0.3
 # Length of the line ahead that the second and third pass include [m].
 SEEN_M = 20.0
 # Limit on the moves per call, which bounds a cycle of the loop.
 MOST_MOVES = 3000
-# Limit on the length of a detour that excludes all detours.
+# A limit on the length of detours that excludes all of them.
 NO_DETOURS = -1e6
 
 
@@ -60,7 +60,7 @@ class Polisher:
         """Polish the next piece of the line.
 
         On a map that still grows (``is_settled`` is False) annealing accepts only moves without a
-        loss; these drop detours to floor that another lane sweeps meanwhile.
+        loss. Such moves drop detours to floor that another lane sweeps meanwhile.
 
         Args:
             ahead: the line.

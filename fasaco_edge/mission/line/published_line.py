@@ -21,12 +21,11 @@ from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED, Points
 
-# A change this near is published at once, unless the robot can drive on along the published line:
-# the robot needs a metre to stop, and a second [m], [s].
+# A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, as the robot
+# needs that much to stop; unless the robot can drive on along the published line.
 NEAR_M, NEAR_S = 1.0, 1.0
-# A change within this distance waits while a plan is pending, or the line up to there is not yet
-# polished, but not longer than the patience [m], [s]: a line that a map has cut off gets a new plan
-# within that time.
+# A change nearer than DUE_M [m], or DUE_S [s] of driving, waits up to PATIENCE_S [s] for a plan or
+# for polish: a line that a map has cut off gets a new plan within that time.
 DUE_M, DUE_S, PATIENCE_S = 2.0, 1.0, 1.0
 # Length of the published line ahead of the robot that is no longer polished [m].
 HELD_M = 4.0
@@ -95,7 +94,7 @@ class PublishedLine:
 
         Args:
             now: [s].
-            is_settled: whether nothing is under way that changes the next metres.
+            is_settled: whether neither a plan nor polish is about to change the next metres.
             leads_on: whether the robot can drive along the next points of the published line,
                 float64 (n, 2): x, y [m], while a plan is made.
         """
@@ -131,7 +130,7 @@ def _are_same(points: Points, others: Points) -> NDArray[np.bool_]:
     return same
 
 
-# A robot stands if it has moved less than this in this time [m], [s]; a turn on the spot is faster.
+# A robot stands if it moves less than STANDING_M [m] in STANDING_S [s]; turns take less time.
 STANDING_M, STANDING_S = 0.05, 3.0
 
 
@@ -146,7 +145,7 @@ class Publication:
     def __init__(self, route: Route, speed_m_s: float) -> None:
         self._route = route
         self._line = PublishedLine(speed_m_s)
-        # The newest path that waits, and the newest reason for which the line alone changed.
+        # The newest path that waits; the newest reason for a change of the line alone.
         self._waiting: PathUpdate | None = None
         self._why = ""
         # Where the robot was last seen to move, x, y [m], and until when [s].

@@ -1,6 +1,6 @@
 """Way: a line that leads to a place without sweeping, with few corners.
 
-A diagonal walk over cells is a staircase: its turns on the spot take twice as long as its length.
+A diagonal walk over cells is a staircase: its turns on the spot take twice as long as the driving.
 
 Lead-out: the first step of a robot whose disc does not fit where it stands, because it is off its
 line, its pose is noisy, or a wall is thicker on the newest map. The step leads away from obstacles
@@ -26,10 +26,9 @@ from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.line.polyline import Points
 
-# A straight part of a way leads at most this many points ahead: corners of the walk, so that it can
-# cross a hall.
+# A straight part of a way spans at most this many corners of the walk, enough to cross a hall.
 MOST_SPANNED = 40
-# Margin of a detour around its ends [m]; greatest distance from an end to a free pixel [pixels].
+# A detour stays within DETOUR_M [m] of its ends, and begins within BESIDE_PX [pixels] of them.
 DETOUR_M, BESIDE_PX = 2.0, 2.0
 # A robot nearer to an obstacle than this share of its radius has a wrong pose.
 LEAST_SHARE = 0.5
@@ -73,10 +72,9 @@ def comes_nearer(a: Points, b: Points, beside: Points, start: Points | None = No
 
 
 def corner_past(a: Points, b: Points, beside: Points) -> Points | None:
-    """Return the corner of a way from ``a`` to ``b`` that ``comes_nearer`` to no disc.
+    """Return the corner of a way from ``a`` to ``b`` past discs; None if it comes nearer to one.
 
-    The first part leads at right angles to the direction of the nearest disc. None if such a way
-    comes nearer to a disc, too.
+    The way to the corner is at right angles to the direction of the nearest disc.
 
     Args:
         a, b, beside: as for ``comes_nearer``; at least one disc.

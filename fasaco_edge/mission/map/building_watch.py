@@ -1,14 +1,14 @@
 """Building watch: whether the newest map still shows the building of the ledger.
 
-The frame of the previous map may show another floor, another building or a rotated map. Then walls
-and floor of the cells known to both maps agree no better than by chance: Cohen's kappa of blocked
-and free, 1 for equal maps, is about 0. After a loop closure the maps agree once the previous map is
-moved as the robot's pose has moved. If they agree in neither way, the robot stands still; a map
-that keeps disagreeing for some seconds shows another building. If a mapper alternates between two
+A new map in the same frame may show another floor, another building, or the same one rotated. Then
+the cells known to both maps are equal (blocked or free) no more often than by chance: Cohen's
+kappa, 1 for equal maps, is about 0. After a loop closure the maps agree if the previous map is
+moved in the same way as the robot's pose. If they still disagree, the robot stands still. If they
+disagree for some seconds, the map shows another building. If a mapper alternates between two
 buildings, the robot stands until one of them stays.
 
 Each map is compared with a reference some seconds old, not with the previous map: maps sent in
-parts, and the first maps of a restarted mapper, differ from that in any building.
+parts, and the first maps of a restarted mapper, differ from the previous map in any building.
 
 Measured on 5 buildings, cells of 0.3 m: the highest kappa of two buildings is 0.22, and 0.35 for
 the first 2 m that a scanner sees in another building. The lowest kappa in one building is 0.59 for
@@ -28,22 +28,22 @@ from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
 from fasaco_edge.mission.map.loop_closure import LEAST_CELLS, Motion
 
-# Share of differing cells, of those known to both maps, below which maps are alike.
+# Two maps are alike if less than this share of the cells known to both differs.
 LEAST_SHARE = 0.05
-# Kappa below which two maps show different buildings; above ALIKE they show the same building, even
-# if covered cells are blocked.
+# Two maps show different buildings if kappa is below FOREIGN. Above ALIKE they show the same
+# building, even if covered cells are blocked.
 FOREIGN, ALIKE = 0.3, 0.7
-# Least rise of kappa by a motion of the map that explains the difference of two maps.
+# A motion of the map explains the difference of two maps if it raises kappa by this much.
 BETTER = 0.1
 # Limit on the cells compared.
 MOST_CELLS = 20_000
 # Longest time from a map to the pose that shows its motion, before the robot stops [s].
 GRACE_S = 0.5
-# Time for which maps must show another building before it is accepted; time for which they must
-# show the previous building before the robot drives again [s]. PATIENCE_S doubles with each change
-# of building within SOON_S, up to LONGEST-fold.
+# Maps must show another building for PATIENCE_S before it is accepted, and the previous building
+# for SETTLED_S before the robot drives again [s]. PATIENCE_S doubles with each change of building
+# within SOON_S, up to LONGEST-fold.
 PATIENCE_S, SETTLED_S, SOON_S, LONGEST = 5.0, 5.0, 600.0, 16
-# Age at which the reference is replaced [s], and least share of its cells that the new one knows.
+# The reference is replaced at age AGE_S [s], if the new map knows KNOWN_SHARE of its cells.
 AGE_S, KNOWN_SHARE = 5.0, 0.5
 # Longest time from a jump of the pose to the map that has moved with it [s].
 JUMP_S = 6.0
@@ -68,7 +68,7 @@ class Agreement:
 
     @classmethod
     def of(cls, before: CoverageLattice, after: CoverageLattice, motion: Motion = STILL) -> Self:
-        """Compare two lattices, the first one moved by ``motion``; of large ones, a sample."""
+        """Compare two lattices, the first one moved by ``motion``; if large, by a sample."""
         places = np.flatnonzero(after.states != UNKNOWN)
         stride = 1 + len(places) // MOST_CELLS
         places = places[::stride]
@@ -130,8 +130,8 @@ class BuildingWatch:
         self._is_blind = False
         # Number of changes of building, and the time of the last one.
         self._changes, self._changed_at = 0, float("-inf")
-        # Until the next pose: the agreement of a changed map of the same building, and the pose at
-        # that time; None for a map that is nearly equal.
+        # If the newest map of the same building has changed, until the next pose: the agreement of
+        # the map, and the pose at that time.
         self._shifted: tuple[Agreement, Pose2D] | None = None
         # Whether a loop closure was found since the last ``take_closure``.
         self._has_closed = False
@@ -208,7 +208,7 @@ class BuildingWatch:
         return pose
 
     def note_pose(self, pose: Pose2D, now: float) -> bool:
-        """Note a pose; return whether it explains the newest map, as after a loop closure."""
+        """Note a pose; return whether it explains the newest map, perhaps by a loop closure."""
         shifted, self._shifted = self._shifted, None
         if self._foreign is not None:
             _, seen, before = self._foreign

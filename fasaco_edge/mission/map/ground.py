@@ -88,7 +88,7 @@ class Ground:
             self._set_free(None, grid)
 
     def is_decided(self, window: Window) -> NDArray[np.bool_] | None:
-        """Return the cells of which the map shows whether the robot fits at the centre.
+        """Return the cells for which the map shows whether the robot fits at the centre.
 
         Stands of other cells lie at the border of the known map, and will soon move.
 

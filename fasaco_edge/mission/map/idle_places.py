@@ -1,7 +1,7 @@
 """Places without effect: keep-outs that touch no free ground, home or dock off the map.
 
-Wrong units, signs or origins cause them. A zone of an order there is refused; these places are only
-reported, as the map may grow, and as they apply to later maps, too.
+Causes are wrong units, signs or origins. Orders with such a zone are refused. Places of the
+configuration are only reported: the map may grow, and later maps use them, too.
 """
 
 from __future__ import annotations
@@ -17,8 +17,7 @@ from fasaco_edge.mission.orders.zones import near_polygons
 
 # Least time between two checks of the same places [s], as a growing map changes often.
 PERIOD_S = 1.0
-# Limit on the pixels of a check, which takes some tens of milliseconds; fixed cost of a polygon, in
-# pixels.
+# A check covers up to MOST_PIXELS, some tens of milliseconds. Each polygon adds POLYGON_PIXELS.
 MOST_PIXELS, POLYGON_PIXELS = 1_000_000, 500
 # Limit on the places that are named.
 MOST_NAMED = 5

@@ -1,10 +1,10 @@
 """Incoming maps and poses: selection of the active frame, timeouts, and jumps of the pose.
 
 A frame becomes active once both a map and a pose have arrived in it. From then on maps and poses in
-other frames are refused, but the newest map in another frame is kept. That frame becomes active if
-map and poses arrive in it for ``PATIENCE_S``, and no pose arrives in the active one. The frame of a
-ledger from before a restart is active from the start. So a single message in a wrong frame never
-changes the frame.
+other frames are refused, but the newest map in another frame is kept. The other frame becomes
+active if, for ``PATIENCE_S``, map and poses arrive in it, and no pose in the active one. So a
+single message in a wrong frame changes nothing. The frame of a ledger from before a restart is
+active from the start.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 PATIENCE_S = 10.0
 # Longer gaps between poses restart that time [s].
 GAP_S = 3.0
-# Distance ahead on its line in which a lost robot is searched for, as driving time [s].
+# A lost robot is searched for this far ahead on its line, as driving time [s].
 LOST_ON_LINE_S = 10.0
 # Poses are too far apart if the track to half of the last LOOKED_BACK poses is unknown.
 LOOKED_BACK = 10
@@ -65,7 +65,7 @@ class FrameSelector:
         """Apply updates to maps of frames that are not active.
 
         Returns:
-            The other updates; and the faults of those applied.
+            The updates that were not applied; and the faults of those applied.
         """
         others = [frame for frame in self._maps if self.active not in ("", frame)]
         faults: list[FasacoError] = []
@@ -109,8 +109,8 @@ class FrameSelector:
     def reset(self) -> None:
         """Let the next map and pose select the frame.
 
-        The present map and pose stay in use until then, as neither a latched map nor the pose of a
-        standing robot is repeated.
+        The present map and pose stay in use until then, as latched maps and poses of a standing
+        robot are not repeated.
         """
         self._rival, self._is_open = "", True
         agreed = [frame for frame in self._poses if frame in self._maps]
@@ -179,8 +179,8 @@ class InputMonitor:
             robot's speed; 0 if unknown [m].
         on_line_m: longest possible drive along the line, also if the track between the two poses is
             unknown [m].
-        pose_at, map_at: time of the last pose, and of the last map or update. Before the first one
-            it is the time from which that is due, and None before that time.
+        pose_at, map_at: time of the last pose, and of the last map or update. Before the first
+            message, the time from which it is due; None before ``begin``.
         driven: selects the poses that count for swept floor.
     """
 
@@ -227,8 +227,8 @@ class InputMonitor:
         gap_s = min((stamped.stamp_ns - last.stamp_ns) * 1e-9, LOST_ON_LINE_S)
         self.on_line_m = SPEED_MARGIN * self._config.speed_m_s * max(gap_s, 0.0)
         distance = math.hypot(pose.x - last.pose.x, pose.y - last.pose.y)
-        # Consecutive poses may be some cells apart, or as far as the robot can have driven; after
-        # a timeout, half a cell.
+        # Consecutive poses may be some cells apart, or as far as the robot can have driven; after a
+        # timeout, only half a cell.
         most_m = (0.5 if lost else JUMP_CELLS) * self._config.footprint.cell_m
         jumped = distance > max(most_m, self.farthest_m)
         if jumped:

@@ -1,8 +1,8 @@
 """Loop closures: SLAM corrects the whole map, and moves map and pose at once.
 
-The ledger's cells are places in the map frame. When the map has moved, its true position while the
-tool swept them is unknown: somewhere between the old and the new one. So only cells that are
-covered for every intermediate position still count.
+The ledger's cells are places in the map frame. While the tool swept them, the true position of the
+map was somewhere between the old and the new one. So only cells that are covered for every position
+in between still count.
 
 Small shifts are found by walls alone. A loop closure that moves the map by less than a cell changes
 too few cells for ``has_moved``, and is smaller than the steps between poses of a driving robot. The
@@ -44,15 +44,15 @@ from fasaco_edge.mission.coverage.floor_tiles import (
 )
 from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
 
-# Least number of cells, and least share of the known cells, that change between free and blocked if
-# the map has moved. Doors and passers-by change fewer.
+# A map has moved if LEAST_CELLS, and LEAST_SHARE of the known cells, change between free and
+# blocked. Doors and passers-by change fewer.
 LEAST_CELLS, LEAST_SHARE = 20, 0.1
-# Least number of coverable cells on a map that shows floor, and so gives evidence of walls.
+# A map with this many coverable cells shows floor, and so gives evidence of walls.
 LEAST_FLOOR = LEAST_CELLS
-# Smaller motions are ignored: [m], [rad].
+# Motions up to STILL_M [m] and STILL_RAD [rad] are ignored.
 STILL_M, STILL_RAD = 0.02, math.radians(0.2)
-# A point within this distance of a row (or column) of cell centres [cells] needs only that row
-# covered, else the rows on both sides.
+# A point this near to a row (or column) of cell centres needs only this row covered; another point
+# needs the rows on both sides [cells].
 NEAR = 0.1
 # Intermediate map positions that are tested, as shares of the motion.
 BETWEEN = (0.25, 0.5, 0.75, 1.0)
@@ -141,7 +141,7 @@ def moved_cells(cells: NDArray[np.int32], motion: Motion, cell_m: float) -> NDAr
 def moved_mask(
     window: Window, mask: NDArray[np.bool_], motion: Motion, cell_m: float, scale: float = 1.0
 ) -> tuple[Window, NDArray[np.bool_]] | None:
-    """Return the cells whose centre lies on a marked cell after a motion, with their window.
+    """Return the cells with their centre on a marked cell after a motion, and their window.
 
     ``mask``: bool (rows, cols) of ``window``, of cells of ``cell_m``. The cells returned are
     ``scale`` times as wide. None if their window is too large.
@@ -165,7 +165,7 @@ def moved_mask(
 def uncertain_cells(
     before: LedgerSnapshot, motion: Motion
 ) -> Callable[[Cells, Cells], NDArray[np.bool_]]:
-    """Return a mask function: rows and columns to cells perhaps not covered, bool (n,)."""
+    """Return a mask function: rows and columns to cells that may be uncovered, bool (n,)."""
 
     def inside(rows: Cells, cols: Cells) -> NDArray[np.bool_]:
         x, y = ((each.astype(np.float64) + 0.5) * before.cell_m for each in (cols, rows))
@@ -244,13 +244,13 @@ def _covered(
 
 # Fewest cells that a shift of the map closes; maps that close fewer are not compared.
 LEAST_CLOSED = 3
-# Largest shift along each axis [pixels], and number of pixels compared.
+# Shifts up to FARTHEST_PX along each axis are tried [pixels], on up to MOST_PIXELS.
 FARTHEST_PX, MOST_PIXELS = 4, 2000
-# Least share of these pixels that a shift moves into the previous walls, and least gain in this
-# share over no shift.
+# A shift must move LEAST_ALIKE of these pixels into the previous walls, and BETTER more of them
+# than no shift.
 LEAST_ALIKE, BETTER = 0.5, 0.2
-# Of shifts whose shares differ by less, the smallest is taken, as shifts along a corridor are
-# alike.
+# If the shares of two shifts differ by less, the smaller shift is taken: along a corridor shifts
+# are alike.
 ALIKE = 0.03
 
 

@@ -232,7 +232,7 @@ class MapState(Ground):
             return
         change = self.change
         if before is not None and before.lattice is self.lattice and before.contains(cell):
-            self.area = before  # as with most poses: steps can be driven both ways
+            self.area = before  # most poses change nothing: steps can be driven both ways
         elif before is None or change is None or change.after is not self.lattice:
             self.area = ReachableArea.around(self.lattice, cell)
         else:
@@ -247,7 +247,7 @@ class MapState(Ground):
         lattice, cell = self.lattice, self.path_cell
         if lattice is None or self.pose is None:
             return None
-        # A polished line does not pass through its cells.
+        # A polished line may not pass through the cells of its walk.
         if cell is not None and lattice.is_coverable(cell):
             return cell
         pose, dock = self.pose.pose, self.places.dock
@@ -315,7 +315,7 @@ class MapState(Ground):
         return f"robot is in an occupied cell, or too close to one: {waits}"
 
     def check_zones(self, order: MissionOrder) -> None:
-        """Check that part of each zone lies on the map, if there is one; in the map frame.
+        """Check that part of each zone, in the map frame, lies on the map, if there is one.
 
         Raises:
             OrderError: a zone lies off the map.

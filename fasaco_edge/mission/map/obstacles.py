@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.grid.occupancy import OCCUPIED, OccupancyGrid
 
-# Time for which floor is closed [s], doubled each time it is closed again, up to a limit.
+# Floor is closed for CLOSED_S, twice as long each time again, up to MOST_CLOSED_S [s].
 CLOSED_S, MOST_CLOSED_S = 20.0, 320.0
-# Distance up to which two reports mean the same obstacle [m]; time from the opening of its floor
-# until it is forgotten [s].
+# Reports within SAME_M [m] mean the same obstacle. It is forgotten FORGET_S [s] after its floor was
+# opened.
 SAME_M, FORGET_S = 0.5, 600.0
 # A follower that still reports the obstacle after WIDEN_AFTER_S [s] cannot drive the new path
 # either: the floor is closed wider by WIDER_M [m], up to MOST_WIDER times.
 WIDEN_AFTER_S, WIDER_M, MOST_WIDER = 3.0, 0.05, 4
-# Assumed depth of an obstacle, away from the robot; spacing of its points; the follower's clearance
-# from it; width of the ring around the robot's disc that stays free [m].
+# An obstacle is taken to be DEEP_M deep, away from the robot, with points every SPACING_M. The
+# follower keeps MARGIN_M away from it. A ring of FREE_M around the robot's disc stays free [m].
 DEEP_M, SPACING_M, MARGIN_M, FREE_M = 0.3, 0.05, 0.06, 0.01
-# Largest map on which obstacles are drawn [pixels], as it is then kept twice (``daemon.memory``).
+# Largest map on which obstacles are drawn [pixels]: such a map is kept twice (``daemon.memory``).
 MOST_PIXELS = 6_000_000
-# Limit on the obstacles kept, which are the newest; and on the points of each.
+# The newest MOST obstacles are kept, each with up to MOST_POINTS.
 MOST, MOST_POINTS = 32, 192
 
 
@@ -96,7 +96,7 @@ class Obstacles:
         return True
 
     def open_due(self, now: float) -> bool:
-        """Open the floor whose time is up; return whether there was any."""
+        """Open floor when its time is up; return whether there was any."""
         self._past = [one for one in self._past if now - one.until < FORGET_S][-MOST:]
         due = [one for one in self._closed if now >= one.until]
         if due:

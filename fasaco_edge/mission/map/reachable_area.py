@@ -15,8 +15,8 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels import COL_STEP, ROW_STEP
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, update_reach
 
-# Distance within which the nearest coverable cell is taken if the robot's own cell is not
-# coverable, as by a small offset or a noisy scan [cells].
+# If the robot's own cell is not coverable, by a small offset or a noisy scan, the nearest coverable
+# cell within this distance is taken [cells].
 ANCHOR_CELLS = 1.5
 
 # Bit of a step in a step mask, by index 3 * rows + columns + 4.

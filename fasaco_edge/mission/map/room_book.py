@@ -23,7 +23,7 @@ from fasaco_edge.planners.passes import Pass
 if TYPE_CHECKING:
     from fasaco_edge.mission.map.loop_closure import Motion
 
-# Limits of one sheet; a number needs 16 bits.
+# Limits on the rooms and cuts of a sheet, and on the number of a room, which has 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000
 # Least area of a room, and of a change that is more than noise of its border [m2].
 LEAST_M2 = 1.0
@@ -69,7 +69,7 @@ class Room:
         outline: corners (x, y) [m] in the map frame, without holes.
         area_m2: area of its squares [m2].
         neighbours: numbers of the rooms it is joined to, ascending.
-        encloses: numbers of the rooms within its outline, as inside a ring of corridors.
+        encloses: numbers of the rooms within its outline, for instance in a ring of corridors.
     """
 
     id: int
@@ -101,8 +101,8 @@ class RoomSheet:
         raster: squares of the rooms.
         rooms: by their numbers.
         cuts: segments that people have split rooms along [m].
-        gone: squares of rooms that maps have joined to others; if one reappears, it gets its number
-            back.
+        gone: squares of rooms that maps have joined to others; if such a room reappears, it gets
+            its number back.
         regions: scores of the regions that are no rooms yet, by their numbers in ``pending``.
         pending: squares of these regions.
         settled: the squares of rooms some updates ago, without what the newest maps have added.
@@ -167,7 +167,7 @@ class RoomSheet:
 
     @property
     def is_settling(self) -> bool:
-        """Whether a change is pending, which repeating the same map would complete."""
+        """Whether a change is pending that would be complete after repeats of the same map."""
         return bool(self.regions or self.changes)
 
     @property
@@ -184,8 +184,8 @@ class RoomBook:
         sheets: all sheets, the last used first.
         next_id: the next number.
         version: counter of changes of the published rooms.
-        is_elsewhere: whether the map may show another building than the first sheet; until the next
-            update no sheet is in use then.
+        is_elsewhere: whether the map may show another building than the first sheet; then no sheet
+            is in use until the next update.
     """
 
     sheets: list[RoomSheet] = field(default_factory=list)
@@ -260,7 +260,7 @@ class RoomBook:
         return tuple(rooms[each].outline for each in room.encloses if each in rooms)
 
     def check_name(self, where: str, name: str, *of: int) -> None:
-        """Check a new name of a room; the rooms ``of`` may have it now.
+        """Check a new name of a room; the rooms ``of`` may have it already.
 
         Raises:
             OrderError: it is no valid name, or another room has it.
@@ -328,15 +328,15 @@ class RoomBook:
         self.version += 1
 
     def forget(self, sheet: RoomSheet) -> None:
-        """Drop a sheet, as another sheet is that of its building."""
+        """Drop a sheet, as another sheet is of the same building."""
         self.sheets.remove(sheet)
         self.version += 1
 
     def turn_to(self, sheet: RoomSheet) -> None:
         """Use a sheet, new or not.
 
-        Beyond ``MOST_SHEETS``, the least recently used sheet is dropped, those without kept rooms
-        first.
+        Beyond ``MOST_SHEETS``, the least recently used sheet is dropped, if possible one without
+        kept rooms.
         """
         if self.sheet is not sheet:
             self.version += 1

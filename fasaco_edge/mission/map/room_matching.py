@@ -9,10 +9,10 @@ grows over new floor of its region. Other changes must last:
 - a large part of a room in another room's region joins that room after ``HOLD_CHANGE`` updates.
 
 An update without the change counts twice against it, so that a flickering change never lasts. A
-room that joined another and separates again gets its number back. Maps neither split nor join kept
-rooms, which people have named, set, split or merged: two of them in one region stay divided as
-before, and those split or merged keep their parts. Squares that only the newest maps have added do
-not decide which region shows a room. Rooms that the map does not show stay unchanged.
+room that joined another and separates again gets its number back. Rooms that people have named,
+set, split or merged are kept: maps neither split nor join them. Two kept rooms in one region stay
+divided as before; split or merged ones keep their parts. Squares that only the newest maps have
+added do not decide which region shows a room. Rooms that the map does not show stay unchanged.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ from fasaco_edge.mission.map.room_raster import BLOCK, Ids, RoomRaster, cut_wind
 
 Labels = NDArray[np.int32]
 
-# Number of updates that a change must last.
+# A new region must last HOLD_NEW updates, another change HOLD_CHANGE updates.
 HOLD_NEW, HOLD_CHANGE = 4, 8
 # Squares have settled in a room after 1 to 2 times this number of updates.
 SETTLED = 2 * HOLD_CHANGE
 # Decrease of a change's score with an update that does not show it.
 PENALTY = 2
-# A region shows a room if their common area is at least LEAST_SHOWN_M2 [m2], or half of a smaller
-# room, and at least LEAST_SHARE of the smaller of the two.
+# A region shows a room if they share LEAST_SHOWN_M2 [m2], or half of the room if that is less. They
+# must also share LEAST_SHARE of the smaller of the two.
 LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
-# Size of a region, as a share of a room, from which it shows the whole room: squares of the room
-# outside the region are then no floor.
+# A region with this share of a room's size shows the whole room: squares of the room outside the
+# region are then no floor.
 WHOLE = 0.8
 
 

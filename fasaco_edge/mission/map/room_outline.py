@@ -65,7 +65,7 @@ def _place(corner: list[int], window: Window, square_m: float) -> Point:
 
 
 def _without_pinches(mask: Mask) -> Mask:
-    """Return squares, some added, of which no two touch only at a corner."""
+    """Return the squares, with some added so that no two touch only at a corner."""
     mask = np.pad(mask, 1)
     while True:
         sw, se, nw, ne = mask[:-1, :-1], mask[:-1, 1:], mask[1:, :-1], mask[1:, 1:]
@@ -153,7 +153,7 @@ def joined(ids: Ids, square_m: float) -> dict[int, tuple[int, ...]]:
 
 
 def stale(sheet: RoomSheet, before: Ids) -> list[int]:
-    """Return the rooms whose outlines are outdated."""
+    """Return the rooms with outdated outlines."""
     after = sheet.raster.ids
     squares = np.bincount(after.ravel(), minlength=MOST_NUMBER + 1)
     other = before != after

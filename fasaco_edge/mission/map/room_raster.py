@@ -26,8 +26,8 @@ NOWHERE = Window(0, 0, 0, 0)
 # Number of squares processed at once, which bounds memory.
 BLOCK = 1 << 18
 
-# Distance from a cut up to which squares are cut, by their centre [squares]: no step passes between
-# them.
+# Squares are cut if their centre is within this distance of the cut [squares], so that no step
+# passes between them.
 CUT_SQUARES = 0.75
 
 Ids = NDArray[np.uint16]
@@ -84,7 +84,7 @@ class RoomRaster:
         return window, mask[window.slices_in(self.window)].copy()
 
     def coarser(self, factor: int) -> RoomRaster:
-        """Return the raster with squares ``factor`` times as wide, with their centres' numbers."""
+        """Return the raster with squares ``factor`` times as wide, numbered as at their centres."""
         window = self.window.rounded_out(factor)
         ids = self.on(window)[factor // 2 :: factor, factor // 2 :: factor]
         edges = (window.row0, window.col0, window.row1, window.col1)

@@ -29,19 +29,19 @@ from fasaco_edge.mission.map.room_raster import (
     window_over,
 )
 
-# Least share of floor in matching rooms for a map to show the building of a sheet; least share of
-# their common floor for a region and a room to match.
+# A map shows the building of a sheet if this share of the floor lies in matching rooms. A region
+# and a room match if this share of their floor is common to both.
 ALIKE = MATCH = 0.5
 # Squares are as wide as the map's pixels, and not narrower than this [m].
 LEAST_SQUARE_M = 0.05
 
 
-# Least time between two searches [s], longer for large maps: a search takes some 0.2 s per million
-# pixels.
+# Searches are PERIOD_S apart [s], or 1 s for each PIXELS_PER_S pixels of a large map: a search
+# takes some 0.2 s per million pixels.
 PERIOD_S, PIXELS_PER_S = 2.0, 50_000
 # Larger maps are made coarser before a search, which takes some 20 bytes per pixel.
 MOST_PIXELS = 1_000_000
-# Longest delay of a search, until a step without a new map [s], as planning comes first.
+# A search waits up to this long for a step without a new map, as planning comes first [s].
 LATE_S = 1.0
 
 FAILED_HINT = "the robot goes on with the rooms it knows; report it with the log"
@@ -158,8 +158,8 @@ def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
     in_use = book.sheet if book.frame == frame else None
     if in_use is not None and in_use.is_named:
         return in_use
-    # The first map may show only a corner. So while no room in use is kept, a sheet from before may
-    # turn out to be that of the building.
+    # The first map may show only a corner of the building. So an older sheet may still turn out to
+    # be that of the building, as long as no room in use is kept.
     others = [each for each in book.sheets if each.frame == frame and each is not in_use]
     alike = [(_alike(each, found), each) for each in others if each.is_named or in_use is None]
     share, best = max(alike, key=lambda each: each[0], default=(0.0, None))
@@ -173,7 +173,7 @@ def _sheet_for(book: RoomBook, found: FoundRooms, frame: str) -> RoomSheet:
 
 
 def _alike(sheet: RoomSheet, found: FoundRooms) -> float:
-    """Return the share of the smaller floor, of map or sheet, in matching regions and rooms."""
+    """Return the floor in matching regions and rooms, as a share of the smaller of both floors."""
     window = window_over(found.geometry, sheet.raster.square_m)
     if window.rows * window.cols > MOST_SQUARES:
         return 0.0

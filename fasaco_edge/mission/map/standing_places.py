@@ -2,8 +2,8 @@
 
 That map is in the configured frame ``map_frame``, or else in the first frame used with these
 places, which is kept with the ledger. On a map in another frame, or of another building, the places
-are not used; if keep-out zones are configured, the robot does not drive there, as the keep-out
-zones of that map are unknown. After a command ``reset`` the places belong to the map in use.
+are not used; if keep-out zones are configured, the robot does not drive there, as it does not know
+where they are on that map. After a command ``reset`` the places belong to the map in use.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class StandingPlaces:
     def leave_building(self, frame: str) -> None:
         """Note that the map in a frame shows another building; ``enter`` returns the fault.
 
-        Places that a changed configuration gives belong to the new building.
+        If the configuration has changed, its places belong to the new building.
         """
         if self.note.of == self._of and self.note.frame == frame:
             self.note = replace(self.note, is_left=True)

@@ -61,7 +61,7 @@ class CellsLeft:
         return unswept
 
     def open_to_me(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells that still need a visit by this robot: its part, in a fleet."""
+        """Return the cells that this robot (in a fleet: in its part) still has to visit."""
         window = area.lattice.window
         cells = self._company.mine(self.unswept(window), area).copy()
         self._exploration().mark(cells, window)
@@ -85,10 +85,10 @@ class CellsLeft:
         return int(np.count_nonzero(frontier(area) & self.asked_for(area.lattice.window)))
 
     def ends_of_map(self, cell: Cell) -> list[Cell]:
-        """Return the cells to look on from, the nearest to ``cell`` first.
+        """Return the cells from which to look beyond the map, the nearest to ``cell`` first.
 
-        They border on unknown cells, and were covered before a restart: the map may have shown
-        more then than that of a mapper that has begun anew.
+        They border on unknown cells, and were covered before a restart: a mapper that began anew
+        may show less than the map did then.
         """
         area = self._map.area
         if area is None or self._ledger.before is None:
@@ -141,7 +141,7 @@ class CellsLeft:
         return self._company.has_members
 
     def asked_of_me(self, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells of an area whose floor this robot has to sweep, covered or not."""
+        """Return the cells of an area in which this robot has to sweep floor, covered or not."""
         window = area.lattice.window
         asked = self.asked_for(window)
         mine = self._company.mine_to_sweep(asked, self.unswept(window), area)
@@ -167,11 +167,11 @@ class LeftBehind:
     """Decides whether a robot on its way home turns back, as floor has opened.
 
     Attributes:
-        times: how often it turned back. Callers limit it, as a gap may open after each departure.
+        times: how often it turned back. Callers limit this, as a gap may open after each departure.
     """
 
     times: int = 0
-    # The reachable area when the robot set out; None if unknown, as after a restart.
+    # The reachable area when the robot set out; None if unknown, for instance after a restart.
     _area: ReachableArea | None = None
 
     def set_out(self, area: ReachableArea | None) -> None:
@@ -179,7 +179,7 @@ class LeftBehind:
         self._area = area
 
     def is_open(self, unswept: NDArray[np.bool_], area: ReachableArea) -> bool:
-        """Return whether floor has opened since it set out: at least a square of two by two cells.
+        """Return whether floor has opened since departure: at least a square of two by two cells.
 
         Single rows of cells along walls are noise of the map. ``unswept``: bool (rows, cols) of the
         area.

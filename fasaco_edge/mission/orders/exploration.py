@@ -18,7 +18,7 @@ from fasaco_edge.mission.orders.zones import in_zones
 SEEN_AROUND = 1
 # Period between searches for a way past robots that block it [s].
 SEARCH_PERIOD_S = 1.0
-# Time that a robot stands at the edge of its map, which may come late [s].
+# The robot waits this long at the edge of its map, as a new map may come late [s].
 LOOK_S = 6.0
 
 

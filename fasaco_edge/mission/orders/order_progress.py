@@ -1,4 +1,4 @@
-"""Progress of an order: its zone, pass and stage, and the next ones."""
+"""Progress of an order: its zone, pass and stage, now and next."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class PlacesNote:
         of: checksum of these places; "" while they belong to no map.
         frame: frame of that map.
         is_left: whether the map in that frame has shown another building since.
-        left_mask: checksum of a keep-out mask received as a message, whose frame has shown another
+        left_mask: checksum of a received keep-out mask, if the map in its frame has shown another
             building since; else "".
     """
 

@@ -115,7 +115,7 @@ class OrderState(OrderProgress):
         return self
 
     def forgets(self, command: Command, after: OrderState) -> tuple[Zone, ...]:
-        """Return the zones of an unfinished order whose coverage a command forgets."""
+        """Return the zones of an unfinished order that lose their coverage by a command."""
         if command.name == "reset":
             return EVERYTHING_ONCE.zones
         order = after.order

@@ -27,8 +27,8 @@ def located(
     """Return an order with its named zones in place: standing zones first, then rooms.
 
     Raises:
-        OrderError: no zone or room has the name, and the order does not wait for one; or no room
-            has the number. An order never waits for a number, as any new room may get it.
+        OrderError: a name is unknown, and the order does not wait for a room; or no room has the
+            number. An order never waits for a number, as any new room may get it.
     """
     known = {zone.name: tuple(zone.polygon) for zone in standing}
     may_wait = order.unknown == "wait"
@@ -72,7 +72,7 @@ def _looked_up(
 def restored(order: MissionOrder, book: RoomBook) -> MissionOrder:
     """Return an order from before a restart, without the rooms that the book has lost.
 
-    Their zones keep their polygons, and no other room gets their numbers.
+    Zones of lost rooms keep their polygons, and no other room gets the numbers of lost rooms.
     """
     lost = {zone.room for zone in order.as_given.zones if zone.room >= book.next_id}
     if not lost:
@@ -90,7 +90,7 @@ def placed(order: MissionOrder, book: RoomBook, begun: int = -1) -> MissionOrder
     Args:
         order: the order.
         book: the rooms.
-        begun: index of the zone being covered; up to it zones keep their sequence.
+        begun: index of the zone being covered; zones up to this one keep their sequence.
     """
     rooms = [room for room in book.rooms if room.outline]
     skipped = tuple(_area(room, book) for room in rooms if room.settings.skip)

@@ -54,7 +54,7 @@ class PlanScope:
         Args:
             cell: the robot's cell.
             before: int32 (n, 2), the current path from that cell on.
-            home: the cell that the order leads back to at its end.
+            home: the cell in which the order ends; None for none.
             attempt: see ``CoverageProblem``.
 
         Raises:
@@ -77,7 +77,7 @@ class PlanScope:
             cost=self._cost(),
             before=before,
             attempt=attempt,
-            # An attempt starts on the path, from which the robot may have moved to another area.
+            # An attempt may start in a cell that is not in the robot's area.
             reachable=reachable if area.contains(cell) else None,
         )
         return self._room_price.added_to(problem)
@@ -98,7 +98,7 @@ class PlanScope:
         return self._company.passable(area, cell, self._config.footprint.robot_radius_m)
 
     def puts_other_first(self, ahead_s: float) -> bool:
-        """Choose again if the path ahead, ``ahead_s`` [s], is too long; return whether it did."""
+        """Choose again if the path ahead takes too long; return whether the choice changed."""
         area = self._map.area
         if area is None:
             return False

@@ -24,8 +24,8 @@ from fasaco_edge.mission.orders.order_state import Stage
 from fasaco_edge.mission.orders.plan_scope import PlanScope
 from fasaco_edge.planners.problem import CoverageProblem
 
-# Number of paths in a row without a newly covered cell, after which the cells left wait for a
-# retry. The robot may stop short of a path's end, its tool out of reach of the last cell.
+# After this many paths in a row without a newly covered cell, the cells left wait for a retry. For
+# instance, the robot may stop with its tool out of reach of the last cell.
 MAX_IN_VAIN = 3
 OTHERS_SEE = "looks for its part, which others see"
 MAP_ENDS = "looks where the map ends: the floor there was covered before a restart"
@@ -36,7 +36,7 @@ class PresentPart(OrderReach):
 
     Attributes:
         cells: the cells left.
-        scope: which of them are planned now, and how.
+        scope: which of these cells are planned now, and how.
     """
 
     def __init__(
@@ -134,7 +134,7 @@ class PresentPart(OrderReach):
         return next(filter(None, looks), "")
 
     def _is_map_cut(self) -> bool:
-        """Return whether the map shows less than was in reach of the order, before a restart."""
+        """Return whether the map lacks cells that were reachable before a restart."""
         lattice = self._map.lattice
         if lattice is None or self._once is None:
             return False
@@ -151,8 +151,8 @@ class PresentPart(OrderReach):
     def why_looking(self, cell: Cell, now: float) -> str:
         """Return why the robot stands without a cell to cover, or "".
 
-        It looks at ground beyond its map; or it waits for robots in the way to its zone, for as
-        long as the retries of an order take.
+        It looks at ground beyond its map; or it waits for robots that block the way to its zone,
+        for as long as the retries of an order take.
         """
         exploration, policy = self._exploration, self._config.policy
         if exploration.waits_for_way(now, policy.retries * policy.retry_s):

@@ -24,8 +24,8 @@ from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.mission.orders.present_part import MAX_IN_VAIN, PresentPart
 from fasaco_edge.mission.orders.zones import in_zones
 
-# Share of the area ever reachable below which a robot is shut in: HOME_SHARE with home in reach,
-# so that a closed door to another room has no effect, else MOST_SHARE.
+# A robot is shut in if it can reach less than this share of the area that it could ever reach:
+# MOST_SHARE, or HOME_SHARE if home is in reach, as a door to another room may be closed.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 CARRIED_OUT = "the order was carried out"
 
@@ -149,7 +149,7 @@ class Sequencer(PresentPart):
             )
 
     def advance(self, now: float) -> None:
-        """Continue with the next part, as no more of this one can be done now.
+        """Continue with the next part, as nothing more of the present part can be done now.
 
         A robot that is shut in waits, and tries the present part again.
         """

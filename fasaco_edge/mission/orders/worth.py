@@ -18,7 +18,7 @@ from fasaco_edge.mission.orders.order import RoomArea, Zone
 from fasaco_edge.mission.orders.zones import cells_of
 
 MOST_PRIORITY = 100
-# Share of the time left that floor planned first may take, as lines are longer than estimated.
+# Floor planned first may take this share of the time left, as lines are longer than estimated.
 SHARE = 0.8
 
 

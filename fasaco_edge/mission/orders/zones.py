@@ -15,7 +15,7 @@ from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
 from fasaco_edge.mission.orders.order import Zone
 
-# Tolerance, so that a polygon along a cell's border does not touch it despite rounding [m].
+# Tolerance [m]: rounding must not let a polygon along a cell's border touch the cell.
 TOUCH_TOLERANCE_M = 1e-6
 
 
