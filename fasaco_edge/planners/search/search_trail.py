@@ -1,7 +1,7 @@
 """Search trail: the pheromone that the ants of a search or a repair read and change.
 
-It begins as the mission's living trail, if there is one, and is uniform elsewhere. A region copies
-its part, and pastes it back when it is done.
+It begins as the mission's living trail, and is uniform where there is none. A region copies its
+part of the trail, and pastes it back when it is done.
 """
 
 from __future__ import annotations
