@@ -134,7 +134,7 @@ class LatticeChange:
 
 
 def windows_on_raster(grids: tuple[OccupancyGrid, OccupancyGrid]) -> tuple[Window, Window] | None:
-    """Return the windows of both maps on their common raster; None if they have none in common."""
+    """Return the windows of both maps on their raster; None if they are on different rasters."""
     (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
     return (old, new) if raster == old_raster else None
 

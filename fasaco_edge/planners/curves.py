@@ -31,8 +31,8 @@ Ints = NDArray[np.int64]
 MARGIN = 1.1
 # Distance of the places on a lane where arcs may begin and end [radii].
 SPACING = 0.2
-# Length of the line that a word may replace [radii], plus twice the tool's width: if the robot only
-# drives forward, and if it reverses; factors on this length while no word fits.
+# Length of the line that a word may replace, without and with reversing [radii]; twice the tool's
+# width is added. Factors on this length while no word fits.
 AHEAD_WINDOW, BOTH_WINDOW, WIDER = 6.0, 4.5, (2.0, 4.0, 8.0)
 # Cost of a turn on the spot [s]: a robot with a turning radius cannot drive it.
 SPOT_S = 1000.0

@@ -18,8 +18,8 @@ from fasaco_edge.kernels.lattice.reach import reachable_from
 def start_cell(lattice: CoverageLattice, map_file: Path, grid: OccupancyGrid | None = None) -> Cell:
     """Return the default start of a plan.
 
-    A built-in map has its own start; otherwise it is the cell of the largest connected area nearest
-    to the map frame's origin. ``grid``: the map of the lattice; None for a coverage grid.
+    A built-in map has its own start; otherwise it is in the largest connected area, at the cell
+    nearest to the map frame's origin. ``grid``: the map of the lattice; None for a coverage grid.
 
     Raises:
         NothingToCover: no cell is coverable, because of the map or of the robot.

@@ -34,8 +34,8 @@ from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 FARTHEST_M = 1.0
 # Least connected unswept area that counts as a patch [m2].
 PATCH_M2 = 0.04
-# Shares of all moves: for the first descent, by long moves that gain much; for patches, in addition
-# to all moves.
+# Share of the moves for the first descent, by long moves that gain much; additional moves for
+# patches, as a share.
 DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 # Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000

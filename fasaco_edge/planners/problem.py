@@ -40,8 +40,8 @@ class CoverageProblem:
             still need a visit.
         unreachable: bool (rows, cols), read-only: coverable cells that are asked for but not
             reachable; reported, never attempted.
-        end: the cell (row, col) where the walk ends, also one not to cover; the start for a closed
-            walk; None for anywhere.
+        end: the cell (row, col) where the walk ends, to cover or not; the start for a closed walk;
+            None for anywhere.
         cost: the cost to minimise.
         before: int32 (n, 2), the undriven rest of the previous walk; a repair keeps its valid
             parts. None for none.

@@ -51,9 +51,9 @@ class Nav2Robot:
         # Pauses between goals, except after an abort, a restart or the last goal.
         self.standing_s = self.driving_s = self._idle_s = 0.0
         self._counts_idle = False
-        # For each pause between goals: the end of the goal's path; times before the pause, with
-        # distances from this end; duration of the pause; time from the request for the next goal to
-        # the pause; delay of the request.
+        # For each pause between goals: end of the driven path; distances from this end, each with
+        # the time before the pause; duration; time from the request of the next goal to the pause;
+        # delay of this request.
         self.pauses: list[dict[str, Any]] = []
         self._ended: dict[str, Any] = {}
         self._approach = deque[tuple[float, float]](maxlen=100)

@@ -47,8 +47,8 @@ COMMANDS = (
     (16.0, {"command": "resume"}, ""),
     (19.0, {"command": "replan"}, ""),
 )
-# Least time from the first path to the first command [s]: recordings have no finer times of what
-# the daemon received.
+# Least time from the first path to the first command [s]; recordings give the daemon's times of
+# arrival only this exactly.
 DRIVES_S = 0.5
 # Simulated seconds per second.
 SPEED = 16.0
@@ -166,7 +166,7 @@ class MappingRobot:
         tick_s = SIMULATION.tick_s / SPEED
         due = time.monotonic()
         while not ends(self.status):
-            assert time.monotonic() < deadline, f"never done; the last was {self.status}"
+            assert time.monotonic() < deadline, f"not done; the last status was {self.status}"
             if (sample := self._newest_path.take(0.0)) is not None:
                 self._world.follow(decode_path(sample.payload).xy)
             self._publish()

@@ -95,7 +95,7 @@ def pose_bytes(x: float, y: float, frame: str = "map", yaw: float = 0.0) -> byte
 
 
 def covariant_bytes(x: float, y: float) -> bytes:
-    """Return a geometry_msgs/PoseWithCovarianceStamped that knows no covariance."""
+    """Return a geometry_msgs/PoseWithCovarianceStamped without a known covariance."""
     where, unknown = oracle.pose(Pose2D(x, y)), np.full(36, np.nan)
     message = oracle.pose_with_covariance_stamped("map", 1, where, unknown)
     return oracle.to_bytes("geometry_msgs/msg/PoseWithCovarianceStamped", message)

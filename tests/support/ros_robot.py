@@ -28,7 +28,7 @@ GRID, PATH, POSE = (
     "geometry_msgs/msg/PoseStamped",
 )
 DIAGNOSTICS, TRIGGER = "diagnostic_msgs/msg/DiagnosticArray", "std_srvs/srv/Trigger"
-# As published by std_srvs of Iron and later; rosbags hashes no services.
+# Hash of std_srvs/Trigger in Iron and later; rosbags does not compute hashes of services.
 TRIGGER_HASH = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
 CLIENT = bytes(range(16))
 EMPTY_REQUEST = b"\0\1\0\0\0"

@@ -1,7 +1,7 @@
 """Fleet arrivals: filter and rate limit of other robots' messages, before the loop gets them.
 
 All fleets under one ``bus.base`` publish on the same keys; other publishers can, too. Robots of
-this fleet and other publishers are tracked apart, up to a limited number of each.
+this fleet and other publishers are tracked separately, each up to a limited number.
 """
 
 from __future__ import annotations

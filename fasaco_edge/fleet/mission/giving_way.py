@@ -47,8 +47,8 @@ BESIDE_M, MOVED_M = 0.4, 0.1
 ARRIVED_M = 0.05
 # Length of the way to the refuge that is checked for other robots [points].
 LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
-# A robot has come in the way to the refuge if, since the way was chosen, its distance from the way
-# has decreased by more than this [m].
+# A robot comes in the way to the refuge if its distance from this way decreases by more than this
+# after the way was chosen [m].
 COMES_M = 0.05
 # A robot that has stayed within STAYS_M [m] for LONG_S [s] plans around the robot that obstructs
 # it, even if that robot's noisy poses seem to move. After TOO_LONG_S [s] it is reported as stuck.

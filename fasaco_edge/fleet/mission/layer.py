@@ -45,7 +45,7 @@ class FleetLayer(Company):
 
     Attributes:
         others: the other robots.
-        numbers: the newest division's number, and who made it.
+        numbers: the newest division's number and author.
         step_s: this robot's time to sweep one cell [s].
     """
 
@@ -94,7 +94,7 @@ class FleetLayer(Company):
 
     @property
     def has_members(self) -> bool:
-        """Whether messages of other robots have come."""
+        """Whether messages of other robots have arrived."""
         return bool(self.others.known)
 
     @property
@@ -171,7 +171,7 @@ class FleetLayer(Company):
         """Return the cells on which this robot sweeps the floor, visited or not.
 
         These are the cells of its part; or all, if its part is visited and the others make no
-        progress. So the robot sweeps the floor of each cell that ``mine`` gives it.
+        progress. They include all cells of ``mine``.
         """
         if self._division is None:
             return cells

@@ -75,7 +75,7 @@ def refuge(
         theirs = spaced([(message.x, message.y), *message.ahead])
         apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
         is_free &= (apart >= clear_m).all(axis=1)
-        # A robot that is too near to another may only go where the distance grows.
+        # A robot too near to another may only move away from it.
         is_farther = apart[:, 0] > math.dist(place, (message.x, message.y)) + 1e-6
         is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
     closed = np.zeros(area.reachable[rows, cols].shape, np.bool_)

@@ -25,7 +25,7 @@ SLACK_S = 3.0
 # Distance to a conflict at which a robot waits; difference up to which distances are about equal
 # [m].
 WAIT_M, NEARER_M = 1.0, 0.5
-# A robot makes way if this length of another robot's path leads over it [m].
+# A robot makes way if the first OVER_M of another robot's path lead over it [m].
 OVER_M = 1.5
 # A robot that has stood for STANDS_S is an obstacle; a robot that is blocked or has waited for
 # PATIENCE_S makes way, or plans around the other [s].

@@ -46,7 +46,7 @@ from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
 from fasaco_edge.planners.walk_before import HELD_CELLS, can_repair, completed
 
 # Limit on the ants of a group, which walk at the same time. Larger groups keep more threads busy,
-# smaller groups respond to ``stop`` sooner. It covers about CELLS_PER_GROUP, in some 10 ms.
+# smaller groups respond to ``stop`` sooner. A group covers CELLS_PER_GROUP, in about 10 ms.
 LARGEST_GROUP = 32
 SMALLEST_GROUP = 2
 CELLS_PER_GROUP = 64_000

@@ -44,15 +44,15 @@ GAINLESS_PASSES = 10
 # Perturbations between two evaluations of the whole walk, with one region.
 PERTURBATIONS_IN_VISIT = 64
 
-# States that windows expand between two pauses, in about two milliseconds. Number of these
-# pieces after each round of perturbations, with expensive turns and with cheap turns.
+# States that windows expand in a piece of work, in about two milliseconds; number of pieces after
+# each round of perturbations, with expensive turns and with cheap turns.
 EXPANSIONS_AT_ONCE = 30_000
 DEAR_PIECES, PIECES = 50, 5
 # This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
 # Beam width for solving the whole ground: WHOLE_STATES divided by the number of cells, within the
-# limits. The cheapest of four solutions, one from each corner, is kept: it is better than that of
-# one beam of four times the width.
+# limits. The cheapest of four solutions, one from each corner, is kept: it is better than the
+# solution of one beam that is four times as wide.
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM = 8_000, 8, 100
 CORNERS = (0, LINES, PLACES, LINES | PLACES)
 
