@@ -104,7 +104,7 @@ class Colony:
         return walk, cost_us
 
     def offer(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Take a walk, flat cells int32 (n,), as the best if it is cheaper, or the first."""
+        """Take a walk, flat cells int32 (n,), as the best if it is the first, or cheaper."""
         if not self.best.size or cost_us < self.best_us:
             self.best, self.best_us = walk, cost_us
 

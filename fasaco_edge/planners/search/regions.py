@@ -124,7 +124,7 @@ def neighbourhoods(
 def spot(framed: FramedGround, walk: NDArray[np.int32], number: int) -> Neighbourhood:
     """Return a neighbourhood at a spot along a walk, framed cells int32 (n,).
 
-    Spots of successive numbers are spread evenly along it, from any first number.
+    Any range of successive numbers gives spots spread evenly along the walk.
     """
     at = int(walk.size * (number * GOLDEN_RATIO % 1.0))
     return _around(framed, walk[:0], walk[at : at + 1], is_first=False, radius=SPOT_RADIUS)

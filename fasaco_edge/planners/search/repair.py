@@ -41,8 +41,8 @@ FEW = 0.2
 # number of cells of a spot; number of passes over all spots without gain that ends the search.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
-# Greatest number of cells for which a repair has a bound, and a second repair for the path ahead:
-# on larger walks the bound would dominate the time, and a second repair would double it.
+# Largest number of cells with a bound, and with a second repair for the path ahead: on larger
+# walks, the bound would dominate the time of a repair, and a second repair would double it.
 BOUNDED_CELLS = 2_000
 
 
