@@ -100,20 +100,21 @@ def obstruction(
 ) -> Obstruction | None:
     """Return a robot's obstruction; None if there is none.
 
-    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. For each
-    other robot, the first row applies whose two conditions hold:
+    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. Of two
+    robots, the first is the one whose name sorts first. It is this robot's turn if it is the first,
+    has a path, and both wait for each other. For each other robot, the first row applies whose two
+    conditions hold; "is blocked" is returned only if no other robot gives another decision.
 
     | the other robot | this robot | decision |
     |---|---|---|
-    | its path leads over this one; waits for this one or for none | waits for it, or has no path; \
-not if each waits for the other and this one has a path and is first by name | makes way |
-    | has stopped, WAIT_M / 2 ahead or less; waits for this one; has a path | waits for it; is \
-second by name | goes on waiting |
-    | has stopped, WAIT_M / 2 ahead or less | comes nearer to it | is blocked, unless it waits for \
-another robot |
-    | drives; both come too near within SLACK_S of each other | is WAIT_M from there or less, and \
-NEARER_M farther than the other, or about as far and second by name | waits |
-    | drives; both come too near within twice SLACK_S | is WAIT_M from there or less; waits for it \
+    | its path leads over this one; waits for no third robot | waits for it, or has no path; it is \
+not its turn | makes way |
+    | has stopped, at most WAIT_M / 2 ahead; waits for this one; has a path | waits for it; is the \
+second | goes on waiting |
+    | has stopped, at most WAIT_M / 2 ahead | comes nearer to it | is blocked |
+    | drives; both come too near within SLACK_S of each other | is at most WAIT_M from there, and \
+NEARER_M farther than the other, or about as far and the second | waits |
+    | drives; both come too near within twice SLACK_S | is at most WAIT_M from there; waits for it \
 | goes on waiting |
 
     Args:
