@@ -40,7 +40,7 @@ from fasaco_edge.kernels.floor.places import (
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# Limit on the fine pixels, of which int8 and int32 arrays are allocated.
+# Limit on the fine pixels, for the memory of int8 and int32 arrays of them.
 MOST_PIXELS = 100_000_000
 
 

@@ -177,8 +177,8 @@ def _check_affordable(path: Path, image: ImageFile, most_bytes: int) -> None:
     is_slow = any(tile[0] in DECODERS for tile in image.tile)
     if is_slow and rows * cols > SLOW_PIXELS:
         raise MapFileError(
-            f"{path}: {cols} x {rows} pixels of a format that is slow to read, of which there may "
-            f"be {SLOW_PIXELS}",
+            f"{path}: {cols} x {rows} pixels in a format that is slow to read; the limit is "
+            f"{SLOW_PIXELS} pixels",
             hint="save it as PNG",
         )
 

@@ -20,7 +20,7 @@ from fasaco_edge.errors import BadConfiguration, PlannerFailed
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.text import shown
 
-# Exceptions of the user's code, with those of ``sys.exit()``, which would look like a success.
+# Exceptions of the user's code. ``sys.exit()`` is included: it would look like a success.
 RAISED = (Exception, SystemExit, GeneratorExit)
 CALLED_WITH = "a planner is called with the problem alone, a class without arguments"
 SHAPE = "FILE.py:NAME or MODULE:NAME"

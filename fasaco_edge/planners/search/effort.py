@@ -14,7 +14,7 @@ LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
 WHOLE_WALK = -1
 EVERY_CELL = 1 << 30
-# Number of perturbations, of each 256, in which ants rebuild a disc.
+# Number of perturbations by ants, which rebuild a disc, among 256.
 BY_ANTS = 128
 
 
