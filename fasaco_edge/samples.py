@@ -1,16 +1,16 @@
 """Codec of recorded samples: lossless batches of many samples.
 
-Successive payloads of a key are similar, so a payload is stored as its difference from the one
-before it of the same key and length, and a batch is deflated. The first payload of a key is stored
-as a whole, also after ``SampleEncoder.restart``.
+Successive payloads of a key are similar. So a payload is stored as its difference from the previous
+payload of the same key and length, and a batch is deflated. The first payload of a key is stored as
+a whole, also after ``SampleEncoder.restart``.
 
-A batch is ``_HEAD`` and the deflated MessagePack of a list of lanes, which hold samples that
-share topic, key, schema and length. Large payloads have a lane for themselves.
+A batch is ``_HEAD`` and the deflated MessagePack of a list of lanes. The samples of a lane have the
+same topic, key, schema and length. Each large payload has a lane of its own.
 
-The difference, or residual, is the exclusive or: zero where nothing changed. All first bytes of
-several payloads come first, then all second bytes, so that bytes that rarely change make long runs
-of zeros. Where nearly all is zero, only the lengths of the runs are stored, and the bytes that are
-not zero: a map of a million pixels of which some hundred have changed takes some hundred bytes.
+The difference, or residual, is the exclusive or: zero where nothing changed. The residual of
+several payloads has all their first bytes, then all second bytes, so that bytes that rarely change
+give long runs of zeros. If nearly all bytes are zero, only the lengths of the runs and the other
+bytes are stored: some hundred bytes for some hundred changed pixels in a map of a million.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.limits import MAX_MESSAGE_BYTES
 
 FORMAT = 1
-# Format, run, and number of the first sample that no earlier batch contains.
+# Format, run, and number of the batch's first new sample.
 _HEAD = struct.Struct("<BQQ")
 LARGE_BYTES = 16_384
 DEFLATE_LEVEL = 6
-# Largest content that a batch may claim, checked before it is inflated: a map in force, a new one
-# and what gathers meanwhile (``recording.write.input_log``).
+# Limit on the content of a batch, checked before it is inflated: the map in force, a new map, and
+# the samples that arrive meanwhile (``recording.write.input_log``).
 MOST_BATCH_BYTES = 3 * MAX_MESSAGE_BYTES
 MOST_SAMPLES = 200_000
-# Value of ``_Lane.against`` where the first payload is stored as a whole.
+# Value of ``_Lane.against`` if the first payload is stored as a whole.
 WHOLE = -1
 
-# Runs of zeros are stored if at most one byte in this many is not zero.
+# Runs of zeros are stored if, of this many bytes, at most one is not zero on average.
 SPARSE = 8
 _COUNT = struct.Struct("<I")
 
@@ -51,7 +51,7 @@ _MANY = msgspec.Meta(max_length=MOST_SAMPLES)
 
 @dataclass(frozen=True, slots=True)
 class Numbered:
-    """A sample and its number, counted from 0 over all samples of a run."""
+    """A sample and its number in the run, from 0."""
 
     number: int
     arrival: Arrival
@@ -59,7 +59,7 @@ class Numbered:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Position of a batch: its run, and the number of its first sample in no earlier batch."""
+    """Position of a batch: its run, and the number of its first new sample."""
 
     run: int
     first: int
@@ -69,10 +69,10 @@ class _Lane(msgspec.Struct, array_like=True):
     """Samples that share topic, key, schema and length.
 
     Attributes:
-        numbers, at_ns, ahead_ns: of each sample its number, its time, and how far the wall clock
-            was ahead of that; each but the first as the difference from the one before.
-        attachments: of each sample; empty if none has any.
-        against: number of the sample that the first one is stored as the difference from.
+        numbers, at_ns, ahead_ns: for each sample its number, its time, and the wall clock minus
+            its time; after the first sample, as differences from the previous sample.
+        attachments: of each sample; empty if all are empty.
+        against: number of the sample from which the first payload's difference is taken.
         checksum: CRC-32 of all payloads in order.
         sparse, body: the residual.
     """
@@ -92,10 +92,10 @@ class _Lane(msgspec.Struct, array_like=True):
 
 
 class SampleEncoder:
-    """Encodes samples into batches; a batch needs those before it, back to the last restart.
+    """Encodes samples into batches; decoding a batch needs all batches since the last restart.
 
     Args:
-        run: identifies the run, such as by its start [ns].
+        run: identifies the run, for example its start [ns].
     """
 
     def __init__(self, run: int) -> None:
@@ -115,19 +115,19 @@ class SampleEncoder:
         return numbered
 
     def skip(self, count: int) -> None:
-        """Leave out the numbers of samples that were lost, so that a reader sees the gap."""
+        """Skip the numbers of lost samples, so that a reader sees the gap."""
         self._next += count
 
     def restart(self, again: Sequence[Numbered] = ()) -> None:
-        """Let the next batch need none before it, and begin with samples of earlier batches."""
+        """Make the next batch need no earlier batch; it begins with earlier samples, ``again``."""
         self._last.clear()
         first = self._waiting[0].number if self._waiting else self._next
         self._again = [numbered for numbered in again if numbered.number < first]
 
     def take(self, *, in_any_case: bool = False) -> bytes:
-        """Return all samples added since the last batch; b"" if there are none.
+        """Return a batch of all samples added since the last batch; b"" without new samples.
 
-        ``in_any_case``: then a batch of samples of earlier batches, if any; it must be the last.
+        ``in_any_case``: return a batch without new samples, too; it must be the last.
         """
         if not self._waiting and not in_any_case:
             return b""
@@ -166,7 +166,7 @@ class SampleDecoder:
     """Decodes the batches of one run, in order.
 
     Args:
-        topics: those to decode; None for all.
+        topics: topics to decode; None for all.
     """
 
     def __init__(self, topics: Container[str] | None = None) -> None:
@@ -177,7 +177,7 @@ class SampleDecoder:
         """Return the samples of ``batch`` in order of their numbers.
 
         Raises:
-            MalformedMessage: it is no batch, or one that it needs is missing.
+            MalformedMessage: it is no batch, or an earlier batch that it needs is missing.
         """
         place_of(batch)
         try:
@@ -203,7 +203,7 @@ class SampleDecoder:
             before = last.arrival.sample.payload
         payloads = _payloads(lane, before)
         if _checksum(payloads) != lane.checksum:
-            raise MalformedMessage(f"sample {numbers[0]}, or one after it, is not what it was")
+            raise MalformedMessage(f"sample {numbers[0]}, or a later one, has a wrong checksum")
         attachments = lane.attachments or [b""] * len(numbers)
         times = accumulate(lane.at_ns), accumulate(lane.ahead_ns)
         samples = []
@@ -215,7 +215,7 @@ class SampleDecoder:
             samples.append(Numbered(number, arrival))
         self._last[lane.topic] = samples[-1]
         if sum(len(kept.arrival.sample.payload) for kept in self._last.values()) > MOST_BATCH_BYTES:
-            raise MalformedMessage("samples of more topics, and larger ones, than there are")
+            raise MalformedMessage(f"last samples of all topics exceed {MOST_BATCH_BYTES} bytes")
         return samples
 
 
@@ -226,12 +226,12 @@ def place_of(batch: bytes) -> Place:
         MalformedMessage: it is no batch, or of another release.
     """
     if len(batch) < _HEAD.size:
-        raise MalformedMessage(f"batch of samples: {len(batch)} bytes are none")
+        raise MalformedMessage(f"batch of samples: {len(batch)} bytes are too few")
     kind, run, first = _HEAD.unpack_from(batch)
     if kind != FORMAT:
         raise MalformedMessage(
             f"batch of samples: format must be {FORMAT}, got {kind}",
-            hint="daemon and recorder are to be of the same release",
+            hint="use the same release for daemon and recorder",
         )
     return Place(run, first)
 
@@ -240,12 +240,12 @@ def _inflated(body: bytes) -> bytes:
     inflater = zlib.decompressobj()
     content = inflater.decompress(body, MOST_BATCH_BYTES)
     if inflater.unconsumed_tail or not inflater.eof:
-        raise MalformedMessage(f"batch of samples: torn, or more than {MOST_BATCH_BYTES} bytes")
+        raise MalformedMessage(f"batch of samples: cut off, or over {MOST_BATCH_BYTES} bytes")
     return content
 
 
 def _lanes(content: bytes) -> Iterator[_Lane]:
-    """Yield lanes one by one, as long as what they claim to hold can be held."""
+    """Yield lanes one by one; raise MalformedMessage if their content exceeds the limits."""
     samples = claimed = 0
     for raw in msgspec.msgpack.decode(content, type=Annotated[list[msgspec.Raw], _MANY]):
         lane = msgspec.msgpack.decode(raw, type=_Lane)
@@ -253,8 +253,8 @@ def _lanes(content: bytes) -> Iterator[_Lane]:
         claimed += len(lane.numbers) * lane.length
         if samples > MOST_SAMPLES or claimed > MOST_BATCH_BYTES:
             raise MalformedMessage(
-                f"batch of samples: claims {samples} samples of {claimed} bytes, at most "
-                f"{MOST_SAMPLES} of {MOST_BATCH_BYTES} are written"
+                f"batch of samples: has {samples} samples of {claimed} bytes, at most "
+                f"{MOST_SAMPLES} of {MOST_BATCH_BYTES} are allowed"
             )
         yield lane
 
@@ -292,7 +292,7 @@ def _residual(payloads: Sequence[bytes], before: bytes) -> tuple[bool, bytes]:
         before: the payload before the first, of the same length; b"" for none.
     """
     if len(payloads) == 1:
-        # Usually a large one: memory counts.
+        # A single payload is usually large: save memory.
         flat = np.frombuffer(payloads[0], np.uint8)
         flat = flat ^ np.frombuffer(before, np.uint8) if before else flat
     else:
@@ -308,16 +308,16 @@ def _residual(payloads: Sequence[bytes], before: bytes) -> tuple[bool, bytes]:
     edges = np.flatnonzero(changed[1:] != changed[:-1]) + 1
     ends = [0] * int(changed[:1].any()), [flat.size] * int(changed[-1:].any())
     edges = np.concatenate((ends[0], edges, ends[1])).astype(np.int64)
-    # How many zeros, how many others, how many zeros ...; the low bytes of all stand together.
+    # Numbers of zeros, of other bytes, of zeros ...; first the low bytes of all numbers.
     runs = np.diff(edges, prepend=0).astype("<u4").view(np.uint8).reshape(-1, 4).T
     return True, _COUNT.pack(len(edges)) + runs.tobytes() + flat[changed].tobytes()
 
 
 def _payloads(lane: _Lane, before: bytes) -> list[bytes]:
-    """Return the payloads of a lane; ``before`` as it was given.
+    """Return the payloads of a lane; ``before``: see ``_residual``.
 
     Raises:
-        ValueError, IndexError, struct.error: its residual is none.
+        ValueError, IndexError, struct.error: its residual is malformed.
     """
     count = len(lane.numbers)
     flat = _flat(lane, count * lane.length)
@@ -339,7 +339,7 @@ def _flat(lane: _Lane, size: int) -> NDArray[np.uint8]:
     starts, lengths = edges[0::2], runs[1::2]
     if int(lengths.sum(dtype=np.int64)) != body.size - end:
         raise ValueError(f"runs of {lengths.sum(dtype=np.int64)} bytes, {body.size - end} follow")
-    # For each byte that is not zero its place among such bytes, and the number of zeros before it.
+    # Place of each byte that is not zero: its index among such bytes plus the zeros before it.
     places = np.arange(body.size - end)
     places += np.repeat(starts - (np.cumsum(lengths, dtype=np.int64) - lengths), lengths)
     flat = np.zeros(size, np.uint8)

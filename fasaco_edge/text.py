@@ -1,9 +1,9 @@
 """Text from elsewhere, made safe to show: in a terminal, in a log and on a page.
 
-A name, a reason or a message off the bus, out of a file or a recording may hold what a terminal
-obeys (escapes, C0 and C1 controls), what turns a line about or hides in it (overrides, joiners,
-fillers), line ends that feign another line, and mark-up. All output to people goes through
-here: ``cli.console``, ``daemon.notify``, ``drawing``, ``review`` and ``serve``.
+Text from the bus, a file or a recording may contain terminal commands (escapes, C0 and C1
+controls), characters that reverse or hide text (overrides, joiners, fillers), line ends that
+imitate another line, and mark-up. All output to people uses this module: ``cli.console``,
+``daemon.notify``, ``drawing``, ``review`` and ``serve``.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from collections.abc import Collection
 from difflib import get_close_matches
 
 MOST = 2_000
-"""What is shown of a text at most [characters]; longer texts are cut."""
+"""Limit on a shown text [characters]; longer texts are cut."""
 
-# What a terminal obeys, or nobody sees: controls, line and paragraph separators, overrides and
-# isolates, joiners, fillers, tags, lone surrogates. By code point, so that no Python's own
-# Unicode tables decide.
+# Characters that control a terminal or are invisible: controls, line and paragraph separators,
+# overrides and isolates, joiners, fillers, tags, lone surrogates. They are listed by code point,
+# independent of the Unicode tables of a Python version.
 _HIDDEN = (
     "\x00-\x1f\x7f-\x9f\xad\u034f\u061c\u115f\u1160\u17b4\u17b5\u180b-\u180f\u200b-\u200f"
     "\u2028-\u202e\u2060-\u206f\u3164\ufe00-\ufe0f\ufeff\uffa0\ufff0-\uffff\ud800-\udfff"
@@ -35,12 +35,12 @@ _SHOWN.maxlevel = 3
 
 
 def one_line(text: str, most: int = MOST) -> str:
-    r"""Return a text as one line that shows all it holds and does nothing: ESC becomes ``\x1b``."""
+    r"""Return a text as one line, with ``_HIDDEN`` characters escaped: ESC becomes ``\x1b``."""
     return _IN_A_LINE.sub(_visible, _bounded(text, most))
 
 
 def lines(text: str, most: int | None = None) -> str:
-    """Return the same of a text whose line ends and tabs are meant; None for any length."""
+    """Return a text like ``one_line``, but keep line ends and tabs; None for no limit."""
     return _IN_LINES.sub(_visible, text if most is None else _bounded(text, most))
 
 
@@ -48,13 +48,13 @@ def shown(value: object) -> str:
     """Return a value as it was written, shortened if it is long, deep or contains itself."""
     try:
         return one_line(_SHOWN.repr(value))
-    except (ValueError, RecursionError):  # an integer of thousands of digits; a tree of as many
-        return f"a {type(value).__name__} too large to be shown"
+    except (ValueError, RecursionError):  # an integer of thousands of digits; a very deep tree
+        return f"a {type(value).__name__} too large to show"
 
 
 def json_line(document: object) -> str:
-    """Return a document as JSON in one line of ASCII, which shows all and does nothing, too."""
-    # JSON lets DEL stand as it is; outside of strings there is none.
+    """Return a document as JSON in one line of printable ASCII."""
+    # JSON does not escape DEL, which can only occur in strings.
     return json.dumps(document).replace("\x7f", "\\u007f")
 
 
@@ -87,6 +87,6 @@ def duration(seconds: float) -> str:
 
 
 def nearest(name: str, names: Collection[str], least: float = 0.6) -> list[str]:
-    """Return the names that one was probably meant for: without its unit, or misspelt."""
+    """Return the names that ``name`` probably stands for: it lacks their unit, or is misspelt."""
     near = [each for each in names if each.startswith(f"{name}_")]
     return near or get_close_matches(name, names, 1, least)

@@ -1,10 +1,9 @@
 """Lattice changes: incremental update of the coverage lattice to a new map.
 
-If the new map lies on the raster of the previous one (it was patched, or has grown, shrunk or moved
-by whole pixels), pixels are compared, and only cells near changed pixels are reclassified. On
-another raster (its origin has moved by a fraction of a pixel, or was rotated) all cells are
-reclassified. Either way the lattice equals, bit for bit, ``CoverageLattice.from_map`` of the new
-map.
+A map that was patched, or has grown, shrunk or moved by whole pixels, stays on its raster: pixels
+are compared, and only cells near changed pixels are reclassified. A map whose origin has moved by a
+fraction of a pixel, or was rotated, lies on another raster: all cells are reclassified. In both
+cases the lattice equals, bit for bit, ``CoverageLattice.from_map`` of the new map.
 """
 
 from __future__ import annotations
@@ -40,8 +39,8 @@ class LatticeChange:
         before: the previous lattice; None for the first.
         after: the lattice over the new map; the previous object if no cell has changed.
         cells: int32 (n, 2), read-only: (row, col) of each cell whose state or steps have
-            changed. Outside its window a lattice is unknown, so a cell that entered or left the
-            window has changed if it is or was known.
+            changed. A lattice is unknown outside its window, so a known cell that entered or left
+            the window has changed.
     """
 
     before: CoverageLattice | None
@@ -135,13 +134,13 @@ class LatticeChange:
 
 
 def windows_on_raster(grids: tuple[OccupancyGrid, OccupancyGrid]) -> tuple[Window, Window] | None:
-    """Return the windows of the previous map and of the new one on their raster; None for two."""
+    """Return the windows of both maps on their raster; None if they are on different rasters."""
     (old_raster, old), (raster, new) = (grid.geometry.on_raster() for grid in grids)
     return (old, new) if raster == old_raster else None
 
 
 def carried(array: NDArray[Scalar], old: Window, new: Window, beyond: float = 0) -> NDArray[Scalar]:
-    """Return an array (rows, cols, ...) over the old window on the new one.
+    """Return the array (rows, cols, ...) of an old window on a new window.
 
     If the windows are equal, the array itself is returned.
 
@@ -178,12 +177,12 @@ def cells_near_changes(
 ) -> NDArray[np.bool_]:
     """Return which cells of the new window are near changed pixels, bool (rows, cols).
 
-    Everything outside a map is unknown: unknown pixels that come or go with its rim are no change.
+    Everything outside a map is unknown, so unknown pixels that it gains or loses are no change.
 
     Args:
         grids: the previous map and the new one.
         window: window of the lattice over the new map.
-        placement: placement of its cells; ``reach_of`` is the distance at which pixels affect them.
+        placement: placement of its cells; pixels affect cells within a distance of ``reach_of``.
         thresholds: thresholds of free and occupied.
         within: see ``LatticeChange.between``.
     """
@@ -214,9 +213,8 @@ def cells_near_changes(
 def new_cells(old: Window, new: Window) -> NDArray[np.bool_]:
     """Mark the cells of the new window that the old one lacks, bool (rows, cols).
 
-    They are classified even if no pixel near them changed, as a robot wider than its tool may be
-    blocked there. The other cells have no steps into them unless nearby pixels changed, as
-    everything outside a map is unknown.
+    They are always classified, as a robot wider than its tool may be blocked there. Old cells gain
+    steps into new cells only near changed pixels, as everything outside a map is unknown.
     """
     return ~carried(np.ones((old.rows, old.cols), np.bool_), old, new)
 

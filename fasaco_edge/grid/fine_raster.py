@@ -1,8 +1,8 @@
 """Fine raster of a map: its pixels, polygons on it, and the pixels that a change affects.
 
-The strip that a tool leaves along a wall is narrower than a pixel of most maps, so pixels are
-divided. Unknown pixels form a border around the map. Pixel (i, j) of the raster is the unit square
-around the point (y = i, x = j).
+The pixels of a map are divided, as a tool leaves strips along walls that are narrower than most
+maps' pixels. A border of unknown pixels surrounds the map. Pixel (i, j) of the raster is the unit
+square around the point (y = i, x = j).
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from fasaco_edge.kernels.floor.bits import Bits, packed
 from fasaco_edge.kernels.lattice.footprint import Placement
 from fasaco_edge.kernels.lattice.polygons import add_near, turn_inside
 
-# Largest edge of a fine pixel [m]: the strip left along a wall is a few of them wide.
+# Largest edge of a fine pixel [m]: a strip left along a wall is a few such pixels wide.
 FINE_M = 0.025
 # Decimals of a polygon's corner [pixels].
 DECIMALS = 6
 # Approximate number of pixels processed at once in arrays of a byte or more per pixel.
 STRIP = 1 << 20
-# Distance from the centres of its two cells within which a step may bend [cells], and an addition
-# for rounding [pixels].
+# Largest distance of a step's bend from the centres of its two cells [cells]; addition to it for
+# rounding [pixels].
 REACH_CELLS, REACH_PX = 2.5, 2.0
 
 
@@ -66,8 +66,8 @@ def fine_geometry(
         coarse: the map.
         discs: robot and tool.
         most_pixels: limit on the pixels.
-        chunk: the raster spans whole chunks of this many pixels of the map if the limit allows it,
-            so that a map that grows within them keeps its raster.
+        chunk: edge of a chunk in pixels of the map. Within the limit, the raster spans whole
+            chunks; a map that grows inside them keeps its raster.
 
     Raises:
         MapTooLarge: it would exceed the limit even with undivided pixels.
@@ -186,7 +186,7 @@ class PolygonsOnRaster:
         """Convert polygons (x, y) [m], one or more, to the raster of a geometry."""
         ends = np.cumsum([len(polygon) for polygon in polygons])
         points = np.array([corner for polygon in polygons for corner in polygon], np.float64)
-        # Rounding of the raster's corner must not move an edge off or onto an edge of pixels.
+        # Otherwise rounding of the raster's corner could move an edge off or onto a pixel's edge.
         cols, rows = (
             np.round(each, DECIMALS) for each in geometry.to_pixels(points[:, 0], points[:, 1])
         )
@@ -223,8 +223,7 @@ def _touched_by(corners: NDArray[np.float64], part: Window) -> NDArray[np.bool_]
 class Reach:
     """Reach of a robot: the pixels and cells that a change nearby affects.
 
-    Disc and tool reach beyond the pixel or cell that they are on, and a step may bend around a
-    corner.
+    A change has an effect at a distance: disc and tool have a size, and steps bend around corners.
 
     Attributes:
         discs: robot and tool.

@@ -1,9 +1,9 @@
 """Floor: the places of the robot on a fine raster of a map, and the floor its tool reaches there.
 
-The reachable floor is everything that the tool's disc touches while the robot's disc is at places
-connected to its start. All pixels under the robot's disc are free. If the tool extends beyond it
-(side brushes, a wide deck, a lamp), a pixel of the tool's disc counts only if free pixels, about
-inside that disc, connect it with the robot's disc.
+The robot's disc can be at places where all pixels under it are free. The reachable floor is
+everything that the tool's disc touches while the robot is at places connected to its start. Where
+the tool extends beyond the robot (side brushes, a wide deck, a lamp), a pixel counts only if free
+pixels, about inside the tool's disc, connect it with the robot's disc.
 
 A cell of the lattice over the floor is coverable if the robot has a place in it. Its stand is the
 place nearest to the cell's centre, and a step may bend around a corner.
@@ -40,7 +40,7 @@ from fasaco_edge.kernels.floor.places import (
 )
 from fasaco_edge.kernels.lattice.footprint import Placement
 
-# Limit on the fine pixels, of which int8 and int32 arrays are allocated.
+# Limit on the fine pixels, for the memory of int8 and int32 arrays of them.
 MOST_PIXELS = 100_000_000
 
 
@@ -96,7 +96,7 @@ class Floor:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StandLattice:
-    """A lattice of stands: in each cell the robot stands as near to the centre as it can.
+    """A lattice of stands, each as near to the centre of its cell as the robot can be.
 
     Attributes:
         lattice: the lattice; cells with a stand are coverable.
@@ -142,7 +142,8 @@ class StandLattice:
             window: window of the cells.
             cell_m: their width [m].
             clear: radius of the robot with its clearance [pixels].
-            unknown: bool (rows, cols): cells that are unknown, not blocked, if without stand.
+            unknown: bool (rows, cols): cells that count as unknown if they have no stand; other
+                cells without a stand are blocked.
             before: the previous lattice, the shift of pixels since then in rows and columns, and
                 the cells to recompute, bool (rows, cols); None to compute all.
         """
@@ -218,10 +219,9 @@ class StandLattice:
 
 
 def tool_steps(radius: float, tool: float) -> int:
-    """Return the steps over pixels' edges from the robot's disc to the rim of the tool's.
+    """Return the number of steps over pixels' edges from the robot's disc to the tool's rim.
 
-    The number is enough for diagonal directions, which take most steps; 0 for a tool within the
-    robot's disc.
+    The number is for diagonal directions, which take most steps; 0 for a tool within the robot.
 
     Args:
         radius, tool: radii of robot and tool [pixels].
@@ -256,8 +256,7 @@ def states_of(stands: NDArray[np.float64], unknown: NDArray[np.bool_] | None) ->
 
     Args:
         stands: see ``StandLattice``.
-        unknown: bool (rows, cols): cells without stand that are unknown, not blocked; None for
-            none.
+        unknown: see ``StandLattice.where``; None for none.
     """
     states = np.full(stands.shape[:2], BLOCKED, np.uint8)
     if unknown is not None:

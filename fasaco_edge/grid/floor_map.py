@@ -1,10 +1,10 @@
 """Floor map: places, stands and the lattice over them, for a map that changes.
 
-If the new map lies on the raster of the previous one, only cells near changed pixels are
-recomputed (``grid.changes``). The result equals that of the new map alone.
+If the raster stays, only cells near changed pixels are recomputed (``grid.changes``). The result is
+the same as if the new map were the first.
 
-The raster spans whole chunks of the map's pixels, so that a growing map seldom moves it, and then
-by whole words of its bits.
+The raster spans whole chunks of the map's pixels. So a growing map seldom moves the raster, and
+always by whole words of its bits.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ class FloorMap:
         near = cells_near_changes(grids, plain.window, wide, thresholds, within)
         self.revision += 1
         self.shift = geometry.corner_of(self.geometry)
-        # New cells are left out: along the sides of a grown map they contain little new floor.
+        # Without new cells: along the sides of a grown map they contain little new floor.
         self.touched = self._reach.pixels_of(near, plain.window, geometry)
         if plain.window != before.window:
             # Floor that is no longer shown may lie beyond the new cells.
@@ -147,7 +147,7 @@ class FloorMap:
         is_same = geometry == self.geometry
         if self.touched is None and is_same and plain.window == before.window:
             return LatticeChange.to(before, self._with_states(plain))
-        # Rounding may place a polygon differently on another raster.
+        # On another raster, rounding may shift keep-out polygons.
         if not is_same and (not self._move(geometry, self.shift) or self._keep_out):
             self._compute_places(grids[1], parts, 0, geometry.rows)
         elif self.touched is not None:

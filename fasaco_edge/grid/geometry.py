@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     _Coordinate = TypeVar("_Coordinate", float, NDArray[np.float64])
     _Pixel = TypeVar("_Pixel", bound=np.generic)
 
-# Steps per pixel to which a raster's corner is rounded, so that a map that grows by whole pixels
+# A raster's corner is rounded to 1 / RASTER_STEPS of a pixel. So a map that grows by whole pixels
 # stays on its raster, even if its origin is rounded to float32.
 RASTER_STEPS = 2048
 
@@ -253,8 +253,8 @@ class GridGeometry:
     def snapped(self, chunk: int = 1) -> GridGeometry:
         """Return this grid moved exactly onto its raster, see ``on_raster``.
 
-        Grids on the same pixels become equal, even if the origin of one was rounded, as float32 or
-        by a transform. The grid is extended to whole chunks of ``chunk`` pixels of the raster.
+        So grids on the same pixels become equal, also if a transform or float32 has rounded one of
+        their origins. The grid is extended to whole chunks of ``chunk`` pixels of the raster.
         """
         raster, window = self.on_raster()
         window = window.rounded_out(chunk)
@@ -265,7 +265,7 @@ class GridGeometry:
         return GridGeometry(window.rows, window.cols, raster.resolution, origin)
 
     def corner_of(self, other: GridGeometry) -> tuple[int, int]:
-        """Return the pixel (row, col) at another grid's corner, which is a pixel's corner here."""
+        """Return the pixel (row, col) whose corner is the corner of another grid."""
         col, row = self.to_pixels(other.origin.x, other.origin.y)
         return round(row), round(col)
 

@@ -36,7 +36,7 @@ def label_place(polygon: Polygon) -> LabelPlace | None:
             y0, y1 = next(((a, b) for a, b in _chords(turned, x) if a <= y <= b), (y, y))
             tall = 2 * min(y - y0, y1 - y)
             fits = min(x1 - x0, ASPECT * tall) + tall / 2
-            # Of equally good lines the first is kept, regardless of rounding.
+            # Of lines that differ only by rounding, the first is kept.
             if fits > best + 1e-6:
                 best, found = fits, LabelPlace(x, y, x1 - x0)
     return found

@@ -32,15 +32,14 @@ __all__ = ["BLOCKED", "COVERABLE", "UNKNOWN", "Cell", "CoverageLattice", "Footpr
 
 Cell = tuple[int, int]
 
-# Extension of a map into a cell that counts as rounding [cells].
+# A map that extends into a cell by less than this does so by rounding [cells].
 ROUNDING = 1e-6
 
-# Limit on the pixels that robot and tool may span: above it, the tables for classifying a map take
-# more memory than the map itself, see ``kernels.lattice.classification``.
+# Limit on the pixels that robot and tool may span. With more, the tables of
+# ``kernels.lattice.classification`` take more memory than the map.
 MOST_REACH_PX = 400
 
-# Tolerance for a robot exactly as wide as a corridor, which fits in spite of float32 rounding of
-# resolutions.
+# Tolerance for float32 rounding of resolutions: a robot exactly as wide as a corridor fits.
 TOUCH_TOLERANCE_PX = 1e-3
 
 

@@ -1,12 +1,12 @@
 """Map images: decoded at once, processed in stripes of rows; and the cell values of their levels.
 
-Pillow's decoded image takes one byte per grey pixel, and four per colour pixel. Everything derived
-from it is made in stripes, which bounds the additional memory.
+Pillow's decoded image takes one byte per grey pixel, and four per colour pixel. It is processed in
+stripes, which bounds the additional memory.
 
-ROS 2's map_saver writes three greys in trinary mode: black, 254, and 205 for never seen. Until
-2025 it also wrote ``free_thresh: 0.25``, by which 205, 19.6 % occupied, is free for map_server;
-since then it writes 0.196, as in ROS 1 (navigation2 PR 5278). Here, that grey is unknown if
-map_saver wrote it, as a robot must not drive over ground that was never seen.
+In trinary mode, ROS 2's map_saver writes black, grey 254 for free, and grey 205 for never seen,
+which is 19.6 % occupied. Until 2025 it also wrote ``free_thresh: 0.25``, by which map_server takes
+205 as free; since then it writes 0.196, as in ROS 1 (navigation2 PR 5278). This module takes 205 as
+unknown if map_saver wrote it, as a robot must not drive over ground that was never seen.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 MAX_PIXELS = 64_000_000
 
-# nav2's three recommended formats, and JPEG, used for published maps; PPM is Pillow's name for the
-# PGM family. JPEG artefacts at sharp edges may turn unknown pixels beside walls free.
+# The three formats that nav2 recommends, with PPM as Pillow's name for PGM; and JPEG, as some maps
+# are published in it. Artefacts of JPEG may turn unknown pixels beside walls into free ones.
 FORMATS = ("PPM", "PNG", "BMP", "JPEG")
 # Size of a stripe, rounded to 8 rows: pixels, and memory per pixel [bytes].
 STRIPE_PIXELS = 500_000
@@ -177,8 +177,8 @@ def _check_affordable(path: Path, image: ImageFile, most_bytes: int) -> None:
     is_slow = any(tile[0] in DECODERS for tile in image.tile)
     if is_slow and rows * cols > SLOW_PIXELS:
         raise MapFileError(
-            f"{path}: {cols} x {rows} pixels of a format that is slow to read, of which there may "
-            f"be {SLOW_PIXELS}",
+            f"{path}: {cols} x {rows} pixels in a format that is slow to read; the limit is "
+            f"{SLOW_PIXELS} pixels",
             hint="save it as PNG",
         )
 
@@ -216,7 +216,7 @@ def values_of(
 def settle(
     image: MapImage, values: NDArray[np.int8], mode: str, *, negate: bool, is_mask: bool
 ) -> str:
-    """Return a contradiction of keys and image, with its remedy; "" for none.
+    """Resolve the grey of map_saver; return how keys contradict the image, with a remedy, or "".
 
     Args:
         image, mode, negate: content of the map file.
@@ -237,7 +237,7 @@ def settle(
     if negate:
         is_savers = unseen and counts[SEEN_FREE] and given == OCCUPIED
         return NEGATED.format(unseen) if is_savers else ""
-    # If most grey pixels have it, the grey is map_saver's, not one of many shades.
+    # If more than half of the grey pixels have this grey, map_saver wrote it.
     is_grey = (values[:: image.white // 255] != OCCUPIED) & (np.arange(256) < SEEN_FREE)
     if is_mask or 2 * unseen <= counts[is_grey].sum():
         return ""

@@ -20,7 +20,7 @@ UNKNOWN = -1
 FREE = 0
 OCCUPIED = 100
 
-# Pixels processed at once, as a mask of all would take as much memory as the map.
+# Pixels processed at once: a mask of all pixels would take as much memory as the map.
 BLOCK_PIXELS = 1_000_000
 
 
@@ -56,7 +56,7 @@ class OccupancyGrid:
         """Return this map with ``patches`` applied in order.
 
         Raises:
-            PatchWithoutBase: one is not inside this map, or is in another frame.
+            PatchWithoutBase: a patch is not inside this map, or is in another frame.
         """
         result = self.with_updates(patches)
         for fault in result.faults:
@@ -111,7 +111,7 @@ class UpdatedGrid:
 
 
 def coarser(grid: OccupancyGrid, most_pixels: int) -> OccupancyGrid:
-    """Return a map of at most about ``most_pixels``, each the highest of those it joins."""
+    """Return a map of about ``most_pixels`` or fewer; a pixel is the highest of those it joins."""
     factor = math.ceil(math.sqrt(grid.cells.size / most_pixels))
     if factor <= 1:
         return grid

@@ -19,7 +19,7 @@ MOST_PAIRS = 65536
 def polygon_flaw(polygon: Polygon) -> str:
     """Return why ``polygon`` has no well-defined interior; "" if it has.
 
-    Its points must be finite; the last is joined to the first.
+    Its points must be finite; an edge joins the last point to the first.
     """
     if len(polygon) < 3:
         return f"must have at least 3 points, got {len(polygon)}"
@@ -65,7 +65,7 @@ def area_m2(polygon: Polygon) -> float:
 
 
 def _crossing(polygon: Polygon) -> tuple[int, int] | None:
-    """Return two edges that touch where they must not, by the indices of their first points.
+    """Return two edges that cross or touch, by the indices of their first points; None for none.
 
     Blocks of edges are compared with all edges; the exact test runs only where their boxes overlap.
     """
@@ -101,8 +101,7 @@ def _meet(
     of_c, of_d = _side(a, b, c), _side(a, b, d)
     of_a, of_b = _side(c, d, a), _side(c, d, b)
     crossing = (of_c * of_d <= 0) & (of_a * of_b <= 0)
-    # Collinear segments meet only if their boxes overlap; boxes of other meeting segments always
-    # do.
+    # Collinear segments meet if their boxes overlap; the boxes of others that meet always overlap.
     overlap = (np.minimum(c, d) <= np.maximum(a, b)) & (np.maximum(c, d) >= np.minimum(a, b))
     meet: NDArray[np.bool_] = crossing & overlap.all(axis=1)
     return meet

@@ -1,9 +1,9 @@
 """Rooms of an occupancy grid: regions of free floor that doors separate.
 
 Free-standing furniture is ignored. Doors are narrow gaps between the ends of walls
-(``kernels.rooms.doors``); each is cut, and each connected part is a region. A region too small for
-a room is joined to a neighbour through the least certain door. A room on an incomplete map is found
-as soon as enough of its floor has been seen through the door.
+(``kernels.rooms.doors``). Each door is cut, and each connected part is then a region. A region too
+small for a room is joined to a neighbour through the least certain door. On an incomplete map, a
+room is found once enough of its floor has been seen through the door.
 """
 
 from __future__ import annotations
@@ -31,18 +31,19 @@ PIXEL_M = 0.05
 DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
 # Smallest room [m2].
 ROOM_M2 = 1.5
-# Furniture: longest edge; edge up to which anything is furniture; least thickness of the rest [m].
+# Longest edge of furniture; edge up to which everything is furniture; least thickness of furniture
+# with a longer edge [m].
 LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
-# Distance to free floor beside unknown pixels, within which unknown pixels belong to a part of the
-# building that was not seen yet [m].
+# Unknown pixels within this distance of free floor that borders on unknown pixels belong to an
+# unseen part of the building [m].
 OPEN_M = 0.5
-# Ratio of unknown to wall pixels beside free ones, above which a map marks no walls, so that all
-# pixels that are not free are wall.
+# Largest ratio of unknown to wall pixels beside free pixels. Above it the map does not mark walls,
+# and all pixels that are not free count as wall.
 MOST_UNMARKED = 4
 # Largest clearance in a door [m].
 CLEAR_M = 2.0
-# Directions of chords, as integers along half of a square's border, so that their unit vectors are
-# equal on all machines.
+# Directions of chords lead to integer points on half of a square's border, so their unit vectors
+# are equal on all machines.
 _HALF = 6
 _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
     (_HALF, col) for col in range(_HALF - 1, -_HALF - 1, -1)
@@ -170,9 +171,9 @@ def _beside_free(kinds: NDArray[np.uint8], kind: int) -> int:
 
 
 def _unseen(kinds: NDArray[np.uint8], pixel_m: float) -> NDArray[np.bool_]:
-    """Return unknown pixels of parts of the building still to be seen, bool (rows, cols).
+    """Return unknown pixels of unseen parts of the building, bool (rows, cols).
 
-    Free floor adjoins them nearby, whereas only walls adjoin unknown pixels behind furniture.
+    They border on free floor nearby; unknown pixels behind furniture border only on its outline.
     """
     unknown, free = kinds == _UNKNOWN, kinds == _FREE
     reach = round(OPEN_M / pixel_m)
@@ -214,7 +215,7 @@ def _joined(
     heapq.heapify(small)
     while small:
         size, room = heapq.heappop(small)
-        # Outdated: joined or grown since, or without neighbours now.
+        # Skip an outdated entry: the region was joined, has grown, or has no neighbours.
         if into[room] != room or size != floor[room] or not links[room]:
             continue
         (kind, _), _, other = min(

@@ -4,11 +4,10 @@ Cells of the coverage lattice are aligned with the map frame. If walls are at an
 lane meets them obliquely. If the map is rotated back by that angle, cells are aligned with walls.
 
 Method: a histogram of gradient directions, used by O'Gorman and Clowes (1976) to find straight
-edges. Each edge between a free and an occupied pixel contributes a unit vector across it. Smoothed,
-these are normal to the wall; their directions modulo a quarter-turn peak at the direction of most
-walls. The angle is that of the sum of all vectors around the peak, as along a straight wall of
-stepped pixels they add up to its normal. The sums are of integers, so the same pixels give the same
-angle on any machine.
+edges. Each edge between a free and an occupied pixel contributes a unit vector across it. Smoothed
+vectors are normal to the wall; their directions modulo a quarter-turn peak at the direction of most
+walls. The sum of the vectors around the peak gives the angle: along a straight wall of stepped
+pixels, vectors add up to its normal. Sums are of integers, so all machines find the same angle.
 
 Source: F. O'Gorman, M. B. Clowes, "Finding picture edges through collinearity of feature points",
 IEEE Transactions on Computers C-25(4), 1976. Deviation: only directions vote, not lines.
@@ -29,12 +28,12 @@ from fasaco_edge.kernels.lattice.footprint import Thresholds
 
 THRESHOLDS = Thresholds(free=25, occupied=65)
 
-# Approximate size to which finer pixels are joined, as they show a scanner's noise [m].
+# Approximate edge to which finer pixels are joined [m]: they show a scanner's noise.
 UNIT_M = 0.05
 # Edge of the tiles that are processed at once [joined pixels].
 TILE = 512
 
-# Smoothing: sums of pixels at these distances along each axis; a standard deviation of 2.6 pixels.
+# Smoothing: along each axis, sums of pixels at these distances; standard deviation 2.6 pixels.
 SHIFTS = (1, 1, 2, 2, 3, 3)
 # The sum of all contributions of one pixel edge.
 EDGE = 2 * 4 ** len(SHIFTS)
@@ -48,16 +47,15 @@ LEAST_SQUARE = (EDGE // 128) ** 2
 BINS, PEAK, AROUND = 180, 14, 20
 MOST_ROUNDS = 8
 
-# Least evidence of a direction: share of all wall (0.16 if directions are uniform), length [m].
+# Least share of all wall in a direction (0.16 if directions are uniform), and least length [m].
 LEAST_SHARE, LEAST_WALL_M = 0.3, 2.0
-# Least ratio of wall along another direction to wall along the map frame's axes for it to replace
-# them.
+# Another direction replaces the map frame's axes if it has this many times as much wall.
 BETTER = 1.25
-# Tolerance within which walls are parallel to the pixels' axes, or at 45 degrees to the map frame,
-# so that nearly equal maps do not rotate by 45 and by -45 [deg].
+# Walls within this angle of the pixels' axes are parallel to them [deg]. Likewise walls near 45
+# degrees are at 45 degrees, so that nearly equal maps do not rotate by 45 and by -45 degrees.
 NEAR_DEG = 0.3
-# Least rotation that gains anything [deg]. A rotation by 1 degree leaves a seventh of the patches,
-# in the same time; from 2 degrees on it also saves time.
+# Least useful rotation [deg]. A rotation by 1 degree leaves a seventh of the patches in the same
+# time; from 2 degrees on a rotation also saves time.
 LEAST_ROTATION_DEG = 0.5
 
 
@@ -68,8 +66,8 @@ class WallDirection:
     Attributes:
         angle_deg: angle of the walls to the axes of the map frame, in (-45, 45] [deg].
         share: share of all wall that is within 7 degrees of it.
-        wall_m: length of that wall [m], each side counted; a wall of one pixel that is known free
-            on both sides counts for 0.3 of its length, as its vectors cancel out.
+        wall_m: length of that wall [m], of both sides; a wall one pixel thick between free pixels
+            counts for 0.3 of its length, as vectors cancel out.
         is_of_rim: whether the map marks few walls, and the border of free space was used instead.
     """
 
@@ -87,8 +85,8 @@ class WallDirection:
 def wall_direction(grid: OccupancyGrid) -> WallDirection | None:
     """Return the direction of most walls of a map; None if there are few, or none is straight.
 
-    A wall is an edge between free and occupied pixels; on maps with few of these, as maps of free
-    space only, any edge of free space.
+    A wall is an edge between free and occupied pixels. On maps with few such edges, as maps of free
+    space only, it is any edge of free space.
     """
     votes = _Votes.of(grid)
     if is_of_rim := votes.rim > 4 * votes.edges:
@@ -152,7 +150,7 @@ class _Votes:
     def peak(self, axes_deg: float) -> _Peak | None:
         """Return the direction of most walls; None without walls.
 
-        It is the direction near ``axes_deg`` [deg] unless another has ``BETTER`` times the wall.
+        ``axes_deg`` [deg] is preferred unless another direction has ``BETTER`` times as much wall.
         """
         lengths, x, y = self.sums
         total = int(lengths.sum())
@@ -204,7 +202,7 @@ def _tiles(grid: OccupancyGrid) -> Iterator[NDArray[np.int8]]:
             here = values[max(-top, 0) :, max(-left, 0) :][: cells.shape[0], : cells.shape[1]]
             here[free] = _FREE
             here[cells >= THRESHOLDS.occupied] = _WALL
-            # A joined pixel is wall if any of its parts is, else free if any is.
+            # A joined pixel is wall if any part is wall; otherwise free if any part is free.
             yield highest(values, parts)
 
 
@@ -223,8 +221,8 @@ def _vote(east: NDArray[np.int16], north: NDArray[np.int16], sums: NDArray[np.in
     squares = x.astype(np.int32) ** 2 + y.astype(np.int32) ** 2
     kept = np.flatnonzero(squares >= LEAST_SQUARE)
     x, y, squares = x.ravel()[kept], y.ravel()[kept], squares.ravel()[kept]
-    # Rounding has no effect: bins end at odd multiples of a quarter of a degree, whose tangents are
-    # irrational, and no fraction of such small integers is close enough to one.
+    # Rounding has no effect. Bins end at odd multiples of a quarter-degree; their tangents are
+    # irrational, and fractions of such small integers are not near them.
     degrees = np.degrees(np.arctan2(y, x, dtype=np.float64))
     bins = np.floor((degrees + 45.0) * (BINS / 90) + 0.5).astype(np.intp) % (4 * BINS)
     for kind, values in enumerate((np.rint(np.sqrt(squares)), x, y)):
@@ -241,7 +239,7 @@ def _smoothed(values: NDArray[np.int16]) -> NDArray[np.int16]:
 
 
 def _added_up(values: NDArray[np.int64], half: int) -> NDArray[np.int64]:
-    """Return the sums of each value and ``half`` on each side; 0 where there are fewer."""
+    """Return the sum of each value and ``half`` values on each side; 0 near the ends."""
     sums = np.zeros_like(values)
     before = np.concatenate([[0], np.cumsum(values)])
     sums[half : len(values) - half] = before[2 * half + 1 :] - before[: -2 * half - 1]

@@ -25,8 +25,8 @@ from fasaco_edge.offline.settings import AXES, HOME, WALLS
 from fasaco_edge.planners.line import LINES, LineSearch
 
 Line = NDArray[np.float64]
-# Ratio of unswept floor by the judge to unswept floor on the line's own raster; measured: 1.2 to
-# 1.5, more if little is left.
+# Ratio of unswept floor by the judge to unswept floor on the line's raster. Measured: 1.2 to 1.5,
+# and more if little floor is unswept.
 LEFT_BY_JUDGE = 1.6
 
 
@@ -109,11 +109,11 @@ class Ground:
         return row + window.row0, col + window.col0
 
     def only(self, cells: NDArray[np.bool_], *, beyond: bool) -> Ground:
-        """Return this ground with only the floor in some cells to sweep.
+        """Return this ground; only the floor in some cells has to be swept.
 
         Args:
             cells: bool (rows, cols) of the lattice.
-            beyond: whether floor in cells without a stand, as along walls, is included.
+            beyond: whether to include floor in cells without a stand, such as along walls.
         """
         if self.floor is None:
             return self
@@ -161,7 +161,7 @@ def _lattice_deg(align: str | float, grid: OccupancyGrid) -> float:
 
 def _stands(floor: Floor, cell_m: float, lattice_deg: float) -> StandLattice:
     """Return the stands in cells whose rows are at an angle to the map frame's x axis."""
-    # Instead of the lattice, the map below it is rotated; stands are pixels of the map.
+    # The map is rotated instead of the lattice; stands are pixels of the map.
     below = replace(floor, geometry=rotated_geometry(floor.geometry, -lattice_deg))
     return StandLattice.over(below, cell_m)
 

@@ -75,13 +75,12 @@ def load_map(
 
     Args:
         source: a map_server YAML file, the name of a built-in map (``fasaco-edge maps``), an image
-            alone, a coverage grid in a .npy file, or one as an array, bool (rows, cols), True =
-            coverable.
+            alone, or a coverage grid: a .npy file or an array, bool (rows, cols), True = coverable.
         resolution_m: edge of a pixel [m] of an image alone; None otherwise.
         unknown_free: whether unknown pixels count as free.
 
     Raises:
-        MapFileError: it is none of these, or cannot be read; or an option does not apply to it.
+        MapFileError: ``source`` is none of these or cannot be read; or an option does not apply.
     """
     if isinstance(source, np.ndarray):
         _without_pixels("the array", resolution_m, unknown_free)
@@ -95,7 +94,7 @@ def load_map(
         return Map("array", free=free)
     if not isinstance(source, str | Path):
         raise MapFileError(
-            f"a map is a file, the name of a built-in one or a NumPy array, got {shown(source)}",
+            f"a map is a file, the name of a built-in map or a NumPy array, got {shown(source)}",
             hint="give a str, a Path or a bool array (rows, cols)",
         )
     file = find_map(source)

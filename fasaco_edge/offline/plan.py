@@ -77,12 +77,12 @@ def plan(
         map: what to cover.
         robot: its size and driving parameters; None for the defaults of the configuration.
         start: start cell (row, col), as wide as the tool, aligned with the map frame.
-        start_xy: start point (x, y) [m] instead. Without either, the start is that of a built-in
-            map, or else in the largest area, near the map frame's origin.
+        start_xy: start point (x, y) [m] instead of ``start``. By default, a built-in map's own
+            start, or the place nearest to the map frame's origin in the largest area.
         end: "anywhere", "home", or a cell.
         line: "cells": through their centres, as the paper's planners do; "quick" or "thorough":
-            over the floor, with 60 or 180 s as the value of a square metre. None for "thorough",
-            and for "cells" on a coverage grid or by a planner other than colony-search.
+            over the floor, with 60 or 180 s as the value of a square metre. Default: "thorough";
+            "cells" on a coverage grid, or by a planner other than colony-search.
         align: direction of the rows of cells for a line over the floor: "walls", "axes" or an angle
             [deg]; None for walls.
         covers: "all" cells; "edge", cells along walls and furniture; or "rest", all others.
@@ -90,13 +90,13 @@ def plan(
             the cheapest.
         search: settings of the search; None for the defaults.
         planner: a planner of your own instead of a search: a function that takes a ``GridProblem``
-            and returns the walk's cells (row, col) in order; or a class, or an object, with such a
-            method ``plan``. It gets the seed of ``search``, and is ended after ``budget_s``, by
-            default 60 s, if it runs in the main thread.
+            and returns the walk's cells (row, col) in order; or a class or an object with such a
+            method ``plan``. It gets the seed of ``search``. In the main thread, it is ended after
+            ``budget_s``, by default 60 s.
         stop: stopping criterion.
         watch: called with the progress of each search for a walk.
-        observe: called with the colony's pheromone: a ``ColonySnapshot`` after each cohort, or
-            once at the end of colony-search; not by planners without pheromone.
+        observe: called with a ``ColonySnapshot``, which holds the pheromone: after each cohort, or
+            once at the end of colony-search. Planners without pheromone do not call it.
 
     Raises:
         BadConfiguration: a value is invalid.
@@ -180,7 +180,7 @@ def checked(robot: RobotConfig) -> RobotConfig:
     """Return a robot after checking its values.
 
     Raises:
-        BadConfiguration: one is invalid; the error names it.
+        BadConfiguration: a value is invalid; the error names it.
     """
     members = msgspec.structs.asdict(robot).items()
     given = {name: value for name, value in members if value is not msgspec.UNSET}

@@ -46,8 +46,7 @@ class Drive(NamedTuple):
     """The effort of driving a line: its length [m], quarter-turns, and time [s].
 
     Attributes:
-        gap: excess of the time over the least time of any line, as a share of that; None if
-            unknown.
+        gap: time over the lower bound on the time of any line, minus 1; None if unknown.
         counts_turns: whether turns take time; False with ``quarter_turn_s=0``.
     """
 
@@ -126,7 +125,7 @@ class Plan:
 
     @property
     def grid_problem(self) -> GridProblem:
-        """The problem as a planner of your own gets it."""
+        """The problem, as the input of a planner of your own."""
         return posed(self.problem, self.search.seed)
 
     @property

@@ -13,7 +13,7 @@ from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.offline.ground import Line
 
-# Largest distance of points along the line whose rooms are looked up [m].
+# Largest distance between points on the line at which its room is determined [m].
 PIECE_M = 0.05
 
 

@@ -2,9 +2,9 @@
 
 A line is laid along each of two walks and annealed three times; then the better line is improved
 until the budget ends. The first walk and line are always completed. The steps do not depend on the
-budget, so that a larger budget never gives a worse line, by its seconds and the price of floor left
-unswept. If a share of the floor is asked for, the first line is always annealed three times, which
-finds the price of floor. Without local search there is one walk, which the budget ends.
+budget, so a larger budget never gives a worse line (by its seconds, plus the price of unswept
+floor). If a share of the floor is requested, the first line is always annealed three times, to find
+the price of floor. A planner without local search gives one walk, until the budget ends.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from fasaco_edge.planners.planner import (
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.registry import planner_of
 
-# Limit on the proposals per cell of a search for a walk: beyond it, the search for the line gains
-# more. Limit on all proposals of the first walk, which has no budget: some five seconds.
+# Limit on the proposals per cell of a search for a walk; then the search for the line gains more.
+# Limit on all proposals of the first walk, which has no budget: some five seconds.
 PROPOSALS_A_CELL, FIRST_PROPOSALS = 10_000, 25_000_000
 # Number of stages after which two lines are compared.
 COMPARED = 3
@@ -55,7 +55,7 @@ class Ending:
 
     Attributes:
         by: what ended them.
-        bound: the problem's lower bound, for planners that have none of their own.
+        bound: the problem's lower bound, for planners that do not compute it.
         is_walk_limited: whether the limit on proposals ended the last search for a walk.
         is_walk_cut: whether ``budget`` or ``stop`` ended it.
     """
@@ -120,7 +120,7 @@ class _Laid:
     snapshots: list[ColonySnapshot]
 
     def complete(self, stages: int, stop: Callable[[], bool] = lambda: False) -> bool:
-        """Search to the end of stage number ``stages``; return False if stopped before."""
+        """Search to the end of stage number ``stages``; return False if stopped earlier."""
         for _ in self.pieces:
             if self.line.stages >= stages:
                 return True
@@ -180,7 +180,7 @@ class Planning:
     def _begin(self, line: str, robot: RobotConfig) -> _Laid:
         """Return the walk with the better line of two walks.
 
-        There is only one walk without local search, or if the first search ended by itself.
+        Without local search, or if the first search ended by itself, there is only one walk.
         """
         search, ending = self._search, self._ending
         has_two = search.has_local_search

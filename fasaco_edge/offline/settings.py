@@ -16,8 +16,8 @@ ANYWHERE, HOME = "anywhere", "home"
 CELLS, THOROUGH = "cells", "thorough"
 # Directions of the rows of cells for a line over the floor, other than an angle [deg].
 WALLS, AXES = "walls", "axes"
-# Default time budget of a planner with local search [s]; other planners have none. Thresholds of
-# equation (4): the best one with local search, and the paper's.
+# Default time budget of a planner with local search [s]; other planners have none. Values of q0 in
+# equation (4): the best with local search, and the paper's.
 BUDGET_S = 2.0
 SEARCH_Q0, PAPER_Q0 = 0.9, 0.7
 # Planner whose settings apply to a planner of the user's own.
@@ -41,10 +41,10 @@ class Search:
             text, like 8:1.
         q0: likewise; None for the value that suits the planner.
         threads: number of threads of the ants; the walk is the same for any number.
-        budget_s: time limit of the search for walks and the line along one [s]; with local search a
-            first walk and line are always completed; None for 2 s, or without local search for no
-            limit. A planner of your own is ended after it; None for 60 s.
-        swept: share of the reachable floor that the line has to sweep in the least time; three
+        budget_s: time limit of the search for walks and a line [s]. With local search, the first
+            walk and line are always completed. Default: 2 s with local search, no limit without,
+            60 s for a planner of your own, which is ended then.
+        swept: share of the reachable floor that the line has to sweep in the least time; then three
             stages are completed regardless of the budget. None for floor worth its time.
 
     Raises:
@@ -113,7 +113,7 @@ class Search:
 def default_line(search: Search, *, has_floor: bool) -> str:
     """Return the default line.
 
-    The paper's planners drive through cell centres, and a coverage grid has no floor.
+    It leads through cell centres for the paper's planners, and on a coverage grid, without floor.
     """
     return THOROUGH if has_floor and search.has_local_search else CELLS
 

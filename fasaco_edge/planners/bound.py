@@ -28,7 +28,7 @@ FEWEST, MOST = 8, 300
 # Largest lattice [cells] whose bound includes turns: prices take about 100 bytes per cell.
 MOST_CELLS = 250_000
 
-# Exponent of the decay of a price's step size, which begins at a quarter-turn's cost.
+# Exponent of the decay of the step size of prices; the first step size is a quarter-turn's cost.
 FALLS = 4
 
 
@@ -70,7 +70,7 @@ class LowerBound:
         return self.cost_us / MICROSECONDS
 
     def tighten(self, work: int) -> None:
-        """Raise ``cost_us`` if this much work can: cells times iterations."""
+        """Improve ``cost_us`` with an amount of work, in cells times iterations."""
         if not self._turns or not work:
             return
         step, turn = 2 * self._cost.step_us, 2 * self._cost.quarter_turn_us

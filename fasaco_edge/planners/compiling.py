@@ -1,13 +1,13 @@
 """Kernel compiler: a process that compiles missing kernels, and restarts once it has grown.
 
 Compiling takes up to a gigabyte of memory that is never released. So a process that needs kernels
-starts this process, waits for it, and loads the compiled kernels. This process holds the lock of
+starts this process, waits for it, and loads the compiled kernels. The compiler holds the lock of
 the folder; once it has grown, it records the compiled stages and continues as a fresh process.
 Kernels that are damaged, or that other users could have written, count as missing.
 
-A second process compiles stages that share few kernels with the others at the same time, in its own
-folder, as two writers would damage numba's index of a function. When it has ended, the first
-process moves the files of functions that it has not compiled itself, and compiles the rest.
+In parallel, a second compiler compiles the stages that share few kernels with the others. It writes
+to its own folder, as two writers would damage numba's index of a function. When it has ended, the
+first compiler moves the files of functions that it lacks, and compiles the rest.
 """
 
 from __future__ import annotations
@@ -46,18 +46,18 @@ from fasaco_edge.planners.stages import APART, STAGES
 LOG = logging.getLogger(__name__)
 
 MODULE = "fasaco_edge.planners.compiling"
-# Memory of the process at which it restarts [MB], unless this much is available [MB]: restarts take
-# a third of the time. With the daemon's 45 MB it fits the unit's limit (MemoryHigh=), as a fifth of
-# it are pages of libraries, which are shared or reclaimed by the system.
+# The compiler restarts above MOST_MB of memory, unless PLENTY_MB are available: restarts take a
+# third of the time. With the daemon's 45 MB, MOST_MB fits the unit's limit (MemoryHigh=): a fifth
+# of it are pages of libraries, which the system shares or reclaims.
 MOST_MB, PLENTY_MB = 270.0, 2000.0
-# Limit on restarts, of which 25 are usual, for a disk that corrupts every file.
+# Limit on restarts, in case a disk corrupts every file; 25 are usual.
 MOST_RESTARTS = 300
 # Least available memory for two compilers, of up to a gigabyte each [MB].
 TWO_MB = 4000.0
 # Thresholds of Python's garbage collection with plenty of memory, see gc.set_threshold: compiling
 # takes a twentieth less processor time, and some 100 MB more.
 RARELY = 50_000, 20, 50
-# Argument in place of the count of restarts that starts a second compiler.
+# Argument that starts a second compiler, in place of the count of restarts.
 APART_WORD = "apart"
 # Lines that the process prints: one of these words, a tab and a text.
 REASON, STAGE, WARNING = "reason", "stage", "warning"

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from typing import Self
 
 MICROSECONDS = 1_000_000
-# Limits on times: whole microseconds are too coarse for a shorter step; the cost of a walk of 10^8
-# steps of an hour each fits into 64 bits.
+# Limits on times. Whole microseconds are too coarse for shorter steps; the cost of 10^8 steps of
+# LONGEST_S fits into 64 bits.
 SHORTEST_STEP_S, LONGEST_S = 1e-3, 3600.0
 
 # Lanes along the rows of the lattice, along its columns, or in any direction.
@@ -128,7 +128,7 @@ class CoverageCost:
 
     def quality(self, cells: int, cost_us: int) -> float:
         """Return delta phi of equation (8): the cost of one step per cell over the cost [us]."""
-        # One division of whole numbers: for steps alone it equals cells / steps bit for bit.
+        # Whole numbers are divided, so for steps alone the result equals cells / steps bit for bit.
         return cells * self.step_us / max(cost_us, self.step_us)
 
     def of_walk(self, cells: NDArray[np.int32]) -> float:
@@ -207,9 +207,9 @@ class SearchWork:
 
 
 def gap_to(lower_bound_s: float, cost_s: float) -> float | None:
-    """Return the optimality gap ``cost_s / lower_bound_s - 1``; None for an unknown bound, 0.
+    """Return the optimality gap ``cost_s / lower_bound_s - 1``; None for a bound of 0 (unknown).
 
-    One division of whole microseconds: 115 s over a bound of 100 s give 0.15 bit for bit.
+    Whole microseconds are divided, so 115 s over a bound of 100 s give 0.15 bit for bit.
     """
     least, cost = round(lower_bound_s * MICROSECONDS), round(cost_s * MICROSECONDS)
     return (cost - least) / least if least > 0 else None

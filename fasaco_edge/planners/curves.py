@@ -1,8 +1,8 @@
 """Curve along a line, for a robot that cannot turn on the spot.
 
-The lanes of the line stay. Between two places on them, arcs and straights on free floor replace the
-line, see ``kernels.floor.words``. Lanes are shortened, and short ones left out, if their floor is
-worth less than the saved time (``kernels.floor.curves``).
+The curve follows the lanes of the line. Between two places on lanes, arcs and straights on free
+floor replace the line, see ``kernels.floor.words``. Lanes are shortened, and short lanes left out,
+if their floor is worth less than the saved time (``kernels.floor.curves``).
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ Ints = NDArray[np.int64]
 MARGIN = 1.1
 # Distance of the places on a lane where arcs may begin and end [radii].
 SPACING = 0.2
-# Length of the line that a word may replace, forward only and with reversing [radii], in addition
-# to two of the tool's widths; factors of this length if no word fits.
+# Length of the line that a word may replace, without and with reversing [radii]; twice the tool's
+# width is added. Factors on this length while no word fits.
 AHEAD_WINDOW, BOTH_WINDOW, WIDER = 6.0, 4.5, (2.0, 4.0, 8.0)
-# Cost of a turn on the spot [s], which a robot with a turning radius cannot drive.
+# Cost of a turn on the spot [s]: a robot with a turning radius cannot drive it.
 SPOT_S = 1000.0
 # Factor on the seconds of driving backward.
 BACKWARD = 2.0
@@ -51,7 +51,7 @@ STEERED_RAD = 0.02
 TURNED_RAD = 1e-9
 # Poses of a curve are at least this far apart [m].
 LEAST_M = 1e-3
-# Decimals of points [m] and headings [rad], to which the sines of all computers agree.
+# Decimals of points [m] and headings [rad]; to these, all computers compute the same sines.
 DECIMALS = 6
 
 
@@ -63,8 +63,8 @@ class Curve:
         poses: float64 (n, 3), n >= 1: x, y [m] in the map frame, and the robot's heading [rad];
             straight segments join them.
         is_backward: bool (n - 1,): whether each segment is driven backward.
-        legs: int64 (n,): index of the line's point before a pose on a straight of the line; below
-            0 for poses beside the line.
+        legs: int64 (n,): for a pose on a straight of the line, the index of the line's point before
+            it; below 0 for poses beside the line.
         spots: number of turns that do not fit, and stay on the spot.
     """
 
@@ -191,7 +191,7 @@ class _Search:
         return self._drawn(self._states(ways), ways)
 
     def _places(self, points: Floats, headings: Floats) -> kernel.Line:
-        """Return the places along a line without repeated points, after those to start from."""
+        """Return the places to start from, and those along a line without repeated points."""
         legs = np.diff(points, axis=0)
         lengths = np.hypot(*legs.T)
         parts = np.maximum(np.ceil(lengths / (SPACING * self._radius)), 1).astype(np.int64)
@@ -290,15 +290,14 @@ class _Search:
             poses[-1], legs[-1] = self._pose(state), int(self._line.leg[state >> 1])
         drawn, is_backward = np.array(poses), np.array(backward, np.bool_)
         kept = _needed(drawn, is_backward, LEAST_M / self._floor.geometry.resolution)
-        # A way is driven as its end is reached: a shorter one before it may be dropped.
+        # A segment takes the direction in which its end is reached: poses before may be dropped.
         spots = len(self._spots(states, ways))
         return self._as_curve(drawn[kept], is_backward[kept[1:] - 1], np.array(legs)[kept], spots)
 
     def _along(
         self, at: tuple[float, float, float], side: int, length: float
     ) -> list[tuple[float, float, float]]:
-        """Return the poses along a piece of a word, ``length`` [radii]; of a straight only its
-        end."""
+        """Return the poses along an arc, or the end of a straight; ``length`` in [radii]."""
         x, y, yaw = at
         step = STEP_M / self._floor.geometry.resolution
         parts = math.ceil(abs(length) * self._radius / step) if side else 1
@@ -325,7 +324,7 @@ class _Search:
 def _needed(poses: Floats, is_backward: NDArray[np.bool_], least: float) -> Ints:
     """Return the indices of poses that a curve needs, int64 (m,).
 
-    Poses within a straight are left out, and those closer than ``least`` to the previous one.
+    It needs no poses within a straight, and none closer than ``least`` to the previous pose.
     """
     turned = np.abs(np.remainder(np.diff(poses[:, 2]) + np.pi, 2.0 * np.pi) - np.pi) > TURNED_RAD
     is_bend = turned[:-1] | turned[1:] | (is_backward[:-1] != is_backward[1:])

@@ -18,8 +18,8 @@ from fasaco_edge.kernels.lattice.reach import reachable_from
 def start_cell(lattice: CoverageLattice, map_file: Path, grid: OccupancyGrid | None = None) -> Cell:
     """Return the default start of a plan.
 
-    A built-in map has its own; otherwise it is the cell of the largest connected area that is
-    nearest to the map frame's origin. ``grid`` is the map of the lattice; None for a coverage grid.
+    A built-in map has its own start; otherwise it is in the largest connected area, at the cell
+    nearest to the map frame's origin. ``grid``: the map of the lattice; None for a coverage grid.
 
     Raises:
         NothingToCover: no cell is coverable, because of the map or of the robot.
@@ -110,7 +110,7 @@ def read_grid(name_or_path: str | Path) -> NamedGrid:
     become lattices of 0.3 m for a robot of 0.18 m radius.
 
     Raises:
-        MapFileError: there is no such file, or it has none of these formats.
+        MapFileError: the file is missing, or has another format.
         NothingToCover: the grid has no free cell.
     """
     file, grid = find_map(name_or_path), None

@@ -31,20 +31,20 @@ from fasaco_edge.kernels.floor.sweeps import (
 from fasaco_edge.kernels.floor.turning import Turning, proportional_turning
 from fasaco_edge.kernels.lattice.polygons import BITS
 
-# Greatest distance from an edge to floor for which the edge makes a detour [m].
+# Greatest distance of floor from a segment that makes a detour to sweep it [m].
 FARTHEST_M = 1.0
 # Least connected unswept area that counts as a patch [m2].
 PATCH_M2 = 0.04
-# Numbers of moves as shares of all moves: of the first descent, by long moves that gain much; of
-# patches, in addition.
+# Share of the moves for the first descent, by long moves that gain much; additional moves for
+# patches, as a share.
 DESCENT_SHARE, PATCH_SHARE = 0.08, 0.12
 # Limit on the moves per point of the walk, however much floor there is.
 MOST_A_POINT = 2000
-# Temperatures of the first stage, and of each later one, at which a line keeps its overall shape.
-# Stages of doubled length give the same results as one stage of their total length.
+# Temperatures of the first stage; temperatures of each later stage, low enough for the line to keep
+# its overall shape. Stages of doubled length are as good as one stage of their total length.
 COOLED, REHEATED = (1.0, 0.0), (0.7, 0.0)
-# Factors of the price of floor if a share to sweep is asked for: after a line that sweeps too
-# little, after one that sweeps enough; limit of their product. They are large for few stages.
+# Factors on the price of floor if a share to sweep is requested: after a line that sweeps too
+# little; after a line that sweeps enough; limit on their product. Large factors need few stages.
 RAISED, LOWERED, MOST_RAISED = 4.0, 0.7, 100.0
 # Moves per point of the line after which its parts are reordered once.
 MOVES_A_POINT = 48
@@ -71,8 +71,8 @@ class LineConfig:
         turning: durations of turns on the spot.
         moves_m2: limit on the moves tried per reachable square metre.
         patch_s: at the end, patches are swept that take no longer than this [s].
-        swept: share of the reachable floor to sweep in the least time, whatever its price; None for
-            as much as pays by ``price_s_m2``.
+        swept: share of the reachable floor to sweep in the least time; None to sweep the floor that
+            is worth its time by ``price_s_m2``.
     """
 
     price_s_m2: float = 200.0
@@ -129,10 +129,10 @@ class DrivenLine:
 class LineSearch:
     """A running search for the line along a walk, in stages; the first is always completed.
 
-    Each later stage anneals the line again, twice as long as the previous one. The line of the
-    least cost is kept, so along one walk a longer search is never worse than a shorter one. If a
-    share of the floor is asked for, the kept line is the fastest that sweeps it, or else the line
-    that sweeps most; the price of floor is adapted from stage to stage.
+    Each later stage anneals the line again, twice as long as the previous one. The search keeps the
+    line of the least cost, so a longer search along the same walk is never worse. If a share of the
+    floor is requested, it keeps the fastest line that sweeps this share; without such a line, the
+    one that sweeps most. Each stage then adapts the price of floor.
 
     Attributes:
         best: the line kept; None until the first stage is over.
@@ -212,7 +212,7 @@ class LineSearch:
         yield
 
     def _adapt_price(self) -> None:
-        """Raise the price of floor if the last line swept less than asked for, or lower it."""
+        """Raise the price of floor if the last line swept too little; otherwise lower it."""
         if self._config.swept is not None:
             change = RAISED if self._missing_m2(self._swept_m2()) > 0.0 else LOWERED
             left_s = min(self._price.left_s * change, MOST_RAISED * self._least_price.left_s)
@@ -223,18 +223,18 @@ class LineSearch:
         return self._floor.reachable_m2 - int(np.count_nonzero(self._sweeps.counts == 0)) * unit**2
 
     def _missing_m2(self, swept_m2: float) -> float:
-        """Return the floor missing from the share asked for [m2]; 0 if none is asked for."""
+        """Return the floor missing from the requested share [m2]; 0 without a requested share."""
         least = self._config.swept or 0.0
         return max(least * self._floor.reachable_m2 - swept_m2, 0.0)
 
     @property
     def rank(self) -> tuple[float, float]:
-        """The objective: floor missing from the share asked for [m2], then the cost [s]."""
+        """The objective: floor missing from the requested share [m2], then the cost [s]."""
         assert self.best is not None
         return self._rank(self.best)
 
     def _keep(self) -> None:
-        """Keep the line as it is now, if it is better than the one kept."""
+        """Keep the present line if it is better than the kept line."""
         points = straightened(self._line.points[numbers_along(self._line)])
         seconds = self._config.seconds(points, self._floor.geometry.resolution)
         xy, tried = self._floor.to_map(points), int(self._line.state[kernel.TRIED])

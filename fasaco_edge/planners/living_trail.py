@@ -1,12 +1,12 @@
 """Living trail: pheromone on every step of the lattice, kept during a whole mission.
 
-The ants of each plan, and of each attempt in spare time, start from it and change it for the next
-ones. The equations are those of Carr and Wang 2022:
+The ants of each plan, and of each attempt in spare time, start from the trail, and leave it changed
+to the next ants. The equations are those of Carr and Wang 2022:
 
-* equation (7), local update: by each ant (``kernels.ants``), and where the map has changed; a
+* equation (7), local update: each ant applies it (``kernels.ants``), and each change of the map; a
   driven step loses half at once;
-* equation (8), global update: by the ants along what they rebuilt, and by each published plan along
-  its path, while the other steps at its cells fade by (7).
+* equation (8), global update: ants apply it along what they rebuilt, and each published plan along
+  its path; the other steps at the path's cells fade by (7).
 
 Delta phi = (distinct cells x step cost) / path cost, about 1 at best, as in
 ``planners.paper.fasaco``; a step that a path takes twice is strengthened once.
@@ -30,8 +30,8 @@ from fasaco_edge.grid.geometry import Window
 
 # Pull of a driven step towards tau0, equal to equation (7) applied by about seven ants.
 DRIVEN = 0.5
-# A direction is within reach of the strongest if its pheromone is at least this share of the range
-# above the weakest: lambda of the mean branching factor (Gambardella and Dorigo 1995).
+# Lambda of the mean branching factor (Gambardella and Dorigo 1995): a direction is within reach of
+# the strongest if its pheromone is at least weakest + LAMBDA * (strongest - weakest).
 LAMBDA = 0.05
 
 # Direction of a step by index 3 * rows + columns + 4.
@@ -135,7 +135,7 @@ class LivingTrail:
         flat[places] = after
 
     def take(self, walked: TrailSnapshot, ants: int) -> None:
-        """Take over the pheromone that a number of ants have left; removed steps stay removed."""
+        """Take over a trail that a number of ants have changed; removed steps stay removed."""
         self.ants += ants
         common = self._window.intersection(walked.window)
         if common is None:

@@ -1,7 +1,7 @@
 """Passes over a floor: the cells that each covers, and the direction of its lanes.
 
-The direction is the angle of the lattice, with lanes along its rows or its columns, so that lanes
-across those of the previous pass need no other lattice.
+Lanes lie along the rows or the columns of the lattice, and the angle of the lattice is chosen for
+them. So two passes whose lanes cross use the same lattice.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Pass:
     """A pass over the floor.
 
     Attributes:
-        covers: which cells: all, those along edges, or the rest, once edges are covered.
+        covers: which cells: all; those along edges; or the rest, after edges are covered.
         lanes: their direction: auto or cross.
         angle_deg: their angle to the x axis of the map frame in place of ``lanes`` [deg].
         overlap: share of the tool's width by which its lanes overlap; None for the robot's.
@@ -78,8 +78,8 @@ class Laid(NamedTuple):
 def lane_and_tool_m(tool_m: float, usual_lane_m: float, overlap: float) -> tuple[float, float]:
     """Return the distance of lanes that overlap, and the width of the tool to plan them with [m].
 
-    If lanes are closer than usual, the planned tool is narrower as well: with the full width a line
-    would skip swept floor, and its lanes would be as far apart as usual.
+    If lanes are closer than usual, the planned tool is narrower, too: a line for the full width
+    would skip swept floor, so that its lanes would be as far apart as usual.
 
     Args:
         tool_m: width of the tool [m].
@@ -121,10 +121,10 @@ def _is_crossed(after: Iterable[Pass]) -> bool:
 
 
 def check_passes(passes: Sequence[Pass], name: str = "passes") -> None:
-    """Check passes against the previous ones.
+    """Check passes and their order.
 
     Raises:
-        BadConfiguration: a cross pass has no lanes before it, or a rest pass no edge; options of a
+        BadConfiguration: a cross pass does not follow lanes, or a rest pass an edge; options of a
             pass exclude each other; or all passes are edges.
     """
     if not 1 <= len(passes) <= MOST_PASSES:
@@ -157,7 +157,7 @@ def read_pass(text: str) -> Pass:
     """Return the pass in a text as edge, rest, auto, cross, 30deg, rest:cross, cross%30@0.15.
 
     Raises:
-        BadConfiguration: it is none.
+        BadConfiguration: the text is no pass.
     """
     what, at, speed = text.partition("@")
     what, percent, overlap_text = what.partition("%")
@@ -184,7 +184,7 @@ def read_passes(text: str) -> tuple[Pass, ...]:
     """Return the passes in a text: their number, or one text for each, with commas between.
 
     Raises:
-        BadConfiguration: it is neither.
+        BadConfiguration: the text is neither.
     """
     if text.isdecimal() and int(text) <= MOST_PASSES:
         return (Pass(),) * int(text)

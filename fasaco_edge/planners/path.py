@@ -13,7 +13,7 @@ from fasaco_edge.kernels.lattice.reach import shortest_walk
 from fasaco_edge.planners.cost import MICROSECONDS, NO_WORK, SearchWork, count_turns, gap_to
 from fasaco_edge.planners.living_trail import TrailSnapshot
 
-# Number of rows that are compared first, as two walks may differ early.
+# Number of rows that ``common_beginning`` compares first.
 FIRST_PIECE = 256
 
 
@@ -63,7 +63,7 @@ class CoveragePath:
         lower_bound_cost_s: lower bound on the cost [s]; 0 if unknown.
         saved: savings of ants and of local search against the first walk.
         trail: pheromone where ants have walked; None if no ant has walked.
-        first_walk_s: time to the first complete walk [s]; measured, so that it is not reproduced.
+        first_walk_s: measured time to the first complete walk [s]; no rerun reproduces it.
     """
 
     cells: NDArray[np.int32]
@@ -100,8 +100,7 @@ class WalkFigures:
         steps: steps, each to a neighbouring cell.
         revisits: ``steps + 1 - cells``, visits beyond each cell's first.
         recovered_cells: distinct cells visited at least twice (the definition in the paper's text).
-        n_r_paper: revisits of the walk with the shortest path home; only for comparison with Table
-            I, which counts entries minus distinct cells, from start to start.
+        n_r_paper: revisits of the walk with the shortest path home, for comparison with Table I.
         turns_90: quarter-turns between two steps.
         turns_180: reversals.
     """

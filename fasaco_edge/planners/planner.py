@@ -90,8 +90,7 @@ class Interrupt:
 class StopRecorder:
     """Stops with another criterion, and records the calls that stop; ``StopAt`` repeats them.
 
-    The work of a path does not suffice for that: after a stopped repair a search may follow, and be
-    stopped, too.
+    The work of a path does not reproduce it: a repair and the search after it may both be stopped.
 
     Attributes:
         criterion: the other criterion.
@@ -141,8 +140,8 @@ class ColonySnapshot:
     Attributes:
         window: window of the lattice that ``trail`` spans.
         cell_m: edge of a cell [m].
-        trail: float32 (rows, cols): pheromone on the moves into a cell: their mean after a cohort,
-            the strongest for a living trail; 0 if the cell is not coverable.
+        trail: float32 (rows, cols): mean pheromone on the moves into a cell after a cohort, or the
+            strongest of a living trail; 0 if the cell is not coverable.
         cohort: index of the last cohort, from 0.
         velocity: its velocity [cells/move].
         ants: number of ants so far.

@@ -40,17 +40,17 @@ class CoverageProblem:
             still need a visit.
         unreachable: bool (rows, cols), read-only: coverable cells that are asked for but not
             reachable; reported, never attempted.
-        end: the cell (row, col) where the walk ends, which need not be one to cover; the start
-            for a closed walk; None for anywhere.
+        end: the cell (row, col) where the walk ends, to cover or not; the start for a closed walk;
+            None for anywhere.
         cost: the cost to minimise.
         before: int32 (n, 2), the undriven rest of the previous walk; a repair keeps its valid
             parts. None for none.
         is_full: whether to search the whole walk, starting from ``before``, not only to repair it.
-        attempt: number of an attempt to improve a valid ``before``, from 1: each tries other
-            places. 0 for a needed plan.
+        attempt: number of an attempt to improve a valid ``before``, from 1; each attempt tries
+            other places. 0 if a plan is needed.
         trail: the mission's living trail, for planners whose ants start from it; None for none.
-        whole: the problem whose rest this one is, see ``after``; its path begins with the lead,
-            and has the figures of the whole problem. None for a whole problem.
+        whole: the whole problem, if this is its rest after some steps, see ``after``; a path has
+            these steps first, and the figures of the whole problem. None for a whole problem.
         rooms: uint16 (rows, cols), the room of each cell, 0 for none; None without a price for
             steps from one room into another.
     """
@@ -197,7 +197,7 @@ class CoverageProblem:
 
     @property
     def steps_with_rooms(self) -> NDArray[np.uint8]:
-        """The steps of the lattice, with those that lead into another room, see ``ROOM_BITS``."""
+        """The steps of the lattice, with marks of those into another room, see ``ROOM_BITS``."""
         steps, rooms = self.lattice.steps, self.rooms
         if rooms is None:
             return steps

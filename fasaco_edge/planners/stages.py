@@ -1,4 +1,4 @@
-"""Stages of the warm-up: their names and order, and those that a plan or a mission needs."""
+"""Stages of the warm-up: their names, their order, and which of them a plan or a mission needs."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def stages_of_plan(planner: str, *, has_curves: bool = False) -> tuple[str, ...]
 
 
 def stages_of_mission(planner: str, *, has_fleet: bool, has_curves: bool) -> tuple[str, ...]:
-    """Return the stages that a mission needs, by its planner's name; others would take memory."""
+    """Return the stages that a mission needs, by its planner's name; others take memory."""
     needed = {planner, *((SHARES,) if has_fleet else ()), *((CURVES,) if has_curves else ())}
     spared = {*PLANNER_NAMES, SHARES, CURVES} - needed
     return tuple(stage for stage in STAGES if stage not in spared)

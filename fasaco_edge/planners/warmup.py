@@ -126,7 +126,7 @@ def _take_areas(room: TinyRoom) -> None:
 
 
 def _take_local_search(room: TinyRoom) -> None:
-    """Improve and perturb a walk even if it is proven optimal, which no search does."""
+    """Improve and perturb a walk; a search would not, as the walk is proven optimal."""
     framed, walk = room.framed()
     region = WalkRegion(framed.rows, framed.cols, 4 * walk.size, 1, SearchTrail(room.costly, _ANTS))
     (box,) = regions_of(framed, room.costly.cells, 0)

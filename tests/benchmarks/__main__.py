@@ -1,6 +1,6 @@
-"""Benchmarks for those who develop the planner: ``python -m tests.benchmarks NAME``.
+"""Benchmarks for developers of the planner: ``python -m tests.benchmarks NAME``.
 
-What a robot's owner measures on the robot is ``fasaco-edge bench``.
+Users measure on their robot by ``fasaco-edge bench``.
 """
 
 from __future__ import annotations

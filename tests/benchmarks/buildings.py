@@ -1,11 +1,11 @@
 """Synthetic buildings of any size, to measure how planners scale.
 
-Corridors divide the floor into blocks until a block is shallow enough for two rows of rooms,
-or by chance becomes a hall; so rooms, doors and furniture are the same at every scale, and a
-larger building has more of them. Cells are 0.3 m wide.
+Corridors divide the floor into blocks until a block is shallow enough for two rows of rooms, or by
+chance becomes a hall. So larger buildings have more rooms, doors and furniture, of the same sizes.
+Cells are 0.3 m wide.
 
-All parts are drawn on views of one array, turned and flipped such that row 0 is the wall
-with the door. Blocks and rooms have walls of one cell at their first and last rows and columns.
+All parts are drawn on views of one array, rotated and mirrored so that row 0 is the wall with the
+door. Blocks and rooms have walls of one cell at their first and last rows and columns.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Calm of a line: how much it turns, whether it follows the walls, and how often it crosses itself.
 
-A resident sees this, not the seconds. All figures are of a line to be driven from point to point.
+Residents notice these figures more than the seconds. A line leads from point to point.
 """
 
 from __future__ import annotations

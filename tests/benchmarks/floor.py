@@ -1,7 +1,7 @@
-"""Lines over the floor of buildings: planned with the map at hand, and driven while it is heard.
+"""Lines over the floor of buildings: planned on a known map, or driven while the map is built.
 
-``benchmarks floor``: how much of the reachable floor each sweeps, and in what time a square metre,
-beside the walk through the centres of cells on the same map.
+``benchmarks floor``: the swept share of the reachable floor and the time per square metre of each
+line, and of the walk through the centres of cells on the same map.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def measure(maps: Sequence[str], cases: Sequence[str], say: Say) -> Generator[Fl
 
 
 def plan(building: str, truth: OccupancyGrid, start: tuple[float, float], case: str) -> FloorRun:
-    """Plan a line with the map at hand."""
+    """Plan a line on a known map."""
     from fasaco_edge.grid.fine_raster import RobotDiscs
     from fasaco_edge.grid.floor import Floor, StandLattice
     from fasaco_edge.grid.lattice import CoverageLattice, Footprint
@@ -288,10 +288,10 @@ def _goals(
 FLOOR = Benchmark(
     name="floor",
     summary="lines over the floor: swept share and time, planned and driven",
-    description="Plan lines over buildings with the map at hand, quick and thorough, and let a "
-    "simulated robot cover the same buildings while it maps them. Each line, and the true track, "
-    "is judged on the map's own pixels by code that knows nothing of cells. Tool 0.3 m, robot "
-    "radius 0.18 m, 0.25 m/s, 1.5 s a quarter-turn.",
+    description="Plan lines over known buildings, quick and thorough, and let a simulated robot "
+    "cover the same buildings while it maps them. Each line, and the true track, is judged on the "
+    "map's pixels, independently of cells. Tool 0.3 m, robot radius 0.18 m, 0.25 m/s, 1.5 s per "
+    "quarter-turn.",
     add_options=_add_options,
     count=lambda args: len(args.maps) * len(args.cases),
     measure=lambda args, say: measure(args.maps, args.cases, say),

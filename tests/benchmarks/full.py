@@ -1,4 +1,4 @@
-"""``benchmarks full``: full plans that begin with the walk before, against those that do not."""
+"""``benchmarks full``: full plans that start from the previous walk, against plans from none."""
 
 from __future__ import annotations
 
@@ -71,10 +71,14 @@ class Pair:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     add_grid_options(parser, DEFAULT_MAPS)
     parser.add_argument("--cost", choices=("steps", "turns"), default="steps")
-    parser.add_argument("--seeds", type=positive, default=3, metavar="N", help="0 to N - 1")
     parser.add_argument(
-        "--proposals", type=positive, default=2_000_000, help="of each plan (default: %(default)s)"
-    )
+        "--seeds", type=positive, default=3, metavar="N",
+        help="use seeds 0 to N - 1 (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--proposals", type=positive, default=2_000_000,
+        help="proposals of each plan (default: %(default)s)",
+    )  # fmt: skip
 
 
 SITUATIONS = ("asked for", "map corrected", "carried", "other order")
@@ -187,20 +191,20 @@ def _report(args: argparse.Namespace, pairs: Sequence[Pair]) -> Report:
         figures={"cost": args.cost, "pairs": [asdict(pair) for pair in pairs]},
         goals=(),
         remarks=(
-            "cost: of the plan that begins with the walk before, over that of the other, after the "
-            "same work. kept: of the next 5 m of the walk before, up to the first change. carried: "
-            "the robot is elsewhere, nothing can be kept. map corrected: cells along walls come "
-            "and go.",
+            "cost: the plan from the previous walk over the plan from none, after equal work. "
+            "kept: share of the next 5 m of the previous walk, up to the first change. carried: "
+            "the robot is elsewhere, so nothing can be kept. map corrected: cells along walls "
+            "appear and disappear.",
         ),
     )
 
 
 FULL = Benchmark(
     name="full",
-    summary="full plans that begin with the walk before, against those from nothing",
-    description="Plan, drive a part, then make a full plan: asked for, on a corrected map, from "
-    "elsewhere, for another order; once from nothing and once beginning with the walk before. "
-    "Compare cost and what is kept of the next 5 m.",
+    summary="full plans from the previous walk, against plans from none",
+    description="Plan, drive a part, then make a full plan: on request, on a corrected map, from "
+    "another place, for another order; without a walk, and from the previous walk. Compare cost "
+    "and the kept share of the next 5 m.",
     add_options=_add_options,
     count=lambda args: len(SITUATIONS) * args.seeds * len(grid_names(args, DEFAULT_MAPS)),
     measure=_measure,

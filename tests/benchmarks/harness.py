@@ -1,4 +1,4 @@
-"""The harness of all benchmarks: grids by name, the planner that is measured, judged walks."""
+"""Harness of all benchmarks: grids by name, the measured planner, judged walks."""
 
 from __future__ import annotations
 
@@ -88,15 +88,15 @@ def add_floors(parser: argparse.ArgumentParser, floors: int) -> None:
         "--floors",
         type=within(1, 1_000_000),
         default=floors,
-        help="of each kind (default: %(default)s)",
+        help="number of floors of each kind (default: %(default)s)",
     )
     parser.add_argument(
-        "--seed", type=within(0, 2**62), default=0, help="the first (default: %(default)s)"
+        "--seed", type=within(0, 2**62), default=0, help="first seed (default: %(default)s)"
     )
 
 
 def grid_name(name_or_path: str) -> str:
-    """Return what a grid is called in results: where its file lies is nobody's business."""
+    """Return a grid's name in results, without the folder of its file."""
     return Path(name_or_path).stem
 
 

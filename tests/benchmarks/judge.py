@@ -1,8 +1,8 @@
-"""An independent judge of coverage walks.
+"""Independent judge of coverage walks.
 
-It shares no code with the planners and kernels it judges: it has its own directions,
-its own reachability and its own counts, all in numpy. What can be reached is not searched
-cell by cell from the start, as the kernels do: the connected parts of the grid are labelled.
+It shares no code with the planners and kernels that it judges: it has its own directions,
+reachability and counts, all in numpy. To find the reachable cells, it labels the connected parts of
+the grid, whereas the kernels search from the start.
 """
 
 from __future__ import annotations

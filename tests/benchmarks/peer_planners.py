@@ -1,8 +1,8 @@
-"""Coverage planners of others: their installation, and their lines over a building's floor.
+"""Foreign coverage planners (peers): their installation, and their lines over a building's floor.
 
-A peer is installed by pip into a folder of its own, and plans in a process of its own, so that it
-can crash or search without end. It gets the places of the robot's centre as a polygon with holes:
-the free floor less the robot's radius, its outline simplified. Only the call of the peer is timed.
+pip installs each peer into its own folder. It plans in its own process, so that it can crash or
+search without end. Its input is the area for the robot's centre as a polygon with holes: the free
+floor reduced by the robot's radius, with a simplified outline. Only the call of the peer is timed.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Ground(NamedTuple):
 
 
 class Peer(NamedTuple):
-    """A planner of others.
+    """A foreign planner.
 
     Attributes:
         requirement: what pip installs.

@@ -1,6 +1,6 @@
-"""Our ``plan`` beside coverage planners of others, over the same buildings, judged alike.
+"""Comparison of ``plan`` with foreign coverage planners, on the same buildings, by one judge.
 
-``benchmarks peers``: swept share, seconds a square metre, turning, and time of planning.
+``benchmarks peers``: swept share, seconds per square metre, turning, and time of planning.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help=f"map_server YAMLs or names from `maps` (default: {' '.join(DEFAULT_MAPS)})",
     )
     parser.add_argument(
-        "--folder", type=Path, metavar="DIR", help="all map_server YAMLs of a folder, too"
+        "--folder", type=Path, metavar="DIR", help="also use all map_server YAMLs of a folder"
     )
     parser.add_argument(
         "--peers",
@@ -181,21 +181,21 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         choices=tuple(OTHERS),
         default=list(OTHERS),
         metavar="PEER",
-        help=f"of {', '.join(OTHERS)} (default: all)",
+        help=f"foreign planners: {', '.join(OTHERS)} (default: all)",
     )
     parser.add_argument(
         "--installed",
         type=Path,
         default=default_folder(),
         metavar="DIR",
-        help="where peers are installed (default: %(default)s)",
+        help="folder in which peers are installed (default: %(default)s)",
     )
     parser.add_argument(
         "--limit",
         type=positive,
         default=LINE_S,
         metavar="S",
-        help="of a peer's line [s] (default: %(default)s)",
+        help="time limit of a peer's line [s] (default: %(default)s)",
     )
 
 
@@ -208,7 +208,7 @@ def _report(args: argparse.Namespace, samples: Sequence[PeerRun]) -> Report:
         if run.fault
     )
     return Report(
-        title="lines of others, and ours",
+        title="lines of `plan` and of foreign planners",
         header=HEADER,
         rows=tuple(map(_row, samples)),
         figures={
@@ -258,13 +258,13 @@ def _goals(samples: Sequence[PeerRun]) -> Iterator[Goal]:
 
 PEERS = Benchmark(
     name="peers",
-    summary="lines of others' coverage planners beside ours",
-    description="Plan over buildings by our plan with default settings, and by coverage planners "
-    "of others, and judge all lines alike, on the map's pixels. Peers are installed by pip when "
-    "first asked for, each into a folder of its own; one that cannot be installed is left out. "
-    "coverage-path-planner drives a lap along each border, then straight lines; fields2cover "
-    f"straight lines alone, ordered within {ORDER_S} s. Tool 0.3 m, robot radius 0.18 m, 0.25 m/s, "
-    "1.5 s a quarter-turn.",
+    summary="lines of `plan` against those of foreign coverage planners",
+    description="Plan over buildings by `plan` with default settings, and by foreign coverage "
+    "planners (peers), and judge all lines alike, on the map's pixels. pip installs each peer into "
+    "its own folder when it is first used; peers that cannot be installed are left out. "
+    "coverage-path-planner drives a lap along each border, then straight lines; fields2cover only "
+    f"straight lines, ordered within {ORDER_S} s. Tool 0.3 m, robot radius 0.18 m, 0.25 m/s, "
+    "1.5 s per quarter-turn.",
     add_options=_add_options,
     count=lambda args: len(_maps(args)) * (1 + len(args.peers)),
     measure=lambda args, say: measure(_maps(args), args.peers, args.installed, args.limit, say),

@@ -1,7 +1,7 @@
-"""Replans of a mission that drives a line over the floor of a large building, part by part.
+"""Time of each part of a replan, in a mission that drives a line over a large building.
 
-``benchmarks replan``: from a map on which something stands in the way, or stands there no more,
-to the line that goes round it; the processor time of each part of the mission that it takes.
+``benchmarks replan``: processor time of each part of the mission, from a map on which an obstacle
+has appeared or disappeared to the new line.
 """
 
 from __future__ import annotations
@@ -365,7 +365,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=_cells,
         default=[10_000],
         metavar="CELLS",
-        help="of the generated buildings (default: 10000; there are goals for 100000, too)",
+        help="cells of the generated buildings (default: 10000; there are goals for 100000, too)",
     )
     parser.add_argument(
         "--cases", nargs="+", choices=CASES, default=list(CASES), help="(default: all)"
@@ -377,10 +377,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 REPLAN = Benchmark(
     name="replan",
-    summary="replans of a line over the floor of a large building, part by part",
-    description="Let a robot that knows a generated building drive its line, put a crate near it "
-    "or take it away again, and time what the mission does from the map to the line that goes "
-    "round it: processor time of one thread, by part.",
+    summary="time of each part of a replan, on the floor of a large building",
+    description="Let a robot with the map of a generated building drive its line; put a crate near "
+    "it, or take it away again. Measure the processor time of each part of the mission, on one "
+    "thread, from the changed map to the new line.",
     add_options=_add_options,
     count=lambda args: len(args.cells) * len(args.cases) * args.replans,
     measure=lambda args, say: measure(args.cells, args.cases, args.replans, say),

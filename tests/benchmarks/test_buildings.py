@@ -1,4 +1,4 @@
-"""Synthetic buildings: of the size asked for, connected, alike at every scale, repeatable."""
+"""Synthetic buildings have the requested size, are connected, similar at all scales, repeatable."""
 
 import numpy as np
 import pytest

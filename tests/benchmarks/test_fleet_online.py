@@ -1,4 +1,4 @@
-"""Fleets in unknown buildings are measured: against one robot, on the way, in each other's way."""
+"""Benchmark of fleets in unknown buildings: time against one robot's, progress, conflicts."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Lines over the floor of a small building, planned and driven, and what is said of them."""
+"""Benchmark of lines over the floor of a small building, planned and driven; its report."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What a full plan begins from is measured: the same work, what is kept."""
+"""Benchmark of full plans by their first walk: equal work, and the kept part of the path."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The judge of walks: what it must catch, forgive and count."""
+"""Judge of walks: errors that it must find, walks that it must accept, and its counts."""
 
 import random
 from itertools import pairwise

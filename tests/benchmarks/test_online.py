@@ -1,4 +1,4 @@
-"""Missions in buildings that a robot does not know: what it sees, drives and is told of it."""
+"""Benchmark of missions in unknown buildings: maps that the robot sees, its path, its report."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""Lines of others' planners beside ours, in a small room, and peers that cannot be had."""
+"""Comparison with foreign planners in a small room; peers that cannot be installed."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Walks side by side, and the pheromone, show what they are given, where it is."""
+"""Pictures of walks and pheromone show their input at the right places."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Walks judged, others' results read, goals drawn from runs; and the whole benchmark, small."""
+"""Benchmark of quality: judged walks, other planners' results, goals, and a small run."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Replans part by part, on a small building."""
+"""Benchmark of replans by parts, in a small building."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The benchmark of rooms in its short form, and its judge."""
+"""Benchmark of rooms in its short form, and its judge."""
 
 import json
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Table I is measured, summed up, judged and written down."""
+"""Benchmark of Table I: measurement, figures, judgement and page of results."""
 
 import argparse
 import json

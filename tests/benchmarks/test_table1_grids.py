@@ -1,4 +1,4 @@
-"""Grids made of the authors' maps: cells by their rule, and the two of Table I known again."""
+"""Grids from the authors' maps: cells by their rule, and the two grids of Table I."""
 
 import json
 

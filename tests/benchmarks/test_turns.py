@@ -1,4 +1,4 @@
-"""The benchmark of walks where turns cost, small; its report and its complaints."""
+"""Benchmark of walks with costly turns: a small run, its report and its errors."""
 
 import json
 

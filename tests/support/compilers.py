@@ -1,4 +1,4 @@
-"""The kernel compiler of a few small kernels, run as a process of its own."""
+"""Kernel compiler of a few small kernels, as a separate process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fasaco_edge.planners.compiling import MODULE
 from fasaco_edge.planners.stages import WALKS
 from tests.support.processes import ENVIRONMENT
 
-# It compiles within seconds.
+# This stage compiles within seconds.
 STAGES = (WALKS,)
 COMPILE_S = 900.0
 
@@ -33,5 +33,5 @@ def compile_into(
 
 
 def why_not_whole(folder: Path) -> str:
-    """Return what a folder lacks of ``STAGES``, or holds beside them; "" for nothing."""
+    """Return the missing kernels of ``STAGES``, or the temporary files, in a folder; "" if none."""
     return why_missing(folder, STAGES) or ", ".join(file.name for file in folder.glob("*.tmp.*"))

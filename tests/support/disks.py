@@ -1,4 +1,4 @@
-"""Small disks that fill."""
+"""Small disks, to test a full disk."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ import pytest
 
 @contextmanager
 def small_disk(folder: Path, size: str) -> Iterator[Path]:
-    """Mount a tmpfs of a size, as 24m, at ``folder``; yield that.
+    """Mount a tmpfs of a size, such as 24m, at ``folder``; yield the folder.
 
     Raises:
-        PermissionError: one may not.
+        PermissionError: this process has no right to mount.
     """
     mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
     if os.geteuid() != 0 or subprocess.run(mount, capture_output=True, check=False).returncode:
@@ -29,7 +29,7 @@ def small_disk(folder: Path, size: str) -> Iterator[Path]:
 
 
 def disk_fixture(size: str) -> Any:
-    """Return a fixture: a disk of a size; a test is skipped where none may be mounted."""
+    """Return a fixture: a disk of a size; it skips the test without the right to mount."""
 
     @pytest.fixture
     def disk(tmp_path: Path) -> Iterator[Path]:

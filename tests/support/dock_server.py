@@ -1,9 +1,9 @@
-"""A look-alike of Nav2's docking server, beside the controller server: docks and undocks a robot.
+"""Imitation of Nav2's docking server, which docks and undocks a robot.
 
-Written against opennav_docking's ``docking_server.cpp``; payloads by rosbags, no code of ours. It
-refuses what that would: a dock or a type that it does not know (901, 902), a robot that stands
-further from its staging pose than the approach can cover (905). A robot that is in the dock, or is
-not in it any more, ends the goal as aborted, with success and no code.
+It follows opennav_docking's ``docking_server.cpp``; rosbags encodes the payloads, without code of
+this project. Like the original it refuses an unknown dock (901) or type (902), and a robot too far
+from its staging pose (905). A goal to dock a docked robot, or to undock a robot that is not
+docked, ends as aborted, with success and no code.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ RESULTS = {
     "Dock": "bool success\nuint16 error_code\nuint16 num_retries\n",
     "Undock": "bool success\nuint16 error_code\n",
 }
-# The first Jazzy and Humble's package have no message.
+# Humble's package and the first release of Jazzy lack this member.
 MESSAGE = "string error_msg\n"
-# Of send_goal and get_result, by tests/wire/test_docking.py.
+# Type hashes of send_goal and get_result, computed in tests/wire/test_docking.py.
 HASHES = {
     "Dock": (
         "RIHS01_9e60155a1fb741109942c5c7dc21ae0e0db771eaf55d0cfc768bae57a95f3454",
@@ -45,12 +45,12 @@ HASHES = {
 }
 CANCEL_HASH = "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a"
 SPEED_M_S = 0.3
-# From further away the approach is not controlled.
+# Largest distance from the dock at which the approach starts [m].
 STAGED_M = 1.0
 
 
 def dock_store(move: str, *, with_message: bool = True) -> Any:
-    """Return rosbags' types with those of one of the actions."""
+    """Return rosbags' types, including those of one of the actions."""
     return action_store(GOALS[move], RESULTS[move] + (MESSAGE if with_message else ""))
 
 
@@ -62,7 +62,7 @@ class DockActionServer(ActionServer):
     def __init__(self, move: str, wanted: dict[str, Any], faults: Faults) -> None:
         self.move = move
         self.with_message = wanted.get("with_message", True)
-        # Humble has a package of its own.
+        # Humble uses another package.
         self.package = wanted.get("dock_package", "nav2_msgs")
         action = f"/{move.lower()}_robot"
         super().__init__(wanted["endpoint"], wanted["domain"], "jazzy", faults, action)
@@ -83,7 +83,7 @@ class DockActionServer(ActionServer):
     def _ended(self, handle: Handle | None) -> bytes:
         members: dict[str, Any] = {
             "status": handle.status if handle else 0,
-            # As a message is made; only what failed says that it did.
+            # The default of the message; only failures set it to False.
             "success": not handle.code if handle else True,
             "error_code": handle.code if handle else 0,
         }
@@ -97,8 +97,8 @@ class DockActionServer(ActionServer):
 class DockingServer:
     """Docks and undocks.
 
-    ``wanted["dock"]``: pose x, y, yaw of the robot in the dock; how far before it the staging pose
-    is; the type of the only plugin; how many attempts fail with 904 before one does not.
+    ``wanted["dock"]``: pose x, y, yaw of the robot in the dock; distance of the staging pose from
+    it [m]; type of the only plugin; number of first attempts that fail with 904.
     """
 
     def __init__(self, robot: Any, wanted: dict[str, Any], faults: Faults) -> None:
@@ -111,13 +111,13 @@ class DockingServer:
         self._servers = [DockActionServer(move, wanted, faults) for move in ("Dock", "Undock")]
 
     def close(self) -> list[str]:
-        """Go; return what was refused."""
+        """Close the servers; return what they refused."""
         for server in self._servers:
             server.close()
         return [why for server in self._servers for why in server.refused]
 
     def tick(self, dt: float) -> None:
-        """Move the robot as goals want."""
+        """Move the robot according to the goals."""
         for server in self._servers:
             for handle in (server.pending, server.current):
                 if handle is not None and handle.is_canceling:
@@ -157,7 +157,7 @@ class DockingServer:
         server.end(handle, ABORTED, code, text)
 
     def _move(self, server: DockActionServer, handle: Handle, dt: float) -> None:
-        """A step in, or backward out."""
+        """Drive a step into the dock, or backward out of it."""
         robot, goal = self.robot, handle.message
         x, y = self.x, self.y
         if server.move == "Undock":

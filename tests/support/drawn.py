@@ -10,7 +10,7 @@ from tests import naive
 
 
 def ground(steps: NDArray[np.uint8], free: NDArray[np.bool_]) -> list[Cell]:
-    """Return the cells (row, col) that steps lead to from the first free one, in order."""
+    """Return the cells (row, col) that steps connect with the first free cell, in order."""
     if not free.any():
         return []
     row, col = np.argwhere(free)[0].tolist()

@@ -1,7 +1,7 @@
-"""A base and its daemon's side of the bus, for a follower in a process of its own.
+"""Base of a robot and its daemon on the bus, to test a follower in a separate process.
 
-The base moves as the velocities say, publishes its pose, and notes when each velocity came.
-``python -m tests.support.driven_base ENDPOINT`` is a daemon that plans, and does nothing else.
+The base moves by the velocities, publishes its pose, and records when it receives each velocity.
+``python -m tests.support.driven_base ENDPOINT`` imitates only a daemon's token and status.
 """
 
 from __future__ import annotations
@@ -36,26 +36,26 @@ from fasaco_edge.wire.schemas import TWIST
 from tests.support.processes import ENVIRONMENT, PROGRAM, free_endpoint
 from tests.support.waiting import until
 
-# Whoever has not stopped by then will not [s].
+# Time within which a follower has to stop [s].
 LONGEST_S = 5.0
 POSE_S = 0.05
 
 
 class DrivenBase:
-    """A base without inertia, beside a token and a status as of a daemon that plans."""
+    """A base without inertia, with the token and the status of a planning daemon."""
 
     def __init__(self, secured: Mapping[str, Any] | None = None) -> None:
         self.endpoint = free_endpoint()
         self.keys = Keys()
         self.bus = open_bus(BusSettings("router", (), (self.endpoint,), secured or {}))
-        # When each velocity came [s, monotonic], and what it was.
+        # The velocities received, each with its time [s, monotonic].
         self.heard: list[tuple[float, Command]] = []
         self.pose = Pose2D(0.0, 0.0)
         self.frame = "map"
-        # The state that the daemon says, and its Zenoh id.
+        # The state that the daemon reports, and its Zenoh id.
         self.state, self.daemon = "covering", "a1"
         self.says_poses = self.says_status = True
-        # Whether a second daemon waits, and says so.
+        # Whether a second daemon waits, and publishes its status.
         self.has_second = False
         self.last_pose_at = 0.0
         self._path = self.bus.advertise(self.keys, topics.PATH)
@@ -69,13 +69,13 @@ class DrivenBase:
         self._thread.start()
 
     def take_ros(self, domain: int) -> None:
-        """Move as ROS 2 velocities say, and publish poses there, too."""
+        """Move by ROS 2 velocities, and publish poses there, too."""
         self.bus.subscribe(f"{domain}/cmd_vel/**", self._hear)
         key = f"{domain}/pose/geometry_msgs::msg::dds_::PoseStamped_/RIHS01_0"
         self._ros_pose = self.bus.publisher(key, "")
 
     def plans(self, yes: bool = True, name: str = "a1") -> None:
-        """Have the token of a daemon that plans, or not."""
+        """Declare the token of a planning daemon; withdraw it if ``yes`` is False."""
         if self._token is not None:
             self.bus.withdraw(self._token)
             self._token = None
@@ -86,19 +86,19 @@ class DrivenBase:
     def send_path(
         self, *points: tuple[float, float], frame: str = "map", of: str | None = None
     ) -> float:
-        """Publish a path of this daemon, or of another, "" for none; return when."""
+        """Publish a path of this daemon, or of daemon ``of``, "" for none; return the time [s]."""
         xy = np.array(points, np.float64).reshape(-1, 2)
         about = b"" if of == "" else named(of or self.daemon)
         self._path.put(encode_path(xy, np.zeros(len(xy)), frame, 1), about)
         return time.monotonic()
 
     def send_raw_path(self, payload: bytes) -> float:
-        """Publish bytes as a path; return when."""
+        """Publish bytes as a path; return the time [s]."""
         self._path.put(payload, named(self.daemon))
         return time.monotonic()
 
     def send_raw_pose(self, payload: bytes) -> float:
-        """Publish bytes as a pose; return when."""
+        """Publish bytes as a pose; return the time [s]."""
         self._pose.put(payload)
         return time.monotonic()
 
@@ -109,14 +109,14 @@ class DrivenBase:
         return None
 
     def wait_until_it_moves(self) -> None:
-        """Wait for a velocity that is none of standing."""
+        """Wait for a velocity above zero."""
         until(
             lambda: (newest := self.newest()) and newest.speed >= 0.1,
             why=lambda: f"it does not move; {self.heard[-1:]}",
         )
 
     def stopped_after(self, since: float) -> float:
-        """Return how long after ``since`` the base was told to stand, for good [s]."""
+        """Return the time from ``since`` to the final command to stand [s]; infinity for none."""
         until = since + 0.4
         while True:
             time.sleep(max(until - time.monotonic(), 0.01))
@@ -186,7 +186,7 @@ def follower_process(
 
 
 def daemon_that_only_plans(endpoint: str) -> Bus:
-    """Return a session with the token of a daemon, which has said something."""
+    """Return a session with the token of a daemon, after its first status."""
     bus = open_bus(BusSettings("client", (endpoint,)))
     keys = Keys()
     status = bus.advertise(keys, topics.STATUS)
@@ -196,7 +196,7 @@ def daemon_that_only_plans(endpoint: str) -> Bus:
 
 
 def main() -> None:
-    """Be a daemon until killed; say "plans" once it does."""
+    """Imitate a daemon until killed; print "plans" once it plans."""
     bus = daemon_that_only_plans(sys.argv[1])
     status = bus.advertise(Keys(), topics.STATUS)
     print("plans", flush=True)

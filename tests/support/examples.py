@@ -1,4 +1,4 @@
-"""The number of examples Hypothesis tries: a share of what each test names, or all, or more."""
+"""Number of Hypothesis's examples: a share, or a multiple, of the number that a test gives."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Any
 
 from hypothesis import HealthCheck, settings
 
-# `make test` tries a quarter, others each time; `make properties` four times as many as named.
+# `make test` tries a quarter of the number; `make properties` four times the number.
 SHARE = float(os.environ.get("EXAMPLES", "0.25"))
-# Whether kernels run in plain Python, which takes many times as long.
+# Whether kernels run in plain Python, many times slower.
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT") == "1"
 if PLAIN:
     SHARE = min(SHARE, 0.1)
-# What Hypothesis tries of itself.
+# Hypothesis's default number.
 MOST = 100
 
 
 def examples(most: int, **others: Any) -> settings:
-    """Try ``most`` examples in the full run, and a share of them, 8 at least, in the suite.
+    """Try ``most`` examples in the full run; in the suite a share of them, but at least 8.
 
-    None has a deadline, nor a limit on the time that inputs take: the first may compile a kernel,
-    or read it from the cache, and a busy machine is slow.
+    Examples have no time limit: the first may compile a kernel or read it from the cache, and a
+    busy machine is slow.
     """
     count = max(round(SHARE * most), min(most, 8))
     suppressed = [HealthCheck.too_slow, *others.pop("suppress_health_check", ())]

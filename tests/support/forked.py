@@ -1,13 +1,12 @@
-"""Interpreters forked off a server that has numba: half a second of processor time less each.
+"""Interpreters forked off a server that has imported numba, which saves 0.5 s of processor time.
 
-They have imported nothing of the package before their program runs: which kernels, cache and
-settings they have is up to that, as in an interpreter that was started. A command of the package
-in the tests' own environment is forked off a second server, which has loaded the kernels, too: a
-daemon with a map takes as long for that as for all else. What it costs to start a process, and
-what it has in memory, neither can tell.
+A forked interpreter has imported nothing of the package, so its program decides on kernels, cache
+and settings, as in a started interpreter. Commands of the package in the tests' environment are
+forked off a second server, which has also loaded the kernels: this halves the time of a daemon with
+a map. Do not measure start times or memory of forked processes.
 
-``python FILE DESCRIPTOR`` is a server, with ``--kernels`` the second: for each task that comes it
-forks a process, and tells by the pipe that came along its process id, and how it ended.
+``python FILE DESCRIPTOR`` is a server, with ``--kernels`` the second one. For each task it forks a
+process, and sends the process id, and later the exit code, through the pipe of the task.
 """
 
 from __future__ import annotations
@@ -33,29 +32,28 @@ from importlib import import_module
 from pathlib import Path
 from typing import NoReturn
 
-# Found from any folder, installed or not.
+# The package is importable from any folder, installed or not.
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
 PRELOADED = ("numba", "llvmlite.binding", "msgspec", "yaml")
-# Neither Zenoh nor Rerun: by them a command decides how it ends.
+# Without Zenoh and Rerun: a command ends differently if these are imported.
 LOADED = ("fasaco_edge.planners.compiling", "fasaco_edge.daemon.loop.mission_runner")
 NUMBER = struct.Struct("i")
-# What a service manager gives a daemon.
+# Variables that a service manager sets for a daemon.
 OF_MANAGER = ("NOTIFY_SOCKET", "WATCHDOG_USEC")
-# Of a task, which holds words and an environment.
+# Limit on a task: its words and its environment.
 MOST_BYTES = 1 << 20
 
 
 class Forked:
-    """A forked process, with what tests use of ``subprocess.Popen``.
+    """A forked process, with the methods of ``subprocess.Popen`` that tests use.
 
     Args:
-        words: a command line, as ``python`` takes it: "-c" and code, or "-m", a module and words.
-        environment: all of its environment.
-        out, err: files that its outputs are written to.
-        folder: its working folder; without one, this process's.
-        umask: -1 leaves it as it is.
-
-    A terminal as ``out`` and ``err`` is that of a session of its own, and its input, too.
+        words: arguments of ``python``: "-c" and code, or "-m", a module and words.
+        environment: its whole environment.
+        out, err: files for its outputs. A terminal becomes its input, too, and the terminal of its
+            own session.
+        folder: its working folder; by default that of this process.
+        umask: its umask; -1 for that of this process.
     """
 
     def __init__(
@@ -80,7 +78,7 @@ class Forked:
         self._lock = threading.Lock()
 
     def poll(self) -> int | None:
-        """Return its exit code, of a signal its number, negative; or None while it runs."""
+        """Return its exit code, or minus the number of its signal; None while it runs."""
         with self._lock:
             if self.returncode is None and select.select([self._news], [], [], 0.0)[0]:
                 self.returncode = self._told()
@@ -122,7 +120,7 @@ def run_forked(
     folder: str | None = None,
     umask: int = -1,
 ) -> tuple[int, str, str]:
-    """Run a program to its end; return its exit code, and what it said on both outputs."""
+    """Run a program to its end; return its exit code, and the texts of both outputs."""
     with tempfile.TemporaryDirectory() as outputs:
         out, err = Path(outputs, "out"), Path(outputs, "err")
         process = Forked(words, environment, out, err, folder, umask)
@@ -131,12 +129,12 @@ def run_forked(
         finally:
             process.kill()
             process.wait()
-        # As it was written: reading text would make of a carriage return the end of a line.
+        # Not read as text, which would replace carriage returns.
         return code, out.read_bytes().decode(), err.read_bytes().decode()
 
 
 def _settings(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return what may decide which kernels a process has."""
+    """Return the variables that may change the kernels of a process."""
     others = ("COLUMNS", "NO_COLOR", "TERM", "COLORTERM", *OF_MANAGER)
     return {k: v for k, v in environment.items() if k[:7] != "FASACO_" and k not in others}
 
@@ -150,7 +148,7 @@ def _has_kernels(words: tuple[str, ...], environment: Mapping[str, str]) -> bool
 
 @functools.cache
 def _server(has_kernels: bool) -> socket.socket:
-    """Return a way to a server, which ends with this process."""
+    """Return a socket to a server, which ends with this process."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_BYTES)
     with theirs:
@@ -169,7 +167,7 @@ def _server(has_kernels: bool) -> socket.socket:
 
 
 def _load_kernels() -> None:
-    """Import what most commands do, and load all kernels, or compile what is missing."""
+    """Import what most commands import; load all kernels, and compile missing ones."""
     before = sys.path[:]
     sys.path.insert(0, os.environ["PYTHONPATH"])
     for name in LOADED:
@@ -179,8 +177,8 @@ def _load_kernels() -> None:
 
 
 def _serve(tasks: socket.socket) -> None:
-    """Fork a process for each task, until nobody sends any."""
-    # What is there stays: no process looks it through for garbage, and has a copy of it for that.
+    """Fork a process for each task, until the sender closes its socket."""
+    # Garbage collection of forked processes skips present objects, whose memory stays shared.
     gc.freeze()
     woken, wakes = socket.socketpair()
     wakes.setblocking(False)
@@ -226,19 +224,19 @@ def _run(
     folder: str,
     umask: int,
 ) -> NoReturn:
-    """Become what ``python`` would be with those words, in that folder and environment."""
+    """Run like ``python`` with these words, in this folder and environment."""
     is_terminal = outputs[0].startswith("/dev/pts/")
     if is_terminal:
         os.setsid()
     for descriptor, file in enumerate(outputs, start=1):
-        # The first terminal that the leader of a session opens becomes the session's.
+        # The first terminal that a session's leader opens becomes the terminal of the session.
         flags = os.O_RDWR if is_terminal else os.O_WRONLY | os.O_CREAT | os.O_APPEND
         opened = os.open(file, flags, 0o600)
         os.dup2(opened, descriptor)
         os.close(opened)
     if is_terminal:
         os.dup2(1, 0)
-        # The streams of the server are those of files: they would write after large blocks only.
+        # The server's streams are made for files, and would write in large blocks.
         sys.stdin = os.fdopen(0, closefd=False, encoding="utf-8")
         sys.stdout = os.fdopen(1, "w", closefd=False, encoding="utf-8")
         sys.stderr = os.fdopen(2, "w", closefd=False, encoding="utf-8", errors="backslashreplace")
@@ -270,7 +268,7 @@ def _ended(words: tuple[str, ...]) -> int:
         traceback.print_exc()
         code = 1
     threading._shutdown()
-    # A process that ends so does not do it by itself.
+    # ``os._exit`` does not run these.
     atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -278,7 +276,7 @@ def _ended(words: tuple[str, ...]) -> int:
 
 
 if __name__ == "__main__":
-    # Neither this file's folder nor what the tests import is on the path of a program.
+    # A started program has neither this file's folder nor the tests' imports on its path.
     ours = {str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)}
     sys.path[:] = [entry for entry in sys.path if entry not in ours]
     for name in PRELOADED:

@@ -15,7 +15,7 @@ from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from tests import naive
 
-# The paper's own grids are not ours to ship: looked for beside the checkout.
+# The paper's grids must not be shipped with this project; they may lie beside the checkout.
 BESIDE = Path(__file__).parents[3] / "shared" / "reference"
 REFERENCE = Path(os.environ.get("FASACO_REFERENCE", BESIDE))
 
@@ -68,7 +68,7 @@ ENDS = st.one_of(st.sampled_from(("anywhere", "home")), st.integers(0, 80))
 
 
 def end_of(drawn, lattice, start):
-    """The end as a problem has it."""
+    """Return the ``end`` of a problem for a value of ``ENDS``."""
     if drawn == "anywhere":
         return None
     if drawn == "home":
@@ -79,7 +79,7 @@ def end_of(drawn, lattice, start):
 
 
 def reference(name):
-    """A grid of the paper as (lattice, start), or None where it is not at hand."""
+    """A grid of the paper as (lattice, start); None if it is not beside the checkout."""
     grid, about = REFERENCE / f"{name}.npy", REFERENCE / f"{name}.json"
     if not grid.exists():
         return None
@@ -108,7 +108,7 @@ ROOMS = {
 }
 
 
-# 45 and 30 degrees put pixel corners on cell borders; the rest are as they come.
+# 45 and 30 degrees put pixel corners on cell borders; other angles are random.
 YAWS = st.one_of(
     st.sampled_from([0.0, math.pi / 2, math.pi, -math.pi / 4, math.pi / 6]),
     st.floats(-math.pi, math.pi),
@@ -124,7 +124,7 @@ def grid(cells, resolution=0.1, x=0.0, y=0.0, yaw=0.0):
 
 @st.composite
 def occupancy_grids(draw, max_side=14):
-    """A map of 0x0 up to max_side pixels, mostly free, placed and turned somewhere."""
+    """A map of 0x0 up to max_side pixels, mostly free, at a random pose."""
     rows, cols = draw(st.integers(0, max_side)), draw(st.integers(0, max_side))
     random = np.random.default_rng(draw(st.integers(0, 2**32)))
     walls = draw(st.sampled_from([0.0, 0.02, 0.1]))
@@ -143,7 +143,7 @@ def footprints(draw, resolution):
 
 
 def cropped(grid, row0, col0, row1, col1):
-    """The same map, of which less has been seen: another size and origin."""
+    """A part of a map, with its own size and origin, as if less had been seen."""
     geometry = grid.geometry
     x, y = geometry.to_map(col0, row0)
     part = GridGeometry(
@@ -153,7 +153,7 @@ def cropped(grid, row0, col0, row1, col1):
 
 
 def on_raster(geometry):
-    """The same grid where its raster has it: off by less than rounding to float32 may be."""
+    """A grid moved onto its raster, by less than the rounding of float32."""
     raster, window = geometry.on_raster()
     right, up = window.col0 + raster.right, window.row0 + raster.up
     corner = GridGeometry(0, 0, raster.resolution, Pose2D(0, 0, raster.yaw)).to_map(right, up)
@@ -163,7 +163,7 @@ def on_raster(geometry):
 
 
 def repainted(draw, occupancy):
-    """Some pixels have got other values; of the same meaning or not."""
+    """A map with other values in some pixels, with the same or another meaning."""
     cells = occupancy.cells.copy()
     random = np.random.default_rng(draw(st.integers(0, 2**32)))
     share = draw(st.sampled_from([0.0, 0.005, 0.05, 1.0]))
@@ -172,7 +172,7 @@ def repainted(draw, occupancy):
 
 
 def part_of(draw, whole):
-    """As much of the building as has been seen."""
+    """A random part of a map, as if only this part had been seen."""
     rows, cols = whole.cells.shape
     row0, row1 = sorted(draw(st.tuples(st.integers(0, rows), st.integers(0, rows))))
     col0, col1 = sorted(draw(st.tuples(st.integers(0, cols), st.integers(0, cols))))
@@ -180,7 +180,7 @@ def part_of(draw, whole):
 
 
 def displaced(draw, occupancy):
-    """The map lies elsewhere, or is turned, or is told in other pixels."""
+    """A map moved, rotated, or on other pixels."""
     geometry, origin = occupancy.geometry, occupancy.geometry.origin
     pixels = draw(st.sampled_from([3.0, -2.0, 1000.0, 0.5, 0.37, 1e-5]))
     match draw(st.sampled_from(["along x", "along y", "turned", "scaled"])):
@@ -198,7 +198,7 @@ def displaced(draw, occupancy):
 
 
 def assert_answers(problem, path):
-    """The walk begins at the start, makes legal steps only and visits all it is asked to."""
+    """Check that the walk begins at the start, makes legal steps, and visits all cells to cover."""
     ground = problem.lattice
     walk = [ground.local(cell) for cell in path.cells.tolist()]
     around = naive.neighbours(ground.steps)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-# A segment runs along the lanes if it is turned against them by no more than this [deg].
+# Largest angle between a segment along the lanes and the lanes [deg].
 ALONG_DEG = 15.0
 
 

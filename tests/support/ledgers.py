@@ -1,4 +1,4 @@
-"""Ledgers for tests, and what they hold."""
+"""Ledgers for tests, and their content."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from fasaco_edge.mission.coverage.ledger import TILE, CoverageLedger, LedgerSnap
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 
 CELL_M = 0.3
-# The newest and the one before.
+# File names of the newest and the previous ledger.
 NAMES = ("robot.ledger", "robot.ledger.previous")
 Cell = tuple[int, int]
 
 
 def driven(*cells: Cell, cell_m: float = CELL_M, frame: str = "map") -> LedgerSnapshot:
-    """Return the ledger of a robot that stood in one cell (row, col) after the other."""
+    """Return the ledger of a robot that visited cells (row, col) in this order."""
     ledger, floor = CoverageLedger(cell_m, frame), SweptFloor(cell_m)
     for row, col in cells:
         pose = Pose2D((col + 0.5) * cell_m, (row + 0.5) * cell_m)
@@ -34,7 +34,7 @@ def lane(length: int) -> LedgerSnapshot:
 
 
 def visits_of(ledger: LedgerSnapshot) -> dict[Cell, int]:
-    """Return how often each visited cell (row, col) was visited."""
+    """Return the number of visits of each visited cell (row, col)."""
     return {
         (int(row) + TILE * i, int(col) + TILE * j): int(tile[row, col])
         for (i, j), tile in ledger.tiles.items()
@@ -43,7 +43,7 @@ def visits_of(ledger: LedgerSnapshot) -> dict[Cell, int]:
 
 
 def contents(ledger: LedgerSnapshot | None) -> object:
-    """Return all that a ledger holds, to be compared."""
+    """Return the content of a ledger in a comparable form."""
     if ledger is None:
         return None
     swept = {place: tile.tobytes() for place, tile in ledger.floor.tiles.items()}
@@ -52,7 +52,7 @@ def contents(ledger: LedgerSnapshot | None) -> object:
 
 
 def load(folder: Path) -> LoadedLedger:
-    """Return what a daemon finds that starts now."""
+    """Return the ledger that a starting daemon loads from a folder."""
     return LedgerFile(folder, "robot").load(CELL_M)
 
 

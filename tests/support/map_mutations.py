@@ -1,4 +1,4 @@
-"""Payloads that are nearly messages: good ones damaged until no decoder should take them."""
+"""Damaged messages, which every decoder should refuse."""
 
 from __future__ import annotations
 
@@ -22,15 +22,14 @@ REFUSES: dict[str, Callable[[bytes], object]] = {
     "map_update": decode_map_update,
     "pose": lambda payload: decode_pose(payload, POSE_STAMPED),
 }
-# Most of a map is cells, where little can go wrong: half of the damage is done before them.
+# Half of the damage is done in the head: the cells, most of a map, have few invalid values.
 HEAD_BYTES = 96
 
 
 def mutant(rng: random.Random, kind: str) -> bytes:
-    """Return a damaged message of a kind that our decoder refuses.
+    """Return a damaged message of a kind.
 
-    Some damage leaves a valid message, a map with another wall, say: those are not
-    returned, since a daemon is right to follow them.
+    Damage that leaves a valid message, for example a map with another wall, is discarded.
     """
     while True:
         payload = rng.choice((_nearly, _nearly, _nothing_like))(rng, kind)
@@ -39,14 +38,14 @@ def mutant(rng: random.Random, kind: str) -> bytes:
 
 
 def _nearly(rng: random.Random, kind: str) -> bytes:
-    """Return a message of that kind, damaged once or a few times."""
+    """Return a message of this kind, damaged at one or a few places."""
     good = GOOD[kind]
     head = rng.choice((HEAD_BYTES, len(good)))
     return mutations.mutant(rng, [good[:head]]) + good[head:]
 
 
 def _nothing_like(rng: random.Random, kind: str) -> bytes:
-    """Return nothing, noise, noise behind a header of CDR, or some whole message."""
+    """Return nothing, noise, noise after a CDR header, or a valid message of any kind."""
     noise = rng.randbytes(rng.choice((1, 4, 40, 400, 100_000)))
     return rng.choice((b"", noise, b"\0\1\0\0" + noise, GOOD[rng.choice(sorted(GOOD))]))
 

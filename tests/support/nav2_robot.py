@@ -1,11 +1,11 @@
-"""A robot that Nav2's controller drives, by a look-alike of its controller server.
+"""Robot driven by an imitation of Nav2's controller server.
 
 ``python -m tests.support.nav2_robot JSON``: endpoint, domain (null behind a bridge), release, start
-(x, y [m]), and what goes wrong. Publishes its pose; prints what it did, as JSON, once its standard
-input ends. Controller as nav2_regulated_pure_pursuit_controller: it goes on at the pose of the path
-that is nearest, within half a costmap, and turns at the goal to its heading; goal checker as
-SimpleGoalChecker, stateful; progress checker as SimpleProgressChecker. The figures are those of
-deploy/turtlebot.md.
+(x, y [m]), and faults. It publishes its pose, and prints its record as JSON once its standard input
+ends. The controller imitates nav2_regulated_pure_pursuit_controller: it continues at the nearest
+pose of the path within half a costmap, and turns to the goal's heading at the goal. The goal
+checker imitates SimpleGoalChecker (stateful), the progress checker SimpleProgressChecker. Their
+parameters are those of deploy/turtlebot.md.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ class Nav2Robot:
         self.x, self.y = wanted["start"]
         self.yaw = 0.0
         self.driven_m = 0.0
-        # Between goals, not counting what follows an abort, a restart or the last goal.
+        # Pauses between goals, except after an abort, a restart or the last goal.
         self.standing_s = self.driving_s = self._idle_s = 0.0
         self._counts_idle = False
-        # Of each pause between goals: where the goal ended, how long before it the robot came how
-        # near to that; how long the pause was, how long before it the next goal was asked for, and
-        # how long that was under way.
+        # For each pause between goals: end of the driven path; distances from this end, each with
+        # the time before the pause; duration; time from the request of the next goal to the pause;
+        # delay of this request.
         self.pauses: list[dict[str, Any]] = []
         self._ended: dict[str, Any] = {}
         self._approach = deque[tuple[float, float]](maxlen=100)
@@ -66,7 +66,7 @@ class Nav2Robot:
         self._server = self._serve()
         self._docks = DockingServer(self, wanted, self._faults()) if "dock" in wanted else None
         self._path: list[tuple[float, float]] = []
-        # Heading of the goal, and whether the robot has come to its place.
+        # Heading of the goal, and whether the robot has reached its position.
         self._end_yaw, self._is_there = 0.0, False
         self._progress = (0.0, 0.0, 0.0)
         self._session = open_session(wanted["endpoint"])
@@ -84,7 +84,7 @@ class Nav2Robot:
         while not stop.wait(PERIOD_S):
             now = time.monotonic()
             dt, last = min(now - last, 0.2), now
-            # None is made up for: each goal would be aborted as it begins.
+            # Without a goal, an abort is skipped: later it would abort a goal at its start.
             abort = now >= next_abort and self._server.current is not None
             if now >= next_abort:
                 next_abort = self._after("abort_every_s")
@@ -105,7 +105,7 @@ class Nav2Robot:
 
     def _faults(self) -> Faults:
         wanted = self.wanted
-        # Started anew, it would lose the same replies again: the first one of each start, say.
+        # With the same seed, each start would lose the same replies.
         seed = wanted.get("seed", 0) + 1000 * self.restarts
         return Faults(wanted.get("delay_s", 0.0), wanted.get("lost", 0.0), seed)
 
@@ -165,7 +165,7 @@ class Nav2Robot:
             self._ended = {"end": self._path[-1], "at": now, "approach": list(self._approach)}
 
     def _begin(self, handle: Handle, now: float) -> None:
-        """Check what the controller server checks of a goal."""
+        """Check a goal as the controller server does, and begin it."""
         goal = handle.message
         if goal.controller_id not in ("", "FollowPath"):
             self._abort(handle, 101, f"no controller {goal.controller_id}")
@@ -220,7 +220,7 @@ class Nav2Robot:
         del path[:nearest]
         carrot = next((p for p in path if math.dist(here, p) >= LOOK_AHEAD_M), path[-1])
         turn = self._turn(math.atan2(carrot[1] - self.y, carrot[0] - self.x), dt)
-        # On the spot, as with use_rotate_to_heading.
+        # Large turns are made on the spot, as with use_rotate_to_heading.
         step = self.wanted.get("speed", 1.0) * dt if abs(turn) < 0.785 else 0.0
         step = min(step, math.dist(here, carrot))
         self.x += step * math.cos(self.yaw)
@@ -230,7 +230,7 @@ class Nav2Robot:
             self.trail.append((self.x, self.y))
 
     def _turn(self, yaw: float, dt: float) -> float:
-        """Turn towards a heading; return by how much it was away."""
+        """Turn towards a heading; return the angle to it before the turn [rad]."""
         turn = math.remainder(yaw - self.yaw, math.tau)
         most = TURN_RAD_S * dt
         self.yaw += min(max(turn, -most), most)

@@ -1,9 +1,9 @@
-"""A look-alike of the action server in Nav2's controller: plain Zenoh, payloads by rosbags.
+"""Imitation of the action server in Nav2's controller, without code of this project.
 
-Written against rmw_zenoh_cpp (rmw_service_data.cpp), rcl_action (goals, results) and
-nav2_util/nav2_ros_common (SimpleActionServer: one goal is driven, one waits, a third takes the
-place of that); no code of ours. It refuses what they would: a request without attachment, or with
-a number that came before, or that cannot be deserialised, gets no answer.
+It uses plain Zenoh and payloads by rosbags. It follows rmw_zenoh_cpp (rmw_service_data.cpp),
+rcl_action (goals, results) and nav2_util/nav2_ros_common (SimpleActionServer: one goal is driven,
+one waits, and a third replaces the waiting goal). Like these, it does not answer a request without
+attachment, with a repeated number, or that cannot be deserialised.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ RESULTS = {
     "jazzy": "uint16 error_code\nstring error_msg\n",
     "lyrical": "uint16 error_code\nstring error_msg\n",
 }
-# Of the three services' types, by tests/wire/test_ros_actions.py; Humble has none.
+# Type hashes of the three services, computed in tests/wire/test_ros_actions.py; Humble has none.
 HASHES = {
     "jazzy": (
         "RIHS01_5b662aee1159e1d7e7b5f8fef21f556b8bc67c818c730a68e18bb29b85f66946",
@@ -54,14 +54,14 @@ RESULT_KEPT_S = 10.0
 
 
 def store_of(release: str) -> Any:
-    """Return rosbags' types with those of the action."""
+    """Return rosbags' types, including those of the action."""
     names = "".join(f"string {name}\n" for name in PATH_IDS[release])
     result = f"std_msgs/Empty result\n{RESULTS[release]}"
     return action_store(f"nav_msgs/Path path\n{names}", result)
 
 
 def action_store(goal: str, result: str) -> Any:
-    """Return rosbags' types with those of an action, by the members of its goal and result."""
+    """Return rosbags' types, including those of an action with these members of goal and result."""
     store = get_typestore(Stores.ROS2_JAZZY)
     definitions = {
         "Send": f"unique_identifier_msgs/UUID goal_id\n{goal}",
@@ -78,7 +78,7 @@ def action_store(goal: str, result: str) -> Any:
 
 @dataclass
 class Faults:
-    """What goes wrong: how long requests and replies take [s], what share of replies is lost."""
+    """Faults: largest delay of requests and replies [s]; share of replies that are lost."""
 
     delay_s: float = 0.0
     lost: float = 0.0
@@ -87,7 +87,7 @@ class Faults:
 
 @dataclass
 class Handle:
-    """A goal as the server has it."""
+    """A goal on the server."""
 
     id: bytes
     message: Any
@@ -96,14 +96,14 @@ class Handle:
     ended_at: float = 0.0
     code: int = 0
     text: str = ""
-    # When its request was sent, as good as, and how long it took from then on [s].
+    # Time of its request, and delay until the goal was accepted [s].
     asked_at: float = 0.0
     delay_s: float = 0.0
     waiting: list[tuple[Any, bytes]] = field(default_factory=list)
 
 
 class ActionServer:
-    """The services of ``follow_path``, and which goal is to be driven; others as subclasses."""
+    """The services of ``follow_path``, and the present goal; subclasses serve other actions."""
 
     node = "controller_server"
 
@@ -150,18 +150,18 @@ class ActionServer:
         return store_of(release)
 
     def services(self, release: str) -> tuple[Any, Any]:
-        """Return calls with their types, and hashes."""
+        """Return the calls with their types, and the type hashes."""
         return TYPES, HASHES[release]
 
     def close(self) -> None:
-        """Go, as a process that ends; goals are forgotten."""
+        """Close, as a process does when it ends; goals are lost."""
         for declared in self._declared:
             declared.undeclare()
         self._declared.clear()
         self._session.close()  # type: ignore[no-untyped-call]
 
     def end(self, handle: Handle, status: int, code: int = 0, text: str = "") -> None:
-        """End a goal; who waits for its result gets it."""
+        """End a goal; send its result to all clients that wait for it."""
         with self.lock:
             handle.status, handle.code, handle.text = status, code, text
             handle.ended_at = time.monotonic()
@@ -174,7 +174,7 @@ class ActionServer:
             self._reply(query, self._ended(handle), beside)
 
     def accept_pending(self) -> Handle:
-        """Drive the goal that waits; the one before ends as aborted, without a code."""
+        """Drive the waiting goal; the previous goal ends as aborted, without a code."""
         with self.lock:
             assert self.pending is not None
             before, self.current, self.pending = self.current, self.pending, None
@@ -196,13 +196,13 @@ class ActionServer:
         def work() -> None:
             try:
                 answer(query, request, beside, asked_at)
-            except Exception as error:  # whatever rosbags raises: it cannot be deserialised
+            except Exception as error:  # rosbags cannot deserialise the request
                 self.refused.append(f"{key}: {error!r}")
 
         self._after(work)
 
     def _is_taken(self, beside: bytes) -> bool:
-        """Take the attachment apart as rmw_zenoh does."""
+        """Check the attachment as rmw_zenoh does."""
         if len(beside) != 33 or beside[16] != 16:
             self.refused.append(f"attachment {beside.hex()}")
             return False
@@ -278,9 +278,9 @@ class ActionServer:
                     query.reply(str(query.key_expr), payload, attachment=beside or None)
                     query.drop()
                 except zenoh.ZError:
-                    return  # the server is gone, or who asked
+                    return  # the server or the client has closed
             else:
-                LOST.append(query)  # it never ends: the other side waits as long as it wants
+                LOST.append(query)  # kept, so that it never ends, and the client waits
 
         self._after(reply)
 

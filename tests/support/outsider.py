@@ -1,6 +1,6 @@
-"""A program of somebody else on the bus: plain Zenoh, payloads by rosbags, no code of ours.
+"""Foreign program on the bus: plain Zenoh and payloads by rosbags, without code of this project.
 
-``python -m tests.support.outsider ENDPOINT`` subscribes to all that is published, to be frozen.
+``python -m tests.support.outsider ENDPOINT`` subscribes to everything; a test then freezes it.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ import zenoh.ext
 
 from tests.support.waiting import until
 
-# Nothing takes so long but on a machine that is busy with much else [s].
+# Time limit [s]; only a very busy machine needs most of it.
 TIMEOUT_S = 150.0
 
 MAP = "nav_msgs/msg/OccupancyGrid"
 MAP_UPDATE = "map_msgs/msg/OccupancyGridUpdate"
 POSE = "geometry_msgs/msg/PoseStamped"
-# In the attachment of the empty path with which a daemon begins to plan.
+# Part of the attachment of the empty path that a daemon publishes first.
 BEGINS = b'"revision":0,"map_stamp_ns"'
 SCHEMAS = {"map": MAP, "map_update": MAP_UPDATE, "pose": POSE, "priority": MAP}
 
@@ -43,10 +43,10 @@ class Heard:
 
 
 class Collector:
-    """What came in on one key, in order.
+    """The samples of one key, in order of arrival.
 
     Args:
-        begins: take the empty path with which a daemon begins, too.
+        begins: include the empty path that a daemon publishes first.
     """
 
     def __init__(self, *, begins: bool = False) -> None:
@@ -72,19 +72,19 @@ class Collector:
                     if holds(heard):
                         return heard
                 left = deadline - time.monotonic()
-                assert left > 0, f"never came; the last was {self.heard[-1:]}"
+                assert left > 0, f"not received; the last sample was {self.heard[-1:]}"
                 self._came.wait(left)
 
 
 class Outsider:
-    """A client session; close it before the daemon goes."""
+    """A client session; close it before the daemon ends."""
 
     def __init__(
         self, endpoint: str, robot: str = "robot", transport: Mapping[str, Any] | None = None
     ) -> None:
         self.prefix = f"fasaco/@v1/{robot}"
         self.session = open_client(endpoint, transport)
-        # The port is open a moment before anything is subscribed to.
+        # The daemon opens its port shortly before it subscribes.
         until(self.alive, TIMEOUT_S, why=lambda: f"no {robot} at {endpoint}")
         self.status = self.listen("status")
 
@@ -99,8 +99,8 @@ class Outsider:
 
         Args:
             name: the last chunk of the key.
-            late: get what was published last, too.
-            begins: take the empty path with which a daemon begins, too.
+            late: also get the last sample published before.
+            begins: see ``Collector``.
         """
         receiver = Collector(begins=begins)
         key = f"{self.prefix}/{name}"
@@ -112,7 +112,7 @@ class Outsider:
         return receiver
 
     def put(self, name: str, payload: bytes, schema: str | None = None) -> None:
-        """Publish; with the schema of the native contract, another one, or "" for none."""
+        """Publish; ``schema``: None for that of the native contract, "" for none."""
         schema = SCHEMAS[name] if schema is None else schema
         encoding = zenoh.Encoding(f"application/cdr;{schema}") if schema else None
         block = zenoh.CongestionControl.BLOCK
@@ -121,11 +121,11 @@ class Outsider:
         )
 
     def get(self, name: str, timeout_s: float = 60.0) -> list[zenoh.Reply]:
-        """Ask; return all answers."""
+        """Query; return all replies."""
         return list(self.session.get(f"{self.prefix}/{name}", timeout=timeout_s))
 
     def ask(self, name: str) -> Heard:
-        """Ask, and return the one answer there has to be."""
+        """Query; check that there is one reply, and return it."""
         replies = [reply.ok for reply in self.get(name)]
         assert len(replies) == 1, replies
         assert replies[0] is not None
@@ -146,15 +146,15 @@ class Outsider:
         return document
 
     def alive(self, timeout_s: float = 2.0) -> bool:
-        """Tell whether the daemon's liveliness token stands."""
+        """Return whether the daemon's liveliness token exists."""
         replies = self.session.liveliness().get(f"{self.prefix}/alive", timeout=timeout_s)
         return any(reply.ok is not None for reply in replies)
 
 
 def open_client(endpoint: str, transport: Mapping[str, Any] | None = None) -> zenoh.Session:
-    """Open a session as somebody's client would, once there is somebody.
+    """Open a client session once a peer listens at the endpoint.
 
-    ``transport``: what shows who it is, as Zenoh's configuration has it.
+    ``transport``: the section of Zenoh's configuration, with the client's certificate.
     """
     config = zenoh.Config.from_json5(
         json.dumps(
@@ -185,7 +185,7 @@ def _heard(sample: zenoh.Sample) -> Heard:
 
 
 def main() -> None:
-    """Listen until killed; say "listening" on standard output once a status came."""
+    """Listen until killed; print "listening" after the first status."""
     with Outsider(sys.argv[1]) as outsider:
         for name in ("path", "coverage", "pheromone", "status"):
             outsider.listen(name, late=name != "pheromone")

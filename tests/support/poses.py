@@ -6,7 +6,7 @@ from fasaco_edge.grid.geometry import Pose2D
 
 
 def composed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return ``pose``, given in ``frame``, in the parent of that frame; yaw in [-pi, pi]."""
+    """Return a pose given in ``frame`` in the parent frame; yaw in [-pi, pi]."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return Pose2D(
         frame.x + pose.x * cos - pose.y * sin,

@@ -1,4 +1,4 @@
-"""Daemons and commands as processes of their own, started as a user or a service manager does."""
+"""Daemons and commands as separate processes, started as by a user or a service manager."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ import yaml
 from fasaco_edge.host.addresses import free_port
 from tests.support.forked import ENVIRONMENT, OF_MANAGER, Forked, run_forked
 
-# What a daemon may take from SIGTERM to its end on a machine that is busy with much else [s]; on
-# a quiet one it is two seconds at most.
+# Longest time from SIGTERM to a daemon's end on a busy machine [s]; two seconds on a quiet machine.
 STOP_S = 30.0
 PROGRAM = (sys.executable, "-m", "fasaco_edge")
 
 
 def free_endpoint() -> str:
-    """Return a Zenoh endpoint nobody listens on."""
+    """Return a free Zenoh endpoint."""
     return f"tcp/127.0.0.1:{free_port()}"
 
 
@@ -43,11 +42,11 @@ class Daemon:
         return self.process.pid
 
     def log_text(self) -> str:
-        """Return what it has said on standard error."""
+        """Return its log, which it writes to standard error."""
         return self.log.read_text(errors="replace")
 
     def stop(self, number: signal.Signals = signal.SIGTERM) -> float:
-        """Ask it to end, check that it did in order and in time; return the seconds it took."""
+        """End it by a signal, check that it ends with 0 and in time; return the duration [s]."""
         asked = time.monotonic()
         self.process.send_signal(number)
         try:
@@ -59,7 +58,7 @@ class Daemon:
         return time.monotonic() - asked
 
     def kill(self) -> None:
-        """End it whatever it does."""
+        """Kill it."""
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
@@ -76,15 +75,21 @@ def daemon_process(
 ) -> Iterator[Daemon]:
     """Run a daemon with these sections of configuration; end it, and check how it ended.
 
-    Its progress is kept in the folder ``state`` of ``folder``, if words and configuration do not
-    say where (``state=False``): the next one there goes on with it. It is forked, but for one with
-    an environment that no service manager gives, or ``executed``, as what is measured has to be.
+    Args:
+        folder: where its files are written; the next daemon there continues its progress.
+        words: further arguments of its command.
+        env: additional environment. With variables that a service manager does not set, the daemon
+            is started; otherwise it is forked.
+        state: whether its progress is kept in ``state`` of ``folder``; False if words or
+            configuration give the place.
+        executed: whether it is started, not forked, to be measured.
+        sections: its configuration.
     """
-    # The robots of most tests stand still, and say so once.
+    # The robots of most tests stand still, and publish their pose once.
     sections.setdefault("mission", {}).setdefault("lost_pose_s", 0.0)
-    # What they count is what was forced; tests/daemon/test_spare_time.py has the rest.
+    # Most tests count necessary plans; tests/daemon/test_spare_time.py tests the others.
     sections.setdefault("planner", {}).setdefault("spare_share", 0.0)
-    # Cells are what most of them count; tests/daemon/test_line.py has the line.
+    # Most tests count cells; tests/daemon/test_line.py tests the line.
     sections["planner"].setdefault("line", "cells")
     sections.setdefault("bus", {}).setdefault("listen", [free_endpoint()])
     endpoint = [*sections["bus"]["listen"], *sections["bus"].get("connect", ())][0]
@@ -119,7 +124,7 @@ def mapped_files(pid: int) -> str:
 
 
 def is_running(pid: int) -> bool:
-    """Tell whether a process exists and is no zombie."""
+    """Return whether a process exists and is no zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except FileNotFoundError:
@@ -127,7 +132,7 @@ def is_running(pid: int) -> bool:
 
 
 def slowness(work_s: float = 0.03) -> float:
-    """Return how long work takes here, now, in its processor time; 1 on a quiet machine."""
+    """Return the duration of some work over its processor time, now; 1 on a quiet machine."""
     began, worked = time.monotonic(), time.thread_time()
     while time.thread_time() - worked < work_s:
         pass
@@ -139,7 +144,7 @@ COMMAND_S = 1500.0
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended, and what it said."""
+    """Exit code and outputs of a command."""
 
     code: int
     out: str
@@ -147,7 +152,7 @@ class Ended:
 
 
 def fasaco_edge(*words: object) -> Ended:
-    """Run a command to its end, in a forked process; a traceback is never right."""
+    """Run a command to its end, in a forked process; fail on a traceback."""
     command = (*PROGRAM[1:], *(str(word) for word in words))
     ended = Ended(*run_forked(command, ENVIRONMENT, COMMAND_S))
     assert "Traceback" not in ended.err, ended.err

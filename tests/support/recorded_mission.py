@@ -1,7 +1,7 @@
-"""A short mission of a real daemon with a real recorder: a robot in a room it does not know.
+"""Short mission of a real daemon with a real recorder: a robot in an unknown room.
 
-Its mapper sends whole maps while they grow, and else updates. For a while it believes in a
-crate that is not there. Once the robot is told to pause, and to go on.
+The mapper sends whole maps while they grow, and otherwise updates. For some time its map shows a
+crate that does not exist. The robot is paused and resumed once.
 """
 
 from __future__ import annotations
@@ -38,17 +38,17 @@ from tests.support.waiting import until
 
 SIZE_M = (3.6, 2.7)
 START = Pose2D(0.75, 0.75)
-# Where the crate is said to stand [m], and from when to when [simulated s].
+# Place of the crate on the map [m], and period in which the map shows it [simulated s].
 CRATE = (2.4, 1.2, 2.7, 1.5)
 CRATE_S = (8.0, 25.0)
-# What is commanded when [simulated s], and the code of the error that it gets, "" for none.
+# Time of each command [simulated s], the command, and the code of its error, "" for none.
 COMMANDS = (
     (14.0, {"command": "pause"}, ""),
     (16.0, {"command": "resume"}, ""),
     (19.0, {"command": "replan"}, ""),
 )
-# From the first path to the first command, at least [s]: when the daemon took what a recording
-# tells no more exactly than that.
+# Least time from the first path to the first command [s]; recordings give the daemon's times of
+# arrival only this exactly.
 DRIVES_S = 0.5
 # Simulated seconds per second.
 SPEED = 16.0
@@ -60,9 +60,9 @@ SIMULATION = SimulationConfig(
 
 @dataclass(frozen=True)
 class Recording:
-    """The parts, what the daemon said, and where the robot was in truth.
+    """The parts, the daemon's messages, and the robot's true track.
 
-    ``statuses`` and ``notes``, those of all paths, come with the seconds they came at.
+    ``statuses``, and ``notes`` (attachments of paths), are with their times of arrival [s].
     """
 
     paths: list[Path]
@@ -73,7 +73,7 @@ class Recording:
 
 
 def is_done(status: dict) -> bool:
-    """Tell whether all is covered."""
+    """Return whether all is covered."""
     return status.get("state") == "done"
 
 
@@ -89,11 +89,11 @@ def record_mission(
     blocked_s: tuple[float, ...] = (),
     priorities: OccupancyGrid | None = None,
 ) -> Recording:
-    """Record a mission from its first map until a status ends it; some poses may be none.
+    """Record a mission from its first map until a status for which ``ends`` holds.
 
-    ``line`` is the daemon's ``planner.line``; the room lies at ``yaw_deg`` in the map frame. At
-    ``blocked_s`` [simulated s] a follower says that something is ahead. ``priorities`` are there
-    from the beginning.
+    ``broken_poses`` is the number of malformed poses sent; ``line`` the daemon's ``planner.line``;
+    ``yaw_deg`` the angle of the room to the map frame. At ``blocked_s`` [simulated s] a follower
+    reports an obstacle. ``priorities`` are published before the start.
     """
     runs = folder / name
     planner = {"budget_s": 0.05, "line": line}
@@ -105,7 +105,7 @@ def record_mission(
             if priorities is not None:
                 Sender(bus, topics.PRIORITY).put(encode_occupancy_grid(priorities))
             robot.drive(ends)
-        # With the recorder's last words it may take a while on a busy machine.
+        # The recorder's last messages may take some time on a busy machine.
         daemon.process.terminate()
         daemon.process.wait(TIMEOUT_S)
     return Recording(
@@ -157,16 +157,16 @@ class MappingRobot:
         until(
             lambda: self.status and holds(self.status),
             TIMEOUT_S,
-            why=lambda: f"never came; the last was {self.status}",
+            why=lambda: f"not received; the last status was {self.status}",
         )
 
     def drive(self, ends=is_done) -> None:
-        """Drive until the daemon says that all is covered, or what else ends it."""
+        """Drive until a status for which ``ends`` holds."""
         deadline = time.monotonic() + TIMEOUT_S
         tick_s = SIMULATION.tick_s / SPEED
         due = time.monotonic()
         while not ends(self.status):
-            assert time.monotonic() < deadline, f"never done; the last was {self.status}"
+            assert time.monotonic() < deadline, f"not done; the last status was {self.status}"
             if (sample := self._newest_path.take(0.0)) is not None:
                 self._world.follow(decode_path(sample.payload).xy)
             self._publish()
@@ -176,19 +176,19 @@ class MappingRobot:
                 due = time.monotonic()
             due += tick_s
             time.sleep(max(due - time.monotonic(), 0.0))
-        # The last path, which tells the robot to stop, is to be recorded too, and its turn.
+        # The recording must contain the last path, which stops the robot, and the cycle after it.
         self.wait(self._is_up_to_date)
         heard = len(self.statuses)
         until(lambda: len(self.statuses) > heard, TIMEOUT_S)
 
     def _is_up_to_date(self, status: dict) -> bool:
-        """Tell whether a status counts the last pose, and no plan is under way."""
+        """Return whether a status includes the last pose, and no search runs."""
         pose = status["pose"] or {}
         here = pytest.approx(self._told_at, abs=1e-3)
         return (pose.get("x"), pose.get("y")) == here and not status["plan"]["planning"]
 
     def _is_time(self) -> bool:
-        """Tell whether the next command is due; one that waits for its first path gets none."""
+        """Return whether the next command is due; no command is due before the first path."""
         if not self._commands or 1e-9 * self._world.stamp_ns < self._commands[0][0]:
             return False
         if not self.notes or time.monotonic() - self.notes[0][0] < DRIVES_S:
@@ -196,7 +196,7 @@ class MappingRobot:
         return self._commands[0][1]["command"] == "resume" or self.status.get("state") == "covering"
 
     def _report(self) -> None:
-        """Say that something is 0.4 m ahead, if that is due."""
+        """Report an obstacle 0.4 m ahead, if due."""
         if not self._blocked_s or 1e-9 * self._world.stamp_ns < self._blocked_s[0]:
             return
         del self._blocked_s[0]
@@ -217,7 +217,7 @@ class MappingRobot:
             if self._broken_sent < self._broken_poses:
                 self._broken_sent += 1
                 self._poses.put(pose[:-5])
-                # The next pose would take its place, were the daemon busy.
+                # If the daemon were busy, the next pose would replace this one.
                 self.wait(lambda status: status["errors"]["total"] >= self._broken_sent)
 
     def _command(self, document: dict, code: str) -> None:
@@ -252,12 +252,12 @@ class MappingRobot:
 
     @property
     def trail(self) -> np.ndarray:
-        """Where the robot was in truth: points (x, y) [m], float64 (n, 2)."""
+        """The robot's true track: points (x, y) [m], float64 (n, 2)."""
         return self._world.track
 
     def _take_path(self, sample: Sample) -> None:
         note = decode_json(sample.attachment)
-        # The empty path with which the daemon begins is none of its mission's.
+        # The empty path that a starting daemon publishes does not belong to the mission.
         if note["revision"]:
             self.notes.append((time.monotonic(), note))
             self._newest_path.put(sample)

@@ -1,4 +1,4 @@
-"""Recorder processes, and recordings read back without a viewer, also torn ones."""
+"""Recorder processes; recordings read without a viewer, also incomplete files."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ TIMEOUT_S = 120.0
 
 @dataclass
 class Recorder:
-    """A recorder process, and what it says about itself."""
+    """A recorder process, and its reports."""
 
     process: subprocess.Popen[str]
     reports: list[dict[str, Any]] = field(default_factory=list)
@@ -65,16 +65,16 @@ class Recorder:
                     return report
             assert self.process.poll() is None, self.process.stderr and self.process.stderr.read()
             time.sleep(0.02)
-        raise AssertionError(f"never happened; last report: {self.reports[-1:]}")
+        raise AssertionError(f"not reported; last report: {self.reports[-1:]}")
 
     def written(self, messages: int) -> dict[str, Any]:
-        """Wait until so many messages were taken."""
+        """Wait until the recorder has taken this number of messages; return the report."""
         return self.wait_until(lambda report: report["messages"] >= messages)
 
 
 @contextmanager
 def bus_on_free_port() -> Iterator[tuple[Bus, str]]:
-    """Open a bus as the daemon does, and say where."""
+    """Open a bus as the daemon does; yield it with its endpoint."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
@@ -100,7 +100,7 @@ def recorder_process(bus: Bus, endpoint: str, out: Path, **settings: Any) -> Ite
 SCALAR = "Scalars:scalars"
 STATE = "StateChange:state"
 TEXT = "TextLog:text"
-# What rerun writes about a recording, beside what was logged, begins so.
+# Prefix of entities that rerun adds to a recording.
 RESERVED_PREFIX = "/__"
 
 
@@ -109,8 +109,8 @@ class Column:
     """One component of one entity over time.
 
     Attributes:
-        wall_ns: int64 (n,), ascending: when it was logged [ns].
-        values: what was logged, n lists of instances.
+        wall_ns: int64 (n,), ascending: times of logging [ns].
+        values: logged values, n lists of instances.
     """
 
     wall_ns: NDArray[np.int64]
@@ -119,16 +119,16 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class RecordingSummary:
-    """What a recording holds.
+    """Content of a recording.
 
     Attributes:
-        rows: how often each entity was logged with a time, by its name.
+        rows: number of times that each entity was logged with a time, by name.
         timelines: names of the timelines, sorted.
         began_ns, ended_ns: first and last time on the timeline ``wall`` [ns]; 0 if empty.
         complete: whether the recorder ended the file itself.
-        covered: last fraction of the coverable cells that is covered; None if never told.
-        recovered: last fraction of them that was visited again; None if never told.
-        paths: lines on new paths, in order.
+        covered: last covered fraction of the coverable cells; None if not logged.
+        recovered: last revisited fraction of these cells; None if not logged.
+        paths: log lines about new paths, in order.
         states: states of the mission, in order.
     """
 
@@ -149,7 +149,7 @@ class RecordingSummary:
 
 
 def begun_parts(folder: Path) -> list[Path]:
-    """Return the parts in ``folder`` that hold a frame; of others nothing was on the disk yet."""
+    """Return the parts in ``folder`` with a frame; other parts have no data on the disk yet."""
     begun = []
     for part in sorted(folder.glob("*.rrd")):
         with part.open("rb") as file:
@@ -160,7 +160,7 @@ def begun_parts(folder: Path) -> list[Path]:
 
 
 def read_column(path: Path, entity: str, component: str) -> Column:
-    """Return what was logged over time as ``component``, "Scalars:scalars" say, of ``entity``.
+    """Return the values of ``component`` of ``entity`` over time, for example "Scalars:scalars".
 
     Raises:
         UnreadableRecording: ``path`` is no recording, or is torn.
@@ -170,13 +170,13 @@ def read_column(path: Path, entity: str, component: str) -> Column:
         batch = chunk.to_record_batch()
         if not chunk.is_static and component in batch.schema.names:
             rows += zip(_wall_ns(batch).tolist(), batch.column(component).to_pylist(), strict=True)
-    # Chunks come in no order of time.
+    # Chunks are not ordered by time.
     rows.sort(key=lambda row: row[0])
     return Column(np.array([time for time, _ in rows], np.int64), [value for _, value in rows])
 
 
 def read_static(path: Path, entity: str, component: str) -> list[Any]:
-    """Return what was logged as ``component`` of ``entity`` for all times, in order.
+    """Return the values of ``component`` of ``entity`` that hold for all times, in order.
 
     Raises:
         UnreadableRecording: ``path`` is no recording, or is torn.
@@ -190,7 +190,7 @@ def read_static(path: Path, entity: str, component: str) -> list[Any]:
 
 
 def read_summary(path: Path) -> RecordingSummary:
-    """Return what the recording ``path`` holds.
+    """Return the content of the recording ``path``.
 
     Raises:
         UnreadableRecording: ``path`` is no recording, or is torn.
@@ -236,7 +236,7 @@ def _wall_ns(batch: Any) -> NDArray[np.int64]:
 def _chunks(path: Path, content: str) -> Iterator[Any]:
     try:
         with warnings.catch_warnings():
-            # Of a file without its footer: slower to open, and all there.
+            # A file without its footer opens more slowly, but is complete.
             warnings.filterwarnings("ignore", message="RRD file has no footer")
             reader = RrdReader(str(path))
         yield from reader.stream().filter(content=content)

@@ -1,4 +1,4 @@
-"""Rooms drawn pixel by pixel, where a robot fits in them, and their messages by rosbags."""
+"""Rooms drawn pixel by pixel, the cells where a robot fits, and messages encoded by rosbags."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def coverable_cells(pixels: Pixels) -> set[Cell]:
     """Return the cells (row, col) at whose centre the robot's disc touches free pixels only."""
     rows, cols = pixels.shape
     bad = [(float(c), float(r)) for r, c in np.argwhere(pixels != FREE)]
-    # Beyond the map nobody knows: a ring of pixels around it stands for that.
+    # A ring of pixels around the map stands for the unknown area outside.
     bad += [(float(c), float(r)) for r in (-1, rows) for c in range(-1, cols + 1)]
     bad += [(float(c), float(r)) for c in (-1, cols) for r in range(rows)]
     return {
@@ -95,7 +95,7 @@ def pose_bytes(x: float, y: float, frame: str = "map", yaw: float = 0.0) -> byte
 
 
 def covariant_bytes(x: float, y: float) -> bytes:
-    """Return a geometry_msgs/PoseWithCovarianceStamped that knows no covariance."""
+    """Return a geometry_msgs/PoseWithCovarianceStamped without a known covariance."""
     where, unknown = oracle.pose(Pose2D(x, y)), np.full(36, np.nan)
     message = oracle.pose_with_covariance_stamped("map", 1, where, unknown)
     return oracle.to_bytes("geometry_msgs/msg/PoseWithCovarianceStamped", message)
@@ -118,7 +118,7 @@ def _cells_over(pixels: Pixels) -> Iterator[Cell]:
 
 
 def _distance(cell: Cell, pixel: tuple[float, float]) -> float:
-    """Return how far the centre of a cell is from the nearest point of a pixel [m]."""
+    """Return the distance of a cell's centre from the nearest point of a pixel [m]."""
     x, y = (cell[1] + 0.5) * TOOL_M / RESOLUTION_M, (cell[0] + 0.5) * TOOL_M / RESOLUTION_M
     left, bottom = pixel
     beside = max(left - x, 0.0, x - left - 1.0)
@@ -139,14 +139,14 @@ def pillars() -> Pixels:
 
 
 def lanes(count: int) -> list[tuple[float, float]]:
-    """Return the centres of the hall's cells (x, y) [m] as a robot drives over them."""
+    """Return the centres (x, y) [m] of the hall's cells in driving order."""
     cells = [(row, col) for row in range(1, 14) for col in range(1, 19)]
     snake = [(row, col if row % 2 else 19 - col) for row, col in cells]
     return [((col + 0.5) * TOOL_M, (row + 0.5) * TOOL_M) for row, col in snake[:count]]
 
 
 def drive(outsider: Outsider, points: list[tuple[float, float]]) -> dict[str, Any]:
-    """Drive over points of the hall; return the status that has counted them all."""
+    """Drive over points of the hall; return a status that includes all of them."""
     for x, y in points:
         outsider.put("pose", pose_bytes(x, y))
     x, y = points[-1]
@@ -160,7 +160,7 @@ def drive(outsider: Outsider, points: list[tuple[float, float]]) -> dict[str, An
 
 
 def begin(outsider: Outsider, pixels: Pixels = HALL, at: int = 0) -> dict[str, Any]:
-    """Give map and pose; return a status that has seen the robot on a path."""
+    """Publish map and pose; return a status of the robot on a path."""
     place = lanes(at + 1)[at]
     outsider.put("map", map_bytes(pixels))
     outsider.put("pose", pose_bytes(*place))
@@ -169,7 +169,7 @@ def begin(outsider: Outsider, pixels: Pixels = HALL, at: int = 0) -> dict[str, A
 
 
 def wait_written(outsider: Outsider) -> None:
-    """Wait until the ledger was written a period after the start."""
+    """Wait until the ledger is written, one period after the start."""
     outsider.wait_status(
         lambda status: (
             status["ledger"]["age_s"] is not None

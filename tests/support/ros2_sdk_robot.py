@@ -1,6 +1,6 @@
-"""A robot by zenoh-ros2-sdk, a library of somebody else: map and tf out, path and coverage in.
+"""Robot by zenoh-ros2-sdk, a foreign library: it sends map and tf, and receives path and coverage.
 
-Run by the Python that has it, which need not have this package:
+Run by a Python with this library; it need not have this package:
 ``python ros2_sdk_robot.py PORT DOMAIN FOLDER``; prints a JSON document.
 """
 
@@ -24,7 +24,7 @@ TIMEOUT_S = 30.0
 
 
 def write_definitions(folder: Path) -> None:
-    """Write the .msg files the library would fetch from the network."""
+    """Write the .msg files that the library would otherwise fetch from the network."""
     store = get_typestore(Stores.ROS2_JAZZY)
     for schema in (MAP, PATH, TF):
         text, _ = store.generate_msgdef(schema, ros_version=2)
@@ -56,7 +56,7 @@ class Robot:
         ]
 
     def drive(self) -> dict[str, Any]:
-        """Tell map and place until path and coverage are heard; return those."""
+        """Publish map and place until path and coverage arrive; return these."""
         cells = np.zeros((60, 80), np.int8)
         cells[[0, -1]] = cells[:, [0, -1]] = 100
         info = self._make(
@@ -87,7 +87,7 @@ class Robot:
             self._tf.publish(transforms=[stamped])
             if self._changed.wait(0.1):
                 return self._heard
-        raise SystemExit(f"heard only {list(self._heard)}")
+        raise SystemExit(f"received only {list(self._heard)}")
 
     def close(self) -> None:
         """Leave the graph."""
@@ -117,7 +117,7 @@ class Robot:
 
 
 def main(port: int, domain: int, folder: Path) -> dict[str, Any]:
-    """Return what there is to see and to hear."""
+    """Return the graph and the messages received."""
     at = {"domain_id": domain, "router_port": port}
     sdk.ZenohSession.get_instance(router_port=port)
     write_definitions(folder)

@@ -1,6 +1,6 @@
-"""A robot under ROS 2, as it looks on Zenoh: plain Zenoh, payloads by rosbags, no code of ours.
+"""Robot under ROS 2 on Zenoh: plain Zenoh, payloads by rosbags, without code of this project.
 
-What rmw_zenoh does is written down again here, from its design.md and its sources.
+It imitates rmw_zenoh by its design.md and its sources.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ GRID, PATH, POSE = (
     "geometry_msgs/msg/PoseStamped",
 )
 DIAGNOSTICS, TRIGGER = "diagnostic_msgs/msg/DiagnosticArray", "std_srvs/srv/Trigger"
-# As published by std_srvs of Iron and later; rosbags hashes no services.
+# Hash of std_srvs/Trigger in Iron and later; rosbags does not compute hashes of services.
 TRIGGER_HASH = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
 CLIENT = bytes(range(16))
 EMPTY_REQUEST = b"\0\1\0\0\0"
@@ -37,13 +37,13 @@ UPDATE, TF = "map_msgs/msg/OccupancyGridUpdate", "tf2_msgs/msg/TFMessage"
 
 @dataclass(frozen=True)
 class Naming:
-    """How ROS names become keys: ``domain`` None under zenoh-bridge-ros2dds."""
+    """Conversion of ROS names to keys; ``domain``: None under zenoh-bridge-ros2dds."""
 
     domain: int | None
     namespace: str = ""
 
     def key(self, topic: str, schema: str) -> str:
-        """Return the key of a topic, ``map`` say."""
+        """Return the key of a topic, for example ``map``."""
         name = f"{self.namespace}/{topic}".strip("/")
         if self.domain is None:
             return name
@@ -54,13 +54,13 @@ class Naming:
 
 
 class RosPublisher:
-    """Publishes as rmw_zenoh or the bridge does: no encoding; what is latched is kept."""
+    """Publishes as rmw_zenoh or the bridge does: without encoding; latched samples are kept."""
 
     def __init__(self, session: zenoh.Session, key: str, *, latched: bool, attached: bool) -> None:
         self._gid = os.urandom(16) if attached else None
         self._count = 0
         ext = zenoh.ext
-        # A bridge has one publisher for all nodes behind it, and a history ten times theirs.
+        # A bridge has one publisher for all its nodes, with a ten times longer history.
         cache = ext.CacheConfig(max_samples=1 if attached else 10) if latched else None
         beats = ext.MissDetectionConfig(sporadic_heartbeat=0.5) if latched and attached else None
         self._publisher: Any = ext.declare_advanced_publisher(
@@ -83,7 +83,7 @@ class RosPublisher:
 
 
 class RosRobot:
-    """A session with what a robot's nodes publish, and what they hear."""
+    """A session with the publishers and subscribers of a robot's nodes."""
 
     def __init__(self, session: zenoh.Session, naming: Naming) -> None:
         self.session = session
@@ -123,10 +123,10 @@ class RosRobot:
         return receiver
 
     def call(self, service: str) -> tuple[bool, str, bytes]:
-        """Call a Trigger as a client does: ask whoever answers for all.
+        """Call a Trigger service as a ROS client does, with a query to complete servers.
 
         Returns:
-            Success and message of the response, and what came beside it.
+            Success and message of the response, and its attachment.
         """
         key, beside = self.naming.key(service, TRIGGER), None
         if self.naming.domain is not None:
@@ -158,9 +158,9 @@ class RosRobot:
 def ros_robot(
     endpoint: str, naming: Naming, transport: dict[str, Any] | None = None
 ) -> Iterator[RosRobot]:
-    """Run a robot's session, once there is somebody at ``endpoint``.
+    """Run a robot's session once a peer listens at ``endpoint``.
 
-    ``transport``: what shows who it is, as Zenoh's configuration has it.
+    ``transport``: the section of Zenoh's configuration, with the client's certificate.
     """
     deadline = time.monotonic() + TIMEOUT_S
     while True:
@@ -179,7 +179,7 @@ def ros_robot(
 
 @contextmanager
 def ros_node(router: str, naming: Naming) -> Iterator[RosRobot]:
-    """Run a session as rmw_zenoh's nodes have it by default: peers that meet at a router."""
+    """Run a session like rmw_zenoh's nodes by default: peers that find each other by a router."""
     listen = {"endpoints": ["tcp/localhost:0"]}
     with _open(mode="peer", connect={"endpoints": [router]}, listen=listen) as session:
         yield RosRobot(session, naming)
@@ -187,7 +187,7 @@ def ros_node(router: str, naming: Naming) -> Iterator[RosRobot]:
 
 @contextmanager
 def ros_router(endpoint: str) -> Iterator[None]:
-    """Run a router as rmw_zenohd is by default."""
+    """Run a router like rmw_zenohd by default."""
     with _open(mode="router", listen={"endpoints": [endpoint]}):
         yield
 
@@ -204,7 +204,7 @@ def is_walk(heard: Heard) -> bool:
 
 
 def check_path(heard: Heard, near: tuple[float, float]) -> None:
-    """Check what a robot that follows the path needs."""
+    """Check the parts of a path that a follower needs."""
     path = oracle.from_bytes(PATH, heard.payload)
     assert path.header.frame_id == "map"
     assert path.header.stamp.nanosec == 1  # the map's
@@ -219,7 +219,7 @@ def check_path(heard: Heard, near: tuple[float, float]) -> None:
 
 
 def check_attachment(heard: Heard) -> int:
-    """Check what rmw_zenoh takes apart; return the sequence number."""
+    """Check the attachment as rmw_zenoh does; return the sequence number."""
     assert heard.attachment is not None
     assert len(heard.attachment) == 33
     sequence, time_ns, size = struct.unpack_from("<qqB", heard.attachment)

@@ -1,6 +1,6 @@
-"""A Zenoh router in a process of its own, which ends with its input.
+"""Zenoh router in a separate process, which ends with its input.
 
-``router.py ENDPOINT [OTHER ...]``: it listens at the first, and connects to other routers.
+``router.py ENDPOINT [OTHER ...]``: it listens at ENDPOINT, and connects to the others.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a person sees in a terminal, of all that was written to it."""
+"""Visible screen of a terminal, computed from all that was written to it."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import re
 
 _ESCAPE = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])")
 _TEXT = re.compile(r"[^\x1b\r\n]+")
-# What may go on: an escape, or a page that is to be shown at once.
+# An incomplete escape at the end of the text.
 _BEGUN = re.compile(r"\x1b(\[[0-9;?]*)?\Z")
 _PAGE, _PAGE_END = "\x1b[?2026h", "\x1b[?2026l"
 
 
 class Screen:
-    """A terminal, of endless height but for its alternate screen; fed with what is written to it.
+    """A terminal; its height is unlimited, except for its alternate screen.
 
-    It knows the escapes that the commands have a use for, and refuses all others.
+    It knows the escapes that the commands use, and refuses all others.
 
     Attributes:
         columns: its width.
-        wrapped: lines that were wider than it, and went on in the next one.
+        wrapped: lines that were wider than the terminal, and continued on the next line.
         hides_cursor: whether its cursor is hidden.
         is_alternate: whether it shows the alternate screen.
     """
@@ -32,14 +32,14 @@ class Screen:
         self._held = ""
 
     def lines(self) -> list[str]:
-        """Return what is seen; of the alternate screen with the spaces that were drawn."""
+        """Return the visible lines; on the alternate screen with drawn spaces at their ends."""
         return self._rows if self.is_alternate else [text.rstrip() for text in self._rows]
 
     def feed(self, written: str) -> None:
-        """Take in what is written next.
+        """Take in the text that is written next.
 
         Raises:
-            AssertionError: for what no command has a use for.
+            AssertionError: it has an escape or character that commands do not use.
         """
         written, at = self._held + written, 0
         begun, page = _BEGUN.search(written), written.rfind(_PAGE)
@@ -55,8 +55,8 @@ class Screen:
                 self._obey(*escape.groups())
                 at = escape.end()
             else:
-                assert written[at] in "\r\n", f"what is {written[at : at + 9]!r} for?"
-                # The driver makes of a line end a carriage return as well.
+                assert written[at] in "\r\n", f"unexpected {written[at : at + 9]!r}"
+                # The terminal driver adds a carriage return to a line end.
                 self._go(self._row + (written[at] == "\n"), 0)
                 at += 1
 
@@ -65,7 +65,7 @@ class Screen:
         self._rows += [""] * (row + 1 - len(self._rows))
 
     def _write(self, text: str) -> None:
-        assert text.isprintable(), f"what is in {text!r}?"
+        assert text.isprintable(), f"unexpected character in {text!r}"
         while text:
             if self._column == self.columns:
                 assert not self.is_alternate, f"a page is too wide: {self._rows[self._row]!r}"
@@ -91,7 +91,7 @@ class Screen:
                 self.is_alternate = False
                 self._rows, self._row, self._column = self._before
             case ("2", "J"):
-                # The cursor stays where it is in truth; but all go somewhere before they write.
+                # A real cursor would stay, but all commands move it before they write.
                 self._rows, self._row, self._column = [""], 0, 0
             case ("2", "K"):
                 self._rows[self._row] = ""
@@ -101,4 +101,4 @@ class Screen:
                 row, column = map(int, place.split(";"))
                 self._go(row - 1, column - 1)
             case _:
-                raise AssertionError(f"what is ESC [{numbers}{kind} for?")
+                raise AssertionError(f"unexpected ESC [{numbers}{kind}")

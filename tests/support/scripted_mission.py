@@ -1,8 +1,8 @@
-"""A made-up mission, as the daemon and a robot would publish it: asymmetric, so that a
-mirrored picture shows.
+"""Scripted mission: the messages that a daemon and a robot would publish.
 
-A building of 8 m x 6 m whose corner (0, 0) lies at (-1, -2) m: one wall inside, from
-the bottom, and a box at the lower right. The robot sees ever more of it, from the left.
+The building is asymmetric, to reveal mirrored pictures. It is 8 m x 6 m, with corner (0, 0) at
+(-1, -2) m, an inner wall from the bottom, and a box at the lower right. The part that the robot has
+seen grows from the left.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ CONFIG = DaemonConfig(
 )
 ORIGIN = (-1.0, -2.0)
 ROWS, COLS = 120, 160
-# What the robot leaves of each square that it passes is little.
+# Swept share of each cell that the robot passes [percent].
 SWEPT_PERCENT = 90
 # Outlines of two rooms [m].
 HALL = (-1.0, -2.0), (3.0, -2.0), (3.0, 4.0), (-1.0, 4.0)
 NOOK = (3.0, -2.0), (7.0, -2.0), (7.0, 4.0), (3.0, 4.0)
-# The box that turns up half-way, where the map said free: rows and columns of pixels.
+# Rows and columns of the pixels of a box that appears half-way, where the map was free.
 SURPRISE = (slice(80, 92), slice(40, 52))
 
 
@@ -76,11 +76,11 @@ class Mission:
 
     @property
     def sent(self) -> int:
-        """How many samples were sent."""
+        """Number of samples sent."""
         return sum(sender.sent for sender in vars(self).values() if isinstance(sender, Sender))
 
     def frames(self, count: int) -> Iterator[float]:
-        """Publish ``count`` steps of the mission; yield how far it is, from 0 to 1."""
+        """Publish ``count`` steps of the mission; yield its progress, from 0 to 1."""
         for frame in range(count):
             done = frame / max(count - 1, 1)
             if frame % max(count // 16, 1) == 0:
@@ -93,7 +93,7 @@ class Mission:
             yield done
 
     def publish_rooms(self, done: float) -> None:
-        """Publish rooms: one has a name half-way, the swept share of the other grows."""
+        """Publish rooms: one gets a name half-way; the swept share of the other grows."""
         hall = RoomReport(1, "hall" if done > 0.5 else "", HALL, 12.0, (2,), swept=1.0)
         self._rooms.put(
             encode_json(
@@ -102,13 +102,13 @@ class Mission:
         )
 
     def publish_map(self, done: float) -> None:
-        """Publish what is known of the building by then: it grows to the right."""
+        """Publish the known part of the building, which grows to the right."""
         self.seen_cells = known_columns(done) // 5
         truth = building(done)[:, : known_columns(done)]
         self._map.put(encode_occupancy_grid(occupancy(truth)))
 
     def replan(self, done: float, reason: str) -> None:
-        """Publish the living trail, and the walk it led to."""
+        """Publish the living trail, and a walk."""
         self.revision += 1
         self.publish_status("planning", done, planning=True)
         self.publish_trail(done)
@@ -136,12 +136,12 @@ class Mission:
         self.publish_status("covering", done, planning=False)
 
     def changed(self, done: float) -> dict[str, float]:
-        """Return where the map has just grown."""
+        """Return the bounds of the part by which the map has just grown."""
         x, y = ORIGIN[0] + RESOLUTION_M * known_columns(done), ORIGIN[1]
         return {"x_min": x - 0.75, "y_min": y + 0.5, "x_max": x - 0.25, "y_max": y + 5.0}
 
     def publish_trail(self, done: float) -> None:
-        """Publish the living trail, the more decided the later."""
+        """Publish the living trail; it becomes more decided with time."""
         self.best_steps = round(len(self.walk) * 1.1 - 40 * done)
         note = {"revision": self.revision, "cells": 12, "branching": 2.0 - done}
         self._pheromone.put(self._field(done), json.dumps(note).encode())
@@ -161,7 +161,7 @@ class Mission:
         return encode_pheromone(snapshot, "map", _stamp())
 
     def drive(self, done: float) -> None:
-        """Publish the robot's pose, and remember which cell it is in."""
+        """Publish the robot's pose, and count the visit of its cell."""
         place = done * (len(self.walk) - 1)
         index = min(int(place), len(self.walk) - 2)
         step = self.walk[index + 1] - self.walk[index]
@@ -200,7 +200,7 @@ class Mission:
 
 
 def known_columns(done: float) -> int:
-    """Return how many columns of pixels the robot has seen."""
+    """Return the number of columns of pixels that the robot has seen."""
     return min(COLS, 5 * round(10 + done * 32))
 
 
@@ -224,13 +224,13 @@ def occupancy(pixels: np.ndarray) -> OccupancyGrid:
 
 
 def blocked_cells(done: float = 0.0) -> np.ndarray:
-    """Return which lattice cells hold an obstacle or something unknown, bool."""
+    """Return which lattice cells contain an obstacle or unknown pixels, bool."""
     pixels = building(done) != 0
     return pixels.reshape(ROWS // 5, 5, COLS // 5, 5).any(axis=(1, 3))
 
 
 def cells(xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows and columns of the lattice cells that points [m] lie in."""
+    """Return rows and columns of the lattice cells that contain points [m]."""
     row_col = np.floor((xy[:, ::-1] - np.array(ORIGIN[::-1])) / CELL_M).astype(np.int64)
     return row_col[:, 0], row_col[:, 1]
 

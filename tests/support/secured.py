@@ -1,4 +1,4 @@
-"""A CA by openssl as protocol/security.md shows, and a daemon that requires its certificates."""
+"""CA by openssl, as in protocol/security.md, and a daemon that requires its certificates."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LOCAL = "DNS:localhost,IP:127.0.0.1"
 
 @dataclass(frozen=True)
 class Authority:
-    """A CA in a folder of its own, and what it has signed."""
+    """A CA in its own folder, with the certificates that it has signed."""
 
     folder: Path
 
@@ -34,14 +34,14 @@ class Authority:
         return str(self.folder / "ca.pem")
 
     def files(self, name: str) -> dict[str, str]:
-        """Return the files of whoever has that name, as ``bus.security.tls`` has them."""
+        """Return the files of a name, as members of ``bus.security.tls``."""
         certificate, key = self.folder / f"{name}.pem", self.folder / f"{name}.key"
         return {"root_ca": self.root, "certificate": str(certificate), "private_key": str(key)}
 
     def sign(
         self, name: str, *, days: int = 30, names: str = LOCAL, uses: str = BOTH
     ) -> dict[str, str]:
-        """Make key and certificate for a name; it ends after so many days, or has ended."""
+        """Make key and certificate for a name; it expires after ``days``, or has expired."""
         extensions = self.folder / f"{name}.ext"
         extensions.write_text(
             f"basicConstraints=CA:FALSE\nextendedKeyUsage={uses}\nsubjectAltName={names}\n"
@@ -73,12 +73,12 @@ def authority(folder: Path, *names: str) -> Authority:
 
 
 ROLES = {"mapper": ["slam"], "viewer": ["eye"], "operator": ["boss"], "recorder": ["scribe"]}
-# Beside those with a role: one with a certificate and no role.
+# Names with a role, and "stranger" with a certificate but no role.
 NAMES = ("robot", "slam", "eye", "boss", "scribe", "stranger")
 
 
 def transport(files: dict[str, str]) -> dict[str, Any]:
-    """Return what shows a certificate, in Zenoh's words."""
+    """Return the section ``transport`` of Zenoh's configuration with a certificate."""
     tls = {"root_ca_certificate": files["root_ca"], "enable_mtls": True}
     if "certificate" in files:
         tls["connect_certificate"] = files["certificate"]
@@ -91,8 +91,8 @@ class House:
 
     Attributes:
         daemon: its process.
-        ca: who has signed the certificates.
-        endpoint: where it listens, by a name that its certificate holds.
+        ca: the CA of the certificates.
+        endpoint: its endpoint, with a host name of its certificate.
     """
 
     def __init__(self, daemon: Daemon, ca: Authority) -> None:
@@ -101,7 +101,7 @@ class House:
         self.endpoint = daemon.endpoint.replace("127.0.0.1", "localhost")
 
     def guest(self, name: str) -> Outsider:
-        """Return a guest who may see what the robot does."""
+        """Return the client of a name, which may read."""
         return Outsider(self.endpoint, transport=transport(self.ca.files(name)))
 
     def session(self, files: dict[str, str]) -> zenoh.Session:
@@ -110,7 +110,7 @@ class House:
 
     @contextmanager
     def sender(self, name: str) -> Iterator[Sender]:
-        """Open a session that says something, heard or not."""
+        """Open a session that publishes, with permission or without."""
         session = self.session(self.ca.files(name))
         try:
             yield Sender(session)
@@ -119,7 +119,7 @@ class House:
 
 
 class Sender:
-    """Speaks whether it may or not."""
+    """Publishes with permission or without."""
 
     put = Outsider.put
     get = Outsider.get
@@ -131,10 +131,10 @@ class Sender:
 
 @contextmanager
 def secured_daemon(folder: Path, *words: str, **sections: Any) -> Iterator[House]:
-    """Run a daemon that knows its guests."""
+    """Run a daemon that gives roles to ``NAMES``."""
     ca = authority(folder / "ca", *NAMES)
     security = {"kind": "tls", "tls": ca.files("robot"), "roles": ROLES}
-    # These guests ask without a pause.
+    # These clients query without a pause.
     security["limits"] = {"queries_hz": 10_000.0}
     security |= sections.pop("security", {})
     bus = {"listen": [free_endpoint().replace("tcp/", "tls/")], "security": security}

@@ -1,7 +1,7 @@
-"""Publishers of the contract that wait where a link is busy, and count.
+"""Publishers of the contract that wait while a link is busy, and count.
 
-Most of the contract's drop a sample then, which is their right: on a busy machine one of a burst
-of poses is gone before it has left the process, and what comes of the rest cannot be foretold.
+Most publishers of the contract then drop samples. On a busy machine they would drop some of a burst
+of poses, and the result of a test would be random.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class Sender:
     """Publishes a topic and drops nothing.
 
     Attributes:
-        sent: how many samples it has sent.
+        sent: number of samples sent.
     """
 
     def __init__(self, bus: Bus, topic: Topic) -> None:

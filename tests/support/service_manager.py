@@ -1,4 +1,4 @@
-"""A service manager as systemd is one: $NOTIFY_SOCKET, and a memory limit by a control group."""
+"""Service manager like systemd: $NOTIFY_SOCKET, and a memory limit by a control group."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.support.outsider import TIMEOUT_S
 
 
 class Manager:
-    """Listens on $NOTIFY_SOCKET, all the time."""
+    """Listens on $NOTIFY_SOCKET."""
 
     def __init__(self, folder: Path) -> None:
         self.said: list[str] = []
@@ -30,13 +30,13 @@ class Manager:
         self._thread.start()
 
     def count(self, word: str, seconds: float) -> int:
-        """Return how often ``word`` is said within so many seconds from now."""
+        """Return the number of notifications ``word`` within the next ``seconds`` [s]."""
         before = len(self.said)
         time.sleep(seconds)
         return self.said[before:].count(word)
 
     def wait(self, word: str, seconds: float = TIMEOUT_S) -> str:
-        """Return what is said next that begins with ``word``."""
+        """Return the next notification that begins with ``word``."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             for number, text in enumerate(self.said[self._read :], self._read):
@@ -44,7 +44,7 @@ class Manager:
                     self._read = number + 1
                     return text
             time.sleep(0.02)
-        raise AssertionError(f"{word} was not said, but {self.said[self._read :]}")
+        raise AssertionError(f"no {word}, but {self.said[self._read :]}")
 
     def close(self) -> None:
         self._closed.set()
@@ -59,7 +59,7 @@ class Manager:
 
 ROOT = Path("/sys/fs/cgroup")
 UNIT = Path(__file__).parents[2] / "deploy" / "fasaco-edge.service"
-# Of version 1 and 2: the folder, the limit, one more that swapping must not get around, the peak.
+# For control groups version 1 and 2: the folder, the memory limit, the limit with swap.
 VERSIONS = (
     (ROOT / "memory", "memory.limit_in_bytes", "memory.memsw.limit_in_bytes"),
     (ROOT, "memory.max", "memory.swap.max"),
@@ -81,13 +81,13 @@ class Group:
 
     @property
     def program(self) -> tuple[str, ...]:
-        """Words before a program that run it in here."""
+        """Command that runs the program after it in this group."""
         join = f'echo $$ >"{self.folder}/cgroup.procs" && exec "$@"'
         return ("sh", "-c", join, "sh")
 
     @property
     def kills(self) -> int:
-        """How many of its processes the kernel has ended for want of memory."""
+        """Number of its processes that the kernel has killed for lack of memory."""
         for name in ("memory.oom_control", "memory.events"):
             with suppress(OSError):
                 text = (self.folder / name).read_text()
@@ -97,7 +97,7 @@ class Group:
 
 
 def why_not() -> str:
-    """Return why there can be no such group here; "" if there can."""
+    """Return why this computer allows no such group; "" if it does."""
     try:
         with memory_group(1 << 30):
             return ""
@@ -110,7 +110,7 @@ def memory_group(limit: int) -> Iterator[Group]:
     """Make a group whose processes may have ``limit`` [bytes] together; remove it afterwards.
 
     Raises:
-        OSError: there is no memory controller, or it is not ours to use.
+        OSError: there is no memory controller, or no right to use it.
     """
     folder, name, swap = _version()
     group = folder / f"fasaco-memory-{os.getpid()}-{time.monotonic_ns()}"
@@ -119,7 +119,7 @@ def memory_group(limit: int) -> Iterator[Group]:
         if not (group / name).exists():
             raise OSError(f"no {name} in {folder}")
         (group / name).write_text(str(limit))
-        with suppress(OSError):  # where there is no swap, nothing needs to be said of it
+        with suppress(OSError):  # without swap, this file is missing
             (group / swap).write_text("0" if swap == "memory.swap.max" else str(limit))
         yield Group(group)
     finally:

@@ -1,4 +1,4 @@
-"""Statuses with every member there is, and with numbers as large and small as a reader takes."""
+"""Statuses with all members, and with the largest and smallest numbers that a reader accepts."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ FULL: dict[str, Any] = {
 
 INTEGERS = (0, 1, MAX_JSON_INTEGER, -MAX_JSON_INTEGER)
 NUMBERS = (0.0, -0.0, 1e-300, 1e-9, MAX_JSON_NUMBER, -MAX_JSON_NUMBER)
-# What no reader takes, in place of the number of cells that are to be covered.
+# Values that readers refuse, in place of the number of cells to cover.
 MALFORMED = {
     "400 digits": "9" * 400,
     "NaN": "NaN",
@@ -74,7 +74,7 @@ MALFORMED = {
 
 
 def malformed_status(name: str) -> bytes:
-    """Return a status that is as it should be but for one member, see ``MALFORMED``."""
+    """Return a status that is valid except for one member, see ``MALFORMED``."""
     mark = 123_454_321
     coverage = FULL["coverage"] | {"coverable": mark}
     mission = FULL["mission"] | {"zones": [FULL["mission"]["zones"][0] | {"cells": mark}]}
@@ -83,7 +83,7 @@ def malformed_status(name: str) -> bytes:
 
 
 def extreme_statuses() -> Iterator[bytes]:
-    """Yield statuses in which one number, then all are as large or small as documents allow."""
+    """Yield statuses with one number, then all numbers, at the limits of documents."""
     places = list(_numbers(FULL))
     for place in places:
         extremes = INTEGERS if isinstance(_at(place), int) else NUMBERS

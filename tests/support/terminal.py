@@ -1,4 +1,4 @@
-"""A command in a pseudo-terminal, everything it wrote there, and what a person sees of it."""
+"""Command in a pseudo-terminal: everything it wrote, and the visible screen."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from tests.support.forked import Forked
 from tests.support.processes import ENVIRONMENT, PROGRAM
 from tests.support.screen import Screen
 
-# Nothing takes so long but on a machine that is busy with much else [s].
+# Time limit [s]; only a very busy machine needs most of it.
 TIMEOUT_S = 150.0
-# What a forked interpreter still takes from its environment.
+# Variables that a forked interpreter still reads from its environment.
 FORKABLE = {"TERM", "COLORTERM", "NO_COLOR", "DISPLAY", "FASACO_CONNECT"}
 
 
 class Terminal:
-    """A terminal with a command in it; closed, with the command ended, on every way out.
+    """A terminal with a command; on exit, the command is killed and the terminal closed.
 
-    The command is forked, see ``tests.support.forked``; unless it is to be ``executed``, is another
-    program, or has an environment that an interpreter looks at when it starts.
+    The command is forked, see ``tests.support.forked``. It is started instead if ``executed``, if
+    it is another program, or if an interpreter reads its environment at its start.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Terminal:
     ) -> None:
         self.written = ""
         self.shown = Screen(columns)
-        # What is read may end within a character.
+        # A read may end inside a character.
         self._decoder = codecs.getincrementaldecoder("utf-8")()
         self._master, self._slave = pty.openpty()
         self.resize(columns, lines)
@@ -56,7 +56,7 @@ class Terminal:
             self.process = Forked(command[1:], environment, device, device)
             return
         self.process = subprocess.Popen(
-            # In a session of its own, whose terminal this is: Ctrl-C is a signal then.
+            # This is the terminal of the command's own session, so that Ctrl-C sends a signal.
             ["setsid", "--ctty", *command],
             stdin=self._slave,
             stdout=self._slave,
@@ -90,14 +90,14 @@ class Terminal:
         os.write(self._master, keys.encode())
 
     def read(self, timeout_s: float = 0.05) -> None:
-        """Take in what was written."""
+        """Read the text that was written."""
         while select.select([self._master], [], [], timeout_s)[0]:
             text = self._decoder.decode(os.read(self._master, 65536))
             self.written += text
             self.shown.feed(text)
 
     def wait(self, holds: Callable[[str], bool]) -> str:
-        """Wait until the screen is such; return it, as it is seen."""
+        """Wait until ``holds`` is true of the visible screen; return the screen."""
         deadline = time.monotonic() + TIMEOUT_S
         while not holds(screen := "\n".join(self.screen())):
             assert self.process.poll() is None, self.written[-2000:]
@@ -110,7 +110,7 @@ class Terminal:
         return self.wait(lambda screen: text in screen)
 
     def screen(self) -> list[str]:
-        """Return the lines that are seen now, also those above the screen."""
+        """Return the visible lines, and those scrolled off the top."""
         return self.shown.lines()
 
     def end(self, number: signal.Signals | None = None) -> int:
@@ -125,7 +125,7 @@ class Terminal:
         return self.process.returncode
 
     def is_clean(self) -> bool:
-        """Tell whether the terminal is as it was before: its mode, screen, and the cursor shown."""
+        """Return whether the terminal has its first mode and screen again, and shows the cursor."""
         shown = self.shown
         return not (shown.hides_cursor or shown.is_alternate) and self._mode() == self.mode
 

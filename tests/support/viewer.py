@@ -1,6 +1,7 @@
-"""The rerun viewer without a screen: opens recordings, reports errors, takes pictures.
+"""Rerun viewer without a screen: opens recordings, reports errors, takes pictures.
 
-Needs a Vulkan driver, lavapipe will do (Debian: mesa-vulkan-drivers, libegl1, libxkbcommon0).
+It needs a Vulkan driver, for example lavapipe (Debian: mesa-vulkan-drivers, libegl1,
+libxkbcommon0).
 
     python -m tests.support.viewer FILE... PICTURE.png --at 0.5
 """
@@ -31,7 +32,7 @@ SETTLE_S = 1.5
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """What the viewer showed: its picture (PNG), the views' names, and their complaints."""
+    """View of the viewer: its picture (PNG), the names of its views, and their errors."""
 
     picture: bytes
     views: tuple[str, ...]
@@ -45,13 +46,13 @@ def drivers() -> list[Path]:
 
 @contextmanager
 def headless_viewer() -> Iterator[ViewerClient]:
-    """Run a viewer with a window of 1280 x 720 that nobody sees."""
+    """Run a viewer with an invisible window of 1280 x 720."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     binary = Path(rerun_cli.__file__).parent / "rerun"
     size = f"{WINDOW[0]}x{WINDOW[1]}"
-    # No renderer but the software one: what else is installed may need a screen.
+    # Only the software renderer, as others may need a screen.
     environment = os.environ | {
         "VK_ICD_FILENAMES": ":".join(map(str, drivers())),
         "XDG_RUNTIME_DIR": os.environ.get("XDG_RUNTIME_DIR", "/tmp"),
@@ -69,7 +70,7 @@ def headless_viewer() -> Iterator[ViewerClient]:
 
 
 def shoot(viewer: ViewerClient, recordings: Sequence[Path], at: float) -> Shot:
-    """Open ``recordings``, go to a fraction ``at`` of their time, and look."""
+    """Open ``recordings``, go to a fraction ``at`` of their time, and return the view."""
     viewer.open([str(path.resolve()) for path in recordings])
     while viewer.get_state().loading:
         time.sleep(0.1)
@@ -88,7 +89,7 @@ def shoot(viewer: ViewerClient, recordings: Sequence[Path], at: float) -> Shot:
 
 
 def _screenshot(viewer: ViewerClient) -> bytes:
-    """Return the window as PNG; the viewer waits 15 s for its frame, which may take longer."""
+    """Return the window as PNG; repeat if its frame takes longer than the viewer's limit, 15 s."""
     deadline = time.monotonic() + START_TIMEOUT_S
     while True:
         try:
@@ -113,7 +114,7 @@ def _connected(port: int, process: subprocess.Popen[bytes]) -> ViewerClient:
 
 
 def main() -> int:
-    """Write a picture of recordings at a fraction of their time; 1 where a view complains."""
+    """Write a picture of recordings at a fraction of their time; return 1 if a view has errors."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("recordings", nargs="+", type=Path)
     parser.add_argument("picture", type=Path)

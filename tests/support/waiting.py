@@ -1,4 +1,4 @@
-"""Waiting for what comes in its own time, and work that goes on meanwhile."""
+"""Waiting for a condition, and periodic work meanwhile."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Found = TypeVar("Found")
 def until(
     holds: Callable[[], Found],
     timeout_s: float = 150.0,
-    why: Callable[[], object] = lambda: "it never came to that",
+    why: Callable[[], object] = lambda: "the condition was not met in time",
 ) -> Found:
-    """Wait until something holds; return it. ``why`` is asked what to say if it never does."""
+    """Return the first true result of ``holds``; fail with ``why()`` after ``timeout_s`` [s]."""
     ends = time.monotonic() + timeout_s
     while not (found := holds()):
         assert time.monotonic() < ends, why()
@@ -26,7 +26,7 @@ def until(
 
 @contextmanager
 def meanwhile(work: Callable[[], object], every_s: float) -> Iterator[None]:
-    """Do some work again and again, on a thread of its own."""
+    """Repeat ``work`` every ``every_s`` [s] on a separate thread during the block."""
     over = threading.Event()
 
     def go_on() -> None:

@@ -228,12 +228,7 @@ def test_a_host_that_accepts_but_never_answers_blocks_no_command():
 
 def test_once_without_a_daemon_is_an_error(covering):
     for endpoint, robot, said, hint in (
-        (
-            covering.endpoint,
-            "nobody",
-            "no daemon answers at fasaco/@v1/nobody",
-            "robots on this bus: robot",
-        ),
+        (covering.endpoint, "nobody", "no daemon answers at fasaco/@v1/nobody", "this bus: robot"),
         (free_endpoint(), "robot", "fasaco-edge: ", "start the daemon"),
     ):
         words = ("--once", "--timeout", "1", "--connect", endpoint, "--robot", robot)

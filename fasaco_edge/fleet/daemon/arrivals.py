@@ -1,7 +1,7 @@
-"""Fleet arrivals: filter and rate limit for the messages of other robots to the loop.
+"""Fleet arrivals: filter and rate limit of other robots' messages, before the loop gets them.
 
-All fleets under one ``bus.base`` publish on the same keys, and any other publisher can. The number
-of publishers tracked is limited: a robot of another fleet never displaces one of this fleet.
+All fleets under one ``bus.base`` publish on the same keys; other publishers can, too. Robots of
+this fleet and other publishers are tracked separately, each up to a limited number.
 """
 
 from __future__ import annotations
@@ -31,12 +31,11 @@ class FleetArrivals:
 
     def __init__(self, keys: Keys, fleet: str) -> None:
         self._keys, self._fleet = keys, fleet
-        # Times of the last messages by key [s], the oldest first: of robots of this fleet, and of
-        # other publishers.
+        # Time of each key's last message [s], oldest first: robots of this fleet; other publishers.
         self._received_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
-        # Time of the last message without a readable fleet's name that the loop got [s]; it gets
-        # some, to report the fault.
+        # The loop gets some messages whose fleet is unreadable, to report the fault: time of the
+        # last [s].
         self._unreadable_at = float("-inf")
         self._has_refused = False
         self._faults = deque[FasacoError](maxlen=1)
@@ -68,7 +67,7 @@ class FleetArrivals:
         return [self._faults.popleft() for _ in range(len(self._faults))]
 
     def _has_place(self, key: str, now: float) -> bool:
-        """Give a free place to another robot of this fleet; return whether there was one."""
+        """Track another robot of this fleet if there is a free place; return whether there is."""
         if len(self._received_at) >= MOST_OTHERS:
             oldest = next(iter(self._received_at))
             if now - self._received_at[oldest] < FORGOTTEN_S:

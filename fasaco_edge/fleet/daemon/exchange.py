@@ -42,8 +42,8 @@ if TYPE_CHECKING:
 
 
 PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
-# Number of tiles of progress, and also of tiles of ground, in a periodic message (once a second),
-# and in a message on a change. In all 20 kB/s, and up to 7 kB/s more after a change of the epoch.
+# Limit on the tiles of progress, and on those of ground, in a periodic message (once a second) and
+# in a message on a change. A robot sends 20 kB/s, and up to 27 kB/s after a change of the epoch.
 TILES, FEW_TILES = 10, 2
 
 
@@ -135,7 +135,7 @@ class FleetReceiver:
         placed = self._frames.event(received, _pose(*member.origin), member.lattice_deg)
         if received.parts and not placed.parts:
             self._faults.append(
-                FleetError(f"{robot}: its division has a seed farther off than cells may lie here")
+                FleetError(f"{robot}: its division has a seed outside this robot's limits")
             )
         return placed
 
@@ -207,7 +207,7 @@ class FleetSender:
         self._publisher.put(encode_json(member))
 
     def _frame_sent(self, mission: Mission) -> str:
-        """Return the fleet's frame, or the map's own if its pose in the fleet's is not known."""
+        """Return the fleet's frame; the map's own frame while its pose in the fleet is unknown."""
         frame = mission.ledger.frame
         if not fleet_of(mission).shared.why_misplaced(frame):
             return self._frame or frame
@@ -218,7 +218,7 @@ class FleetSender:
 def _thinned(points: Sequence[Point]) -> Sequence[Point]:
     """Return a line's points [m], evenly thinned to the number that a message holds.
 
-    Both ends remain. Lines of 2 m have more points if cells are narrower than 3.2 cm.
+    Both ends remain. Cells narrower than 3.2 cm give a line of 2 m too many points.
     """
     if len(points) <= MAX_FLEET_POINTS:
         return points

@@ -3,8 +3,8 @@
 A cell belongs to the robot with the least sum of its handicap and the travel time from its seed. So
 each part is connected, and cells that a map shows later have an owner, too. Handicaps balance the
 workload of the parts. Seeds start at the robots, or far from one another; then they move to the
-centres of the parts (Lloyd's algorithm, with travel times as distances). The division chosen has
-the shortest makespan if each robot always walks to its nearest open cell.
+centres of the parts (Lloyd's algorithm, with travel times as distances). ``divide`` selects the
+division with the shortest makespan for robots that always walk to their nearest open cell.
 """
 
 from __future__ import annotations
@@ -20,17 +20,16 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
 from fasaco_edge.mission.core.events import Part
 
-# Of more cells than this only every second (third, ...) one is used.
-# Limit on the product of rounds, robots and cells: it lowers the rounds, to one at least.
+# Largest number of cells used: of more cells, every second (third, ...) is used.
+# Limit on rounds x robots x cells: the number of rounds is lowered to keep it, but not below one.
 MOST_CELLS, MOST_SEARCHED = 2_000, 3_000_000
 # Rounds of moving the seeds; updates of the handicaps, and the factor between successive ones.
 ROUNDS, CHANGES, DAMPING = 3, 30, 0.85
-# Number of searches for handicaps with the same seeds: after the first, each search uses the
-# robots' times per cell that the last one gave.
+# Number of searches for handicaps with the same seeds; each uses the times per cell that resulted
+# from the previous search.
 EVENED = 3
 # Factor on the makespan of the old seeds, below 1 to favour them.
-# Weight of the cost of moved cells. The cost: the share of cells that move from one robot to
-# another, which had a part, too, times the robots' mean time.
+# Weight of the cost of moved cells: their share of all cells, times the robots' mean time.
 STABLE, CHANGED = 0.9, 1.0
 
 
@@ -165,7 +164,7 @@ class _Choice:
         self.seeds: list[Cell] = []
         self.handicaps_s = np.zeros(0, np.float32)
         self._travel, self._before, self._turn_steps = travel, before, turn_steps
-        # Which robots had cells: cells for a robot that had none cost nothing.
+        # Which robots had cells: moving cells to a robot without cells costs nothing.
         self._had = np.bincount(before[before >= 0], minlength=len(starts)) > 0
         self._steps_s = steps_s
         lattice, cols = travel.lattice, travel.lattice.steps.shape[1]
@@ -217,7 +216,7 @@ def _cells_s(
 ) -> NDArray[np.float64]:
     """Return each robot's time per cell, float64 (k,) [s]; the average for a robot without cells.
 
-    It is at least the time of a step: a robot on its only cell would have the time 0.
+    The least value is the time of a step, as a robot that stands on its only cell ends at 0 s.
     """
     count = np.bincount(owner, minlength=len(ends_s))
     mean_s = ends_s.sum() / len(owner)

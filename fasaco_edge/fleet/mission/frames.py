@@ -19,11 +19,11 @@ from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
 from fasaco_edge.mission.core.events import MemberReceived
 from fasaco_edge.mission.coverage.ledger import TILE
 
-# Number of robots tracked at once. It exceeds the number of members, to keep the tiles of refused
-# robots: a refused robot may become a member, and it sends few tiles in a message.
+# Number of robots tracked at once. It exceeds the number of members: a refused robot may become a
+# member later, and would need many messages to send its tiles again.
 MOST_OTHERS = 64
 
-# Overlaps of tiles [cells], and angles [rad], below these are due to rounding.
+# Smaller overlaps of tiles [cells] and smaller angles [rad] are rounding errors.
 TOUCH, STRAIGHT = 1e-6, 1e-9
 
 
@@ -57,7 +57,7 @@ class ResampledTiles:
         self._given: dict[tuple[int, int], bytes] = {}
         # Cached tiles of this lattice, until one of their source tiles changes.
         self._made: dict[tuple[int, int], bytes] = {}
-        # Places of the tiles that have ever been filled.
+        # Places of the tiles that are not empty, or were not empty earlier.
         self._shown: set[tuple[int, int]] = set()
 
     def tiles(self, tiles: Iterable[Placed]) -> tuple[Placed, ...]:
@@ -160,7 +160,7 @@ class FleetFrames:
             y=y,
             ahead=tuple(placed_point(frame, *point) for point in message.ahead),
             tiles=swept.tiles(message.tiles),
-            # Not known: a tile here overlaps several of theirs, which may not all have arrived.
+            # Unknown: a tile here overlaps several tiles of the other, and some may not have come.
             kept=None,
             ground=ground.tiles(message.ground),
             parts=parts,

@@ -1,6 +1,6 @@
 """Giving way: when the robot waits for other robots of its fleet, and where it makes way for them.
 
-While it waits, its path is set aside. Afterwards it resumes the path; a way home is planned again.
+While it waits, its path is set aside. Afterwards it resumes the path, or plans a new way home.
 ``fleet.mission.traffic`` decides what obstructs the robot.
 """
 
@@ -47,11 +47,11 @@ BESIDE_M, MOVED_M = 0.4, 0.1
 ARRIVED_M = 0.05
 # Length of the way to the refuge that is checked for other robots [points].
 LOOK_POINTS = int(WAIT_M / 2 / SPACING_M)
-# Another robot is in the way if its distance from the way has decreased by this since the way was
-# chosen [m].
+# A robot comes in the way to the refuge if its distance from this way decreases by more than this
+# after the way was chosen [m].
 COMES_M = 0.05
-# A robot that has stayed within STAYS_M [m] for LONG_S plans around the robot that obstructs it,
-# even if the other one's noisy poses seem to move. After TOO_LONG_S it is reported [s].
+# A robot that has stayed within STAYS_M [m] for LONG_S [s] plans around the robot that obstructs
+# it, even if that robot's noisy poses seem to move. After TOO_LONG_S [s] it is reported as stuck.
 STAYS_M, LONG_S, TOO_LONG_S = 0.2, 30.0, 60.0
 # Least time between two searches for a refuge [s].
 AGAIN_S = 2.0
@@ -209,7 +209,7 @@ class GivingWay(Waiting):
             self._place, self._free_since = here, now
         if self.waits_for:
             self._waited, self._waited_at = self._reason, now
-        # A moment without an obstruction is no progress.
+        # A moment without an obstruction does not end a wait.
         has_waited = now - self._waited_at <= STANDS_S
         if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
             self._stays_at, self._stays_since, self._failed_refuge = here, now, None
@@ -241,7 +241,7 @@ class GivingWay(Waiting):
         return least_apart_m(self._radius_m, near.message)
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
-        """Return whether the robot is at the centre of its refuge: the edge may be in the way."""
+        """Return whether the robot is at the centre of its refuge; at the edge it may obstruct."""
         place = self._map.place_of(refuge)
         return place is None or math.dist(here, place) <= ARRIVED_M
 
@@ -285,8 +285,7 @@ class GivingWay(Waiting):
     ) -> PathUpdate | None:
         route, neighbours = self._route, self._neighbours
         if found.robot != self.waits_for:
-            # Neither a moment without an obstruction nor a change of the obstructing robot is
-            # progress.
+            # A wait for another robot at the same place continues the time of this wait.
             self._since = self._stays_since
         was_waiting = bool(self.waits_for)
         self.waits_for, self._reason = found.robot, found.reason
@@ -298,7 +297,7 @@ class GivingWay(Waiting):
         is_long = now - self._since > PATIENCE_S or self._is_stalled(now)
         # The robot is not free to drive while it waits.
         self._free_since = now
-        # This includes a robot with right of way: it may be jammed.
+        # Plans also avoid a robot with right of way, as it may be jammed.
         stands = neighbours[found.robot].stands_s > STANDS_S or now - self._stays_since > LONG_S
         if is_long and stands:
             self._fleet.others.avoid(found.robot)

@@ -101,7 +101,7 @@ def viewpoint(
 ) -> Cell | None:
     """Return a viewpoint for the nearest wanted cell beyond a robot's own area, or None.
 
-    It is the last cell (row, col) of the robot's own area on the shortest way to that cell.
+    The viewpoint is the last cell (row, col) of this area on the shortest way to the wanted cell.
 
     Args:
         area: cells that the robot can reach on its own map.
@@ -153,7 +153,7 @@ def _joined(
     With ``doors``, ways also lead through blocked cells that others can reach.
     """
     lattice, window = area.lattice, area.lattice.window
-    # The nearest tiles first: those far away may come from a faulty robot.
+    # The nearest tiles first, as tiles far away may come from a faulty robot.
     row, col = (window.row0 + window.row1) / 2, (window.col0 + window.col1) / 2
     places = sorted(tiles, key=lambda at: (abs(at[0] * TILE - row) + abs(at[1] * TILE - col), at))
     around = window
@@ -194,8 +194,8 @@ def _joined(
         return ReachableArea(whole_lattice, reached)
     first = int(seeds[0, 0]) + around.row0, int(seeds[0, 1]) + around.col0
     joined = ReachableArea.around(whole_lattice, first).reachable
-    # Own cells that are reachable only over the ground of others count if another robot can reach
-    # them, too: a wall that this robot has not seen may separate them.
+    # This robot may reach some of its own cells only over the ground of others. Such a cell counts
+    # if another robot reaches it, too: otherwise an unseen wall may separate it.
     return ReachableArea(whole_lattice, joined & (reached | known) & ~door)
 
 

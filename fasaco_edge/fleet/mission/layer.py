@@ -28,8 +28,8 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
 
-# Period of checks [s]. While no robot leaves, least age of a division before a new one [s]: in
-# general, and for balance.
+# Period of checks; least age of a division at which a new one replaces it, in general and for
+# balance [s]. A robot that leaves causes a new division at once.
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts are rebalanced only above this ratio and this difference [s].
 UNEVEN, UNEVEN_S = 1.25, 40.0
@@ -45,7 +45,7 @@ class FleetLayer(Company):
 
     Attributes:
         others: the other robots.
-        numbers: the newest division's number, and who made it.
+        numbers: the newest division's number and author.
         step_s: this robot's time to sweep one cell [s].
     """
 
@@ -94,7 +94,7 @@ class FleetLayer(Company):
 
     @property
     def has_members(self) -> bool:
-        """Whether messages of other robots have come."""
+        """Whether messages of other robots have arrived."""
         return bool(self.others.known)
 
     @property
@@ -171,7 +171,7 @@ class FleetLayer(Company):
         """Return the cells on which this robot sweeps the floor, visited or not.
 
         These are the cells of its part; or all, if its part is visited and the others make no
-        progress. So the robot sweeps the floor of each cell that ``mine`` gives it.
+        progress. They include all cells of ``mine``.
         """
         if self._division is None:
             return cells
@@ -288,11 +288,11 @@ class FleetLayer(Company):
         owners = self._owners_on(division, joint)
         cells = np.bincount(owners[left], minlength=len(division.parts))
         if not cells[division.names.index(self._robot)]:
-            # If the last division gave this robot no part, another one soon after would not either.
+            # After a division without a part for this robot, the same cells give it no part again.
             is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
-        # A robot that cannot reach all of these robots does not know all cells left to each.
+        # This robot knows the cells left to each robot only if it can reach all of them.
         if not names.issuperset(division.names):
             return ""
         steps_s = np.array([part.step_s for part in division.parts])

@@ -30,8 +30,8 @@ class MemberCells:
     Attributes:
         epoch: of the tiles.
         lattice: pose of its lattice in this robot's lattice when the tiles arrived [m].
-        is_doubtful: whether all cells of this epoch are disregarded, because some were disregarded
-            when the sender's lattice moved, and their new places are not known.
+        is_doubtful: whether all cells of this epoch are disregarded: some were disregarded when the
+            sender's lattice moved, and their new places are unknown.
     """
 
     epoch: int

@@ -21,11 +21,11 @@ from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Timeouts of a silent robot, and of a robot at work that does not move [s]; least motion [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05
-# A robot that plans avoid has driven on once it is this far from its place [m]; noise of the poses
-# of a standing robot is less.
+# Plans avoid a standing robot until it is this far from its place [m]: more than the noise of its
+# poses.
 LEFT_M = 0.2
 
-# Absence of a silent robot.
+# ``Member.absence`` of a silent robot.
 GONE = "gone"
 AT_WORK = (State.PLANNING, State.COVERING, State.DEGRADED)
 
@@ -40,7 +40,7 @@ class Member:
         left_out: why it does not belong to this fleet; "" if it does.
         place: its position x, y at its last motion [m].
         moved_at: time of the last motion [s].
-        left_at: when it last left a new division [s].
+        left_at: when it last stopped work soon after a division [s].
     """
 
     newest: MemberReceived
@@ -210,7 +210,7 @@ class Members:
         return {name: m.newest.division for name, m in self.known.items() if not m.left_out}
 
     def note_left(self, names: set[str], now: float) -> None:
-        """Note that robots have left a new division."""
+        """Note that robots have stopped work soon after a division."""
         for name in self.known.keys() & names:
             self.known[name] = replace(self.known[name], left_at=now)
 

@@ -41,7 +41,7 @@ class Messages:
             return None
         others, pose, tiles = fleet_of(mission), mission.pose.pose, mission.ledger.snapshot().tiles
         if others.shared.epoch != self._epoch:
-            # All tiles are sent again. Which cells were swept before a restart is not known.
+            # All tiles are sent again. After a restart, the cells swept before are unknown.
             before = tiles if self._epoch else None
             self._epoch, self._swept, most = others.shared.epoch, SweptQueue(before), most_anew
         swept = self._swept.next(tiles, most)
@@ -72,8 +72,8 @@ def path_ahead(mission: Mission) -> NDArray[np.float64]:
 
 
 def waits_for(mission: Mission) -> str:
-    """Return the name of the robot that this robot waits or makes way for, or whose work it waits
-    for; "" for none."""
+    """Return the robot that this robot waits or makes way for, or the busiest robot while this
+    robot has no work; "" for none."""
     name, orders = mission.giving_way.waits_for, mission.orders
     stands = mission.doing is State.COVERING and len(mission.route.path.ahead) < 2
     if name or not (stands and orders.waits_for_others):

@@ -46,8 +46,8 @@ def refuge(
     """Return the cells of the way to the refuge, int32 (n, 2), or None.
 
     The refuge is the nearest cell off the discs and paths of other robots; the way avoids their
-    discs. It begins at the robot's cell, or a cell beside it, that the robot can drive to without
-    coming nearer to any robot. If there is no such way, it begins at the robot's cell.
+    discs. The way begins at the robot's cell or a cell beside it: the robot can drive there without
+    coming nearer to any robot. Without such a way, one from the robot's cell is returned.
 
     Args:
         area: the reachable area.
@@ -75,7 +75,7 @@ def refuge(
         theirs = spaced([(message.x, message.y), *message.ahead])
         apart = np.hypot(*(points[:, None] - theirs[None]).transpose(2, 0, 1))
         is_free &= (apart >= clear_m).all(axis=1)
-        # A robot that is too near to another may only go where the distance grows.
+        # A robot too near to another may only move away from it.
         is_farther = apart[:, 0] > math.dist(place, (message.x, message.y)) + 1e-6
         is_passable &= (apart[:, 0] >= clear_m) | here | is_farther
     closed = np.zeros(area.reachable[rows, cols].shape, np.bool_)
@@ -89,7 +89,7 @@ def refuge(
         if _leads_away(first, point, beside, sees)
     ]
     way = _nearest(steps, begins, at[is_free], corner)
-    # Else the robot first comes nearer to another one, which may still let it pass.
+    # Without such a way, the robot first comes nearer to another robot, which may let it pass.
     return _nearest(steps, [(0.0, local)], at[is_free], corner) if way is None else way
 
 

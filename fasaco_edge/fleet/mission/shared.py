@@ -7,8 +7,8 @@ changes, the sender's earlier reports are dropped. The progress of an absent rob
 
 Cells that this robot has to sweep again (a second pass, a reset, a map that moved) are disregarded
 until the robot that swept them has forgotten them itself. Each robot reports which of its cells it
-swept before its epoch. A cell stays disregarded if the sender does not know that, or if it swept
-the cell again in an epoch of which no message arrived: it is then swept once more than needed.
+swept before its epoch. Some cells are swept once more than needed: the sender may not know when it
+swept a cell, or swept it again in an epoch whose messages were all lost.
 """
 
 from __future__ import annotations
@@ -101,8 +101,8 @@ class SharedProgress(OthersCells):
     def enter(self, frame: str) -> None:
         """Note the active frame.
 
-        Unless configured, the place is that of the first map. On another floor the robot has
-        another map, whose place is not known.
+        If the configuration names no frame, the place belongs to the first map. On another floor
+        the robot has another map, and its place is unknown.
         """
         if self._place is not None and not self._map_frame:
             self._map_frame = frame

@@ -1,8 +1,8 @@
 """Shared work of a fleet: which robots take part, what is left, and which division is the newest.
 
-A robot without a part stands while the others make progress: it would be in their way. Of two
-divisions, that with the higher number is newer; between equal numbers the author's name that sorts
-first wins. Numbers too far ahead are errors of their sender.
+A robot without a part stands still while the others make progress, so as not to obstruct them. Of
+two divisions, the one with the higher number is newer; between equal numbers the author whose name
+sorts first wins. Numbers too far ahead are errors of their sender.
 """
 
 from __future__ import annotations
@@ -68,8 +68,8 @@ class Remainder:
         self.note(cells, own, swept, now)
 
 
-# Largest number of a division; largest lead over this robot's own number, more than others make in
-# a day; largest first number of a robot that joins.
+# Largest number of a division; largest lead of a received number over this robot's own, more than
+# a day's divisions; largest number that a robot takes over when it joins.
 MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 
 
@@ -89,7 +89,7 @@ class DivisionNumbers:
     def newer(self) -> MemberReceived | None:
         """Return the newest valid division received that is newer than this robot's, or None.
 
-        Divisions without a part for this robot are skipped: their author takes it for absent.
+        Divisions without a part for this robot are skipped: to their authors it is absent.
         """
         most = self._most_valid()
         found = [
@@ -151,8 +151,8 @@ class AtWork:
         """Return the robots of the last division that take part, but are not in reach.
 
         This robot's map shows no way to them, or their messages no longer arrive, but the author of
-        the division still reaches them. If left out, they would make a division that leaves out the
-        robots that they do not reach.
+        the division still reaches them. Robots that are left out would divide again, and leave out
+        the robots that they do not reach.
         """
         found, seen = [], {robot.name for robot in robots}
         for part in () if division is None else division.parts:

@@ -25,7 +25,7 @@ SLACK_S = 3.0
 # Distance to a conflict at which a robot waits; difference up to which distances are about equal
 # [m].
 WAIT_M, NEARER_M = 1.0, 0.5
-# A robot makes way for another whose path leads over it within this length [m].
+# A robot makes way if the first OVER_M of another robot's path lead over it [m].
 OVER_M = 1.5
 # A robot that has stood for STANDS_S is an obstacle; a robot that is blocked or has waited for
 # PATIENCE_S makes way, or plans around the other [s].
@@ -77,7 +77,7 @@ class Obstruction:
 
 
 def least_apart_m(radius_m: float, other: MemberReceived) -> float:
-    """Return the least allowed distance of a robot's centre from another's, for its radius [m]."""
+    """Return the least allowed distance between the centres of two robots [m]."""
     return radius_m + other.radius_m + CLEARANCE_M
 
 
@@ -100,20 +100,21 @@ def obstruction(
 ) -> Obstruction | None:
     """Return a robot's obstruction; None if there is none.
 
-    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. For each
-    other robot, the first row applies whose two conditions hold:
+    A robot has stopped if it waits, has no path, or has stood on its path for STANDS_S. Of two
+    robots, the first is the one whose name sorts first. It is this robot's turn if it is the first,
+    has a path, and both wait for each other. For each other robot, the first row applies whose two
+    conditions hold; "is blocked" is returned only if no other robot gives another decision.
 
     | the other robot | this robot | decision |
     |---|---|---|
-    | its path leads over this one; waits for this one or for none | waits for it, or has no path; \
-not if each waits for the other and this one has a path and is first by name | makes way |
-    | has stopped, WAIT_M / 2 ahead or less; waits for this one; has a path | waits for it; is \
-second by name | goes on waiting |
-    | has stopped, WAIT_M / 2 ahead or less | comes nearer to it | is blocked, unless it waits for \
-another robot |
-    | drives; both come too near within SLACK_S of each other | is WAIT_M from there or less, and \
-NEARER_M farther than the other, or about as far and second by name | waits |
-    | drives; both come too near within twice SLACK_S | is WAIT_M from there or less; waits for it \
+    | its path leads over this one; waits for no third robot | waits for it, or has no path; it is \
+not its turn | makes way |
+    | has stopped, at most WAIT_M / 2 ahead; waits for this one; has a path | waits for it; is the \
+second | goes on waiting |
+    | has stopped, at most WAIT_M / 2 ahead | comes nearer to it | is blocked |
+    | drives; both come too near within SLACK_S of each other | is at most WAIT_M from there, and \
+NEARER_M farther than the other, or about as far and the second | waits |
+    | drives; both come too near within twice SLACK_S | is at most WAIT_M from there; waits for it \
 | goes on waiting |
 
     Args:

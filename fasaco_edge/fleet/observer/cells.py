@@ -154,8 +154,7 @@ def cells_of(tiles: Iterable[CellTile]) -> Cells:
 
 
 def together(parts: Iterable[Cells]) -> Cells:
-    """Return the cells of all parts, each once, int64 (n, 2); parts far from the earlier ones are
-    left out."""
+    """Return the cells of all parts once, int64 (n, 2), except parts far from earlier parts."""
     joined = np.zeros((0, 2), np.int64)
     for part in parts:
         both = np.concatenate([joined, part])
@@ -190,7 +189,7 @@ def distances(ground: NDArray[np.bool_], start: Place, most_steps: int = FAR) ->
     """Return the steps from a cell to each cell of the ground, int32 (rows, cols); FAR for cells
     out of reach, or farther than ``most_steps``.
 
-    Steps lead to all of the four neighbours: which of them a robot can make is not known here.
+    Steps lead to all four neighbours, as the observer does not know which steps a robot can make.
     """
     # The border keeps steps from leading around an edge.
     free = np.pad(ground, 1)

@@ -20,8 +20,8 @@ from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import FLEET, MAP, POSE
 
-# Largest number of waiting samples of a topic; 1 for topics not named. Fleet messages repeat within
-# a second; all poses are needed to know which cells a robot drove through.
+# Largest number of waiting samples by topic; 1 for other topics. Fleet messages repeat within a
+# second; the cells that a robot drove through need all its poses.
 DEPTHS = {FLEET.name: 4, POSE.name: 256}
 # Least number of shares that the capacity is divided into.
 LEAST_SHARING = 4
@@ -37,7 +37,7 @@ class Received:
 
 @dataclass(slots=True)
 class Traffic:
-    """Counts of a robot's messages to its fleet, of their bytes, and of samples too large."""
+    """Numbers of a robot's fleet messages, of their bytes, and of its samples of excessive size."""
 
     messages: int = 0
     bytes: int = 0
@@ -145,7 +145,7 @@ class FleetSubscriptions:
         self._bus, self._keys, self._topics, self._post = bus, keys, topics, post
         # Names of the robots subscribed to.
         self.robots: set[str] = set()
-        # The robot whose turn it is, the end of its turn, its subscription until the map arrives.
+        # The robot whose map is requested, the end of its turn, its subscription to the map.
         self._turn, self._turn_until_ns = "", 0
         self._map: Subscription | None = None
 

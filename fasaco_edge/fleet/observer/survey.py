@@ -25,8 +25,8 @@ from fasaco_edge.fleet.observer.members import MOST_MEMBERS, Member, Members
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.wire.documents.fleet import TILE
 
-# Largest number of steps searched from the seeds of a division, over all robots. Only in very large
-# mazes do some cells get no owner.
+# Largest number of steps searched from the seeds of a division, over all robots. In very large
+# mazes, some cells get no owner.
 MOST_STEPS = 60_000
 # Largest number of cells in the rectangle around all cells, as for one robot.
 MOST_CELLS = (MOST_SPAN * TILE) ** 2

@@ -20,7 +20,7 @@ from fasaco_edge.errors import BadConfiguration, PlannerFailed
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.text import shown
 
-# Exceptions of the user's code, with those of ``sys.exit()``, which would look like a success.
+# Exceptions of the user's code. ``sys.exit()`` is included: it would look like a success.
 RAISED = (Exception, SystemExit, GeneratorExit)
 CALLED_WITH = "a planner is called with the problem alone, a class without arguments"
 SHAPE = "FILE.py:NAME or MODULE:NAME"
@@ -55,7 +55,7 @@ def load(place: str) -> UserCode:
         place: ``FILE.py:NAME`` or ``MODULE:NAME``.
 
     Raises:
-        BadConfiguration: there is nothing at this place, or it is no planner.
+        BadConfiguration: nothing, or no planner, is at this place.
         PlannerFailed: the file raised.
     """
     source, _, member = place.rpartition(":")
@@ -91,7 +91,7 @@ def user_code(planner: object, name: str = "", said: str = "planner", file: str 
         file: its file; "" to look it up.
 
     Raises:
-        BadConfiguration: it is none of these.
+        BadConfiguration: ``planner`` is none of these.
         PlannerFailed: an object of the class cannot be made.
     """
     of = planner if isinstance(planner, type) or hasattr(planner, "__code__") else type(planner)
@@ -186,7 +186,7 @@ def failure(error: BaseException, name: str, file: str) -> PlannerFailed:
 
 
 def too_long(error: BaseException, name: str, file: str, most_s: float | None) -> PlannerFailed:
-    """Return as text for the user that a planner took longer than ``most_s`` [s], and where."""
+    """Return the error of a planner that took longer than ``most_s`` [s], with the place."""
     return PlannerFailed(
         f"planner {name}: no walk after {most_s:g} s, its budget{_lines_in(file, error)}",
         hint="let it end, or give it a larger budget: --budget, or budget_s of Search",

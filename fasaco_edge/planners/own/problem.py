@@ -101,7 +101,7 @@ def walked(code: UserCode, problem: GridProblem, most_s: float | None = None) ->
 def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
     """Return the first ``most + 1`` cells that the code returned or yielded, as plain integers.
 
-    The first item that is no cell is returned as text, and ends the list.
+    An item that is no cell ends the list, and is returned as text.
     """
     found: list[Cell | str] = []
     for _, given in zip(range(most + 1), walk, strict=False):

@@ -15,15 +15,15 @@ AGAIN_S = 0.1
 
 
 class TookTooLongError(BaseException):
-    """The time is over; not an ``Exception``, as the code may catch these."""
+    """The time is over; not an ``Exception``, as the user's code may catch all of these."""
 
 
 @contextmanager
 def no_longer_than(most_s: float | None) -> Iterator[None]:
     """Interrupt the block after this time [s]; None for no limit.
 
-    There is no limit outside the main thread, which alone gets signals, and none if the program has
-    a timer of its own. A call into a compiled library is not interrupted before it returns.
+    There is no limit outside the main thread, as only it gets signals, and none if the program has
+    a timer of its own. A call into a compiled library is interrupted when it returns.
 
     Raises:
         TookTooLongError: the time was over.
@@ -47,7 +47,7 @@ def no_longer_than(most_s: float | None) -> Iterator[None]:
         finally:
             is_open = False
     finally:
-        # Again, as the signal may have interrupted the line above.
+        # Set again: the signal may have interrupted the ``finally`` above.
         is_open = False
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)

@@ -1,15 +1,14 @@
 """Walks by fixed rules: the paper's baselines, and the first walks of a search.
 
 Spanning-tree coverage, Gabriely and Rimon 2001 (``kernels.ants.baselines`` for any grid), is a
-closed walk. With no end cell, the walk stops at the last cell to cover. If an end cell other than
-the start is given, a shortest path to it is appended. The reversed walk is tried too; the cheaper
-wins.
+closed walk. With no end cell, the walk stops at the last cell to cover. With an end cell other than
+the start, a shortest path to it is appended. The cheaper of the walk and its reverse is returned.
 
 Spiral-STC and ZigZag are as the paper's authors ran them. Their Spiral-STC is a backtracking
 spiral: it follows the wall on its right, counter-clockwise, until no open cell is adjacent, and
 continues from the nearest open cell. Their ZigZag tries the directions in one fixed order at every
-cell and leaves dead ends the same way. Both are given here without the extra steps that their code
-makes at dead ends, which Table I counts too; see ``tests/benchmarks/RESULTS.md``.
+cell, and also continues from the nearest open cell. At dead ends the authors' code makes extra
+steps, included in Table I; this code does not make them, see ``tests/benchmarks/RESULTS.md``.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ STRAIGHT_ON = 64
 
 @dataclass(frozen=True, slots=True)
 class FixedRule:
-    """A deterministic planner: a rule gives its one walk.
+    """A deterministic planner, by a fixed rule.
 
     Attributes:
         name: name of the planner.
@@ -57,7 +56,7 @@ class FixedRule:
     def plan(
         self, problem: CoverageProblem, stop: StoppingCriterion = never, observe: Observer = ignore
     ) -> CoveragePath:
-        """Return the walk; it is too fast to need ``stop``."""
+        """Return the walk; ``stop`` is not called, as this takes little time."""
         began = time.perf_counter()
         cells = problem.cells_of(self.walk(problem, graph_of(problem)))
         return CoveragePath(
@@ -122,9 +121,9 @@ def first_walks(problem: CoverageProblem, graph: Graph) -> Iterator[NDArray[np.i
     """Yield complete walks, flat cells int32 (n,).
 
     On the first, an ant always takes the cell with the fewest open neighbours (Warnsdorff's rule).
-    If turns cost, the walks of an ant that goes straight on, of the spiral, the zigzag and the
-    spanning tree follow: each is best on some grids. If a direction of lanes is preferred, the last
-    walk is a zigzag in it.
+    If turns cost, four more follow, each the best on some grids: an ant that goes straight on, the
+    spiral, the zigzag, the spanning tree. If a direction of lanes is preferred, the last walk is a
+    zigzag in this direction.
     """
     yield _ant(problem, graph, velocity=1)
     if problem.cost.quarter_turn_us:

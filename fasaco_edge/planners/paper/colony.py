@@ -28,9 +28,9 @@ class ColonyConfig:
         alpha: weight of new pheromone, equations (7) and (8).
         tau0: pheromone every move starts with, equation (7).
         seed: seed of all random streams.
-        visibility: the value whose reciprocal is eta, equation (5). "neighbour": the distance to
-            the neighbour, 1, as in the paper; "distance": the distance that an ant goes at its
-            velocity; "fewest-open": one more than the number of the neighbour's open neighbours.
+        visibility: 1 / eta, equation (5). "neighbour": the distance to the neighbour, 1, as in the
+            paper; "distance": the distance that an ant goes at its velocity; "fewest-open": the
+            number of the neighbour's open neighbours, plus 1.
         beta: weight of eta, equations (4) and (6); no effect for "neighbour".
     """
 

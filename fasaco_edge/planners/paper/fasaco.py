@@ -6,9 +6,9 @@ strengthened by equation (8); line 9: the cheapest walk is returned, which is th
 steps cost. A colony whose only velocity is 1 is plain ACO.
 
 Deviations: delta phi of equation (8) is the cost of one step per cell over the cost of the walk.
-For steps alone that is ``cells / steps``, proportional to 1 over the length as in the paper, and
-about 1 at best on any map, so tau0 needs no tuning to the map's size. If a walk must end in a given
-cell, ants go there by a shortest path when all is covered.
+For steps alone this is ``cells / steps``: proportional to 1 / length as in the paper, and about 1
+at best on any map, so tau0 needs no tuning to the map's size. If a walk must end in a given cell,
+ants go there by a shortest path once all cells are covered.
 
 With a living trail (``planners.living_trail``) and a previous walk, the search continues instead of
 restarting. The ants start from that trail, and their number is proportional to the share of new
@@ -46,8 +46,7 @@ from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of
 from fasaco_edge.planners.walk_before import HELD_CELLS, can_repair, completed
 
 # Limit on the ants of a group, which walk at the same time. Larger groups keep more threads busy,
-# smaller ones respond to ``stop`` sooner: a group covers about this many cells, some ten
-# milliseconds.
+# smaller groups respond to ``stop`` sooner. A group covers CELLS_PER_GROUP, in about 10 ms.
 LARGEST_GROUP = 32
 SMALLEST_GROUP = 2
 CELLS_PER_GROUP = 64_000
@@ -55,7 +54,7 @@ CELLS_PER_GROUP = 64_000
 # Least number of ants, if hardly any cell is new.
 FEWEST_ANTS = 64
 
-# Initial memory for a walk; a group with a longer walk walks again with more memory.
+# Initial memory for a walk; if a walk is longer, its group walks again with more memory.
 STEPS_PER_CELL = 2
 
 
@@ -105,7 +104,7 @@ class Colony:
         return walk, cost_us
 
     def offer(self, walk: NDArray[np.int32], cost_us: int) -> None:
-        """Take a walk, flat cells int32 (n,), as the best if it is cheaper, or the first."""
+        """Take a walk, flat cells int32 (n,), as the best if it is the first, or cheaper."""
         if not self.best.size or cost_us < self.best_us:
             self.best, self.best_us = walk, cost_us
 

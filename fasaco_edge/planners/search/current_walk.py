@@ -1,7 +1,7 @@
 """Current walk of a search, and its best walk so far.
 
-Work is done on parts: a region of the ground that is loaded and put back (``walk_region``), or
-windows of it (``windows``). Results of a part are accepted here. Walks are framed cells.
+A search changes parts of the walk: a region of the ground that is loaded and put back
+(``walk_region``), or windows (``windows``). The results are accepted here. Walks are framed cells.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ class CurrentWalk:
     def progress(self) -> tuple[int, int]:
         """Return cost [us] and steps of the best walk.
 
-        A region's gain counts before it is put back, unless turns cost and the region has a border,
-        whose turns are known only afterwards.
+        The gain of a loaded region counts, too, except if turns cost and the region has a border:
+        the turns at the border are known once it is put back.
         """
         best_us, steps = self.best_us, self.best.size - 1
         exact = self.is_whole or not self._framed.prices.quarter_turn_us
@@ -108,7 +108,7 @@ class CurrentWalk:
         """Allocate memory for the regions, once the first walk is known."""
         framed, cells = self._framed, self._problem.cells
         if self.is_whole:
-            # If a few cells lie far apart, most of the walk is between them.
+            # The second value is for few cells far apart: most of the walk lies between them.
             visits = max(VISITS_PER_CELL * cells, 2 * self._walk.size)
             self.region = WalkRegion(framed.rows, framed.cols, visits, 1, self._trail)
         else:

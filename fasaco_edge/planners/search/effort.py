@@ -14,7 +14,7 @@ LEVELS = tuple(1.5 * (0.2 / 1.5) ** (level / 15) for level in range(16))
 
 WHOLE_WALK = -1
 EVERY_CELL = 1 << 30
-# Number of perturbations, of each 256, in which ants rebuild a disc.
+# Number of perturbations by ants, which rebuild a disc, among 256.
 BY_ANTS = 128
 
 
@@ -53,7 +53,7 @@ def effort_for(cost: CoverageCost, *, has_ants: bool = True) -> Effort:
             ants_of_256=by_ants,
         )
         return Effort((0,), 200, rules, 3_000)
-    # The parameters were tuned at turns of 1.5 steps; their temperatures are in steps.
+    # The unit of temperatures is a step if a quarter-turn takes 1.5 steps, as in the tuning.
     unit = (cost.step_us + cost.quarter_turn_us) * 2 // 5
     rules = PerturbationRules(
         limit=300,
@@ -77,7 +77,7 @@ class RepairEffort:
         proposals: number of proposals in a neighbourhood after which no perturbation begins.
             Proposals are counted, as the time of a perturbation differs by a factor of three.
         held: number of these proposals that leave the walk just ahead of the robot unchanged.
-        steady_us: a walk that keeps the robot's next cells is preferred up to this extra cost
+        steady_us: largest extra cost of a walk that is preferred because it keeps the next cells
             [us].
     """
 

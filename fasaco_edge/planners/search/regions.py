@@ -73,7 +73,7 @@ def _span(number: int, shift: int, size: int) -> tuple[int, int]:
 
 # Radius of a neighbourhood [steps]: walks are as good with 10 and 20, and worse with 3.
 RADIUS = 6
-# Limits on a neighbourhood: changed cells it grows from, and all cells.
+# Limits on a neighbourhood: on the changed cells that it starts from, and on all its cells.
 MOST_CHANGED, MOST_CELLS = 1_000, 3_000
 # Radius of a spot: a neighbourhood without a change, where the walk is to be improved.
 SPOT_RADIUS = 20
@@ -124,7 +124,7 @@ def neighbourhoods(
 def spot(framed: FramedGround, walk: NDArray[np.int32], number: int) -> Neighbourhood:
     """Return a neighbourhood at a spot along a walk, framed cells int32 (n,).
 
-    Spots of successive numbers are spread evenly along it, from any first number.
+    Any range of successive numbers gives spots spread evenly along the walk.
     """
     at = int(walk.size * (number * GOLDEN_RATIO % 1.0))
     return _around(framed, walk[:0], walk[at : at + 1], is_first=False, radius=SPOT_RADIUS)

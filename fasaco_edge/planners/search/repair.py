@@ -32,17 +32,17 @@ from fasaco_edge.planners.walk_before import HELD_CELLS, completed_from, framed_
 
 # Perturbations between two pauses.
 PERTURBATIONS_AT_ONCE = 8
-# Limit on the perturbations of a neighbourhood, for one in which no move can be proposed.
+# Limit on the perturbations of a neighbourhood, in case no move can be proposed in it.
 MOST_PERTURBATIONS = 100
 # Proposals of a second repair, for the path ahead, as a share of those of the first.
 FEW = 0.2
 
-# For attempts to improve a valid walk: stride between the first spots of two attempts, approximate
-# cells of a spot, and passes over all spots without gain after which the search ends.
+# Attempts to improve a valid walk: stride between the first spots of two attempts; approximate
+# number of cells of a spot; number of passes over all spots without gain that ends the search.
 STRIDE, SPOT_CELLS, PASSES = 997, 400, 4
 
-# Greatest number of cells for which a repair has a bound, and a second repair for the path ahead:
-# on larger walks the bound would dominate the time, and a second repair would double it.
+# Largest number of cells with a bound, and with a second repair for the path ahead: on larger
+# walks, the bound would dominate the time of a repair, and a second repair would double it.
 BOUNDED_CELLS = 2_000
 
 
@@ -86,9 +86,9 @@ def _steady(
 ) -> CoveragePath:
     """Return a path that begins with ``held`` steps of the previous walk, if it is similarly good.
 
-    A repair may change the path just ahead for a gain that a change farther ahead would give, too.
-    So only the walk after these steps is repaired, with few perturbations; more of them do not keep
-    more steps. The result costs no more than the completed walk.
+    A repair may change the path just ahead where a change farther ahead would gain as much. So only
+    the walk after these steps is repaired, with few perturbations, as more do not keep more steps.
+    The result costs no more than the completed walk.
     """
     assert problem.before is not None
     try:
@@ -171,8 +171,8 @@ class _Repair:
     def _improve(self, region: WalkRegion, place: Neighbourhood) -> Iterator[None]:
         """Improve around the changes, then perturb; pause after each piece.
 
-        Moves at equal cost change a walk without a gain: at first no move may change the cells
-        just ahead of the robot.
+        Moves at equal cost change a walk without gain, so at first none may change the cells just
+        ahead of the robot.
         """
         for held in (HELD_CELLS, 0) if place.is_first else (0,):
             region.hold(held)
@@ -243,8 +243,8 @@ def _changed(
 ) -> NDArray[np.int32]:
     """Return the new walk's cells at changed steps, int32 (n,), in its order.
 
-    A step is changed if one of the walks takes it more often. The old walk lacks the part at its
-    beginning that was driven meanwhile; that is no change.
+    A step is changed if one of the walks takes it more often. Steps driven meanwhile, which the old
+    walk lacks at its beginning, do not count.
     """
     ground = framed.ground
     listed = np.empty(2 * (before.size + walk.size), np.int32)

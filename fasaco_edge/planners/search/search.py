@@ -1,8 +1,8 @@
 """Search by colony and local search: a complete walk at once, then better ones until stopped.
 
 1. The first complete walk, within milliseconds, is the cheapest of some simple walks
-   (``first_walks``). A completed previous walk takes its place if it costs no more: then the cells
-   just ahead of the robot change only for a gain.
+   (``first_walks``). A completed previous walk replaces it if it costs no more; then the cells just
+   ahead of the robot change only for a gain.
 2. Local search improves it, region by region on a large ground.
 3. Perturbations follow, each with local search: ants rebuild a disc in every other one. If turns
    cost, windows of the walk are solved again in between (``windows``), most of the time if turns
@@ -44,15 +44,15 @@ GAINLESS_PASSES = 10
 # Perturbations between two evaluations of the whole walk, with one region.
 PERTURBATIONS_IN_VISIT = 64
 
-# States that windows expand between two pauses, about two milliseconds; pauses in the round of
-# windows after each visit of perturbations, with expensive turns and with cheap ones.
+# States that windows expand in a piece of work, in about two milliseconds; number of pieces after
+# each round of perturbations, with expensive turns and with cheap turns.
 EXPANSIONS_AT_ONCE = 30_000
 DEAR_PIECES, PIECES = 50, 5
 # This many windows without gain count as one perturbation.
 WINDOWS_A_PERTURBATION = 10
 # Beam width for solving the whole ground: WHOLE_STATES divided by the number of cells, within the
-# limits. The ground is solved from each corner, and the cheapest walk kept: four narrow beams find
-# more than one beam of four times the width.
+# limits. The cheapest of four solutions, one from each corner, is kept: it is better than the
+# solution of one beam that is four times as wide.
 WHOLE_STATES, LEAST_BEAM, MOST_BEAM = 8_000, 8, 100
 CORNERS = (0, LINES, PLACES, LINES | PLACES)
 
@@ -101,7 +101,7 @@ class Search:
             most = GAINLESS_PASSES * self._perturbed_in_pass
             if walk.is_whole:
                 most = self._effort.patience
-            # Without work the walk exceeds its memory, or lies in no region.
+            # A round did no work: the walk exceeds its memory, or lies in no region.
             if walk.since_gain >= most or self._work == before:
                 return
 
@@ -176,7 +176,7 @@ class Search:
         cost_us = problem.cost_us(walk, self._framed)
         if cost_us <= self._walk.cost_us:
             self._walk.begin(walk, cost_us)
-            # The first visits of a region are those of the walk only if there is one region.
+            # With several regions, the first visits of a region are not the first of the walk.
             self._walk.held = HELD_CELLS if self._walk.is_whole else 0
 
     def _begin_better(self) -> Iterator[None]:

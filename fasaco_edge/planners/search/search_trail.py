@@ -1,7 +1,7 @@
 """Search trail: the pheromone that the ants of a search or a repair read and change.
 
-It begins as the mission's living trail, if there is one, and is uniform elsewhere. A region copies
-its part, and pastes it back when it is done.
+It begins as the mission's living trail, and is uniform where there is none. A region copies its
+part of the trail, and pastes it back when it is done.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.planners.problem import CoverageProblem
 
-# Number of ants that rebuild a disc, whose cheapest result counts; range of a disc's radius.
+# Number of ants that rebuild a disc (the cheapest result counts); range of the disc's radius.
 ANTS, RADIUS = 16, (3, 6)
 # A move has up to four quarter-turns: two before it, and two at the end of a tunnel.
 MOST_QUARTERS = 4

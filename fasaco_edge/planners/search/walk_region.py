@@ -94,7 +94,7 @@ class WalkRegion:
         self._whole: tuple[Ground, NDArray[np.int32], Box] | None = None
 
     def load(self, framed: FramedGround, cells: NDArray[np.int32], box: Box) -> bool:
-        """Cut a region out; return False if the walk is not in it.
+        """Cut a region out; return False if the walk does not enter it, or exceeds the memory.
 
         Args:
             framed: the whole ground.

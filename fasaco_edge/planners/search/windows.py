@@ -1,8 +1,8 @@
-"""Windows of a walk solved again: the strong search where turns cost.
+"""Windows of a walk solved again, if turns cost.
 
 Moves of local search change a walk where it touches itself. With expensive turns, better lanes need
-many cells changed together: ``kernels.windows`` solves a window of some 100 cells again, with
-everything outside fixed, guided by the prices of the lower bound.
+changes of many cells together: ``kernels.windows`` solves a window of some 100 cells again, guided
+by the prices of the lower bound; the walk outside the window stays.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 
 # Limits on the cells of a window, and on the states kept: memory of 2 MB.
 WINDOW_CELLS, MOST_BEAM = 256, 300
-# Threshold of expensive turns, in steps per quarter-turn: above it windows are large; below it
-# small ones are as good, and faster.
+# Cost of a quarter-turn from which turns are expensive [steps]. Then windows are large; for cheaper
+# turns small windows are as good, and faster.
 DEAR_STEPS = 10
-# Price of a turn, in steps, from which solving the whole ground pays; at 1.25 it gains nothing.
+# Cost of a quarter-turn from which the whole ground is solved [steps]; at 1.25 this gains nothing.
 WHOLE_STEPS = 2
 # Lattices with more cells take too much memory: about 75 bytes per cell.
 MOST_LATTICE = 250_000
@@ -52,7 +52,7 @@ RING_TURNS = 1000
 # Windows that join rings: number per piece, number of pieces, beam.
 JOINS_AT_ONCE, JOIN_PIECES, JOIN_BEAM = 8, 40, 20
 NO_SIDE = 1 << 60
-# Expansions counted for a window that expands no state, as it has no possible gain; no limit.
+# Expansions counted for a window without a possible gain, which expands no state; no limit.
 EXPANSIONS_OF_WINDOW, NO_LIMIT = 64, 1 << 60
 NO_SEAMS = Seams(np.empty((0, 2), np.int32), np.empty(0, np.int32))
 
@@ -132,7 +132,7 @@ class WindowSearch:
         return True
 
     def solve(self, expansions: int, random: NDArray[np.uint64]) -> None:
-        """Solve windows until this many states were expanded."""
+        """Solve windows until they have expanded this many states."""
         windows = max(expansions // EXPANSIONS_OF_WINDOW, 1)
         self._solve(self._aim, NO_SEAMS, windows, expansions, random)
 
@@ -147,8 +147,8 @@ class WindowSearch:
     def solve_whole(self, beam: int, mirrored: int, random: NDArray[np.uint64]) -> Iterator[None]:
         """Solve the whole ground as one window, with this beam; pause after each line.
 
-        Its rings are joined; a better result is kept. ``mirrored`` is the corner to begin in, as
-        in ``kernels.windows.order``.
+        Then join the rings of the solution; keep the result if it is better. ``mirrored`` is the
+        first corner, as in ``kernels.windows.order``.
         """
         framed, ground, passages, terms = (
             self._framed,
@@ -161,7 +161,7 @@ class WindowSearch:
         price = RING_TURNS * terms.turn
         begin_window(ground, passages, terms, window, program, 0, ANY_PRICE, price, random)
         while advance_window(ground, passages, terms, window, program, beam):
-            # Work increases from pause to pause.
+            # Each line counts as work.
             self._tally[SOLVED] += 1
             yield
         self._tally[COST] += end_window(ground, passages, terms, window, program)
@@ -213,8 +213,8 @@ def _copy(source: Passages, target: Passages) -> None:
 def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return a walk over the same cells that takes no step three times, int32 (m,).
 
-    Of three passes over a step, two have the same direction. The part of the walk between these
-    two is reversed: then it joins the start of the first to the end of the second without them.
+    Of three passes over a step, two have the same direction. Both are left out, and the part of the
+    walk between them is reversed, so that it joins the walk before to the walk after them.
     """
     while walk.size > 1:
         low, high = np.minimum(walk[:-1], walk[1:]), np.maximum(walk[:-1], walk[1:])
@@ -243,7 +243,7 @@ def _terms(
     prices[cells] = priced
     step, turn = 2 * problem.cost.step_us, 2 * problem.cost.quarter_turn_us
     sides = np.where(masks[:, np.newaxis] >> np.arange(4) & 1, priced, NO_SIDE).min(axis=1)
-    # With these prices no first or last visit has a negative cost.
+    # These prices keep the costs of the first and the last visit from being negative.
     ends = is_wanted if problem.end is None else flat == problem.flat_end
     begin_price = -(step // 2 + int(sides[flat == problem.flat_start].min()))
     end_price = -(step // 2 + int(sides[ends].min()))

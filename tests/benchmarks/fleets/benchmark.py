@@ -1,4 +1,4 @@
-"""``benchmarks fleet-online``: a fleet in buildings that none of its robots knows."""
+"""``benchmarks fleet-online``: a fleet in buildings unknown to all its robots."""
 
 from __future__ import annotations
 
@@ -82,17 +82,19 @@ class FleetFigures:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--maps", nargs="*", default=["flat"], metavar="MAP")
     parser.add_argument(
-        "--generated", type=int, default=3, metavar="N", help="buildings (default: 3)"
+        "--generated", type=int, default=3, metavar="N", help="number of buildings (default: 3)"
     )
-    parser.add_argument("--cells", type=positive, default=1_000, help="of each (default: 1000)")
+    parser.add_argument(
+        "--cells", type=positive, default=1_000, help="cells of each building (default: 1000)"
+    )
     parser.add_argument("--robots", type=positive, nargs="+", default=[2, 4, 8], metavar="N")
     parser.add_argument("--line", choices=("cells", "thorough"), default="cells")
     parser.add_argument(
         "--loss", type=float, default=0.0, metavar="P",
-        help="chance that a message is lost, for each listener (default: 0)",
+        help="probability that a listener does not receive a message (default: 0)",
     )  # fmt: skip
     parser.add_argument(
-        "--period", type=float, default=1.0, metavar="S", help="between messages (default: 1)"
+        "--period", type=float, default=1.0, metavar="S", help="period of messages [s] (default: 1)"
     )
 
 
@@ -216,10 +218,10 @@ def _count(args: argparse.Namespace) -> int:
 
 FLEET_ONLINE = Benchmark(
     name="fleet-online",
-    summary="fleets in buildings that no robot knows, against one robot",
-    description="Let simulated robots with scanners, discs and messages share a building that "
-    "none of them knows, each with its own mission, in simulated time and one process, so that "
-    "the same options give the same run. Of real daemons it is `fasaco-edge demo --robots N`.",
+    summary="fleets in unknown buildings, against one robot",
+    description="Let simulated robots with scanners, discs and messages share an unknown building, "
+    "each with its own mission. Time is simulated, in one process, so the same options give the "
+    "same run. For real daemons use `fasaco-edge demo --robots N`.",
     add_options=_add_options,
     count=_count,
     measure=_measure,

@@ -1,7 +1,7 @@
-"""Robots of one fleet in a building that none of them knows, in simulated time.
+"""Robots of one fleet in an unknown building, in simulated time.
 
-Real missions plan for simulated robots; all of it in one process, so that the same options give
-the same run. Robots get each other's messages once a period, as far as ``hears`` lets them.
+Real missions plan for simulated robots, all in one process, so that the same options give the same
+run. Once a period, robots receive each other's messages, unless ``hears`` prevents this.
 """
 
 from __future__ import annotations

@@ -43,13 +43,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=_some,
         default=0,
         metavar="N",
-        help="synthetic buildings of --cells cells, instead of the default maps (default: none)",
+        help="number of synthetic buildings, in place of the default maps (default: 0)",
     )
     parser.add_argument(
         "--cells",
         type=within(FEWEST_CELLS, MOST_CELLS),
         default=5_000,
-        help="of generated buildings (default: %(default)s)",
+        help="cells of each synthetic building (default: %(default)s)",
     )
     parser.add_argument(
         "--planners",
@@ -58,7 +58,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         default=[DAEMON],
         metavar="NAME",
         help="; ".join(f"{name}: {one.about}" for name, one in CONTENDERS.items())
-        + "; figures and goals are of the first, a table has all (default: %(default)s)",
+        + "; figures and goals are for the first, a table compares all (default: %(default)s)",
     )
     _add_robot_options(parser)
     parser.add_argument(
@@ -66,21 +66,21 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=positive,
         default=2,
         metavar="N",
-        help="in each building: its own, others drawn (default: %(default)s)",
+        help="starts in each building: its own, then random ones (default: %(default)s)",
     )
     parser.add_argument(
         "--seeds",
         type=positive,
         default=1,
         metavar="N",
-        help="0 to N - 1, of the planner (default: %(default)s)",
+        help="use the planner's seeds 0 to N - 1 (default: %(default)s)",
     )
     parser.add_argument(
         "--proposals",
         type=positive,
         default=2_000_000,
-        help="moves that a plan may try, in place of the daemon's time (default: %(default)s, "
-        "about its 0.1 s)",
+        help="limit on the moves that a plan tries, in place of the daemon's time limit (default: "
+        "%(default)s, about its 0.1 s)",
     )
 
 
@@ -91,27 +91,27 @@ def _add_robot_options(parser: argparse.ArgumentParser) -> None:
         type=within(0.1, 100.0),
         default=[3.5, 8.0],
         metavar="M",
-        help="reach of the scanner, which looks all around [m] (default: 3.5 8)",
+        help="range of the scanner, of 360 degrees [m] (default: 3.5 8)",
     )
     parser.add_argument(
         "--cost",
         choices=("steps", "turns"),
         default="steps",
-        help="what walks are to have little of: steps alone, or time with turns (default: steps)",
+        help="cost to minimise: steps alone, or time with turns (default: steps)",
     )
     parser.add_argument(
         "--turn-s",
         type=SECONDS,
         default=1.5,
         metavar="S",
-        help="a quarter-turn [s] (default: %(default)g)",
+        help="time of a quarter-turn [s] (default: %(default)g)",
     )
     parser.add_argument(
         "--speed-m-s",
         type=within(0.01, 10.0),
         default=0.25,
         metavar="V",
-        help="straight on [m/s] (default: %(default)g)",
+        help="speed straight on [m/s] (default: %(default)g)",
     )
 
 
@@ -136,13 +136,12 @@ def _report(args: argparse.Namespace, runs: Sequence[MissionRun]) -> Report:
 
 ONLINE = Benchmark(
     name="online",
-    summary="whole missions in unknown buildings, against robots that know them",
-    description="Send a simulated robot into buildings it does not know: after every cell its "
-    "scanner reveals some more, the real mission decides, the daemon's planner plans with "
-    "counted work, and the robot drives on; without a bus and without "
-    "waiting for plans, so that the same options give the same missions. Every trail is judged "
-    "by code that shares nothing with mission and planner, and compared with the near-optimal "
-    "walk of a robot that knew the building. A ratio of 1.015 is 1.5 % more.",
+    summary="whole missions in unknown buildings, against plans on known maps",
+    description="Send a simulated robot into unknown buildings. After every cell it scans, the "
+    "real mission decides, the daemon's planner plans with counted work, and it drives on. There "
+    "is no bus and no waiting for plans, so the same options give the same missions. A judge that "
+    "shares no code with mission and planner compares every track with a near-optimal walk on the "
+    "known map. A ratio of 1.015 is 1.5 % more.",
     add_options=_add_options,
     count=lambda args: count(_plan(args)),
     measure=lambda args, say: measure(_plan(args), say),

@@ -1,8 +1,7 @@
-"""Buildings for missions that do not know them: the truth, its lattice, and where to start.
+"""Buildings for missions without a map: the true map, its lattice, and starts.
 
-A mission sees pixels. Maps have their own; of a coverage grid every cell becomes 2 x 2
-pixels, and the robot is a little narrower than a cell, so that the lattice over the pixels
-is the coverage grid again.
+Missions need pixels. Each cell of a coverage grid becomes 2 x 2 pixels, and the robot is a little
+narrower than a cell, so that the lattice over the pixels equals the coverage grid.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Planners that missions are made with: the daemon's, and the paper's own."""
+"""Planners of the simulated missions: the daemon's, and the paper's."""
 
 from __future__ import annotations
 

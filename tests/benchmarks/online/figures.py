@@ -1,7 +1,4 @@
-"""Missions summed up: medians and worst ones.
-
-What missions in buildings are to reach; of the goals, those that were measured.
-"""
+"""Figures of several missions (medians and worst values), and the goals for them."""
 
 from __future__ import annotations
 

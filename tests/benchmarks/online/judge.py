@@ -1,4 +1,4 @@
-"""Figures of a mission: the driven path judged by the building alone, and what the robot saw."""
+"""Figures of a mission: its driven path, judged on the true map, and the part that it saw."""
 
 from __future__ import annotations
 

@@ -1,15 +1,11 @@
-"""What there is to note of a mission under way: times, what is kept of paths, what is stale.
+"""Mission in simulated time: the real ``Mission.step``, and a robot that executes its decisions.
 
-Who answers a mission's requests for a plan, at once and with a counted amount of work.
+After every leg the robot scans. The mission receives the changes and the pose, and its decision is
+executed before the next leg. The time of the decision is measured, but the robot does not wait.
 
-A daemon's planner works until its time is up; here it works until it has tried so many moves,
-so that the same mission can be had again on any machine.
-
-A whole mission in simulated time: the real ``Mission.step``, and a robot that does as told.
-
-After every leg the robot looks around; what is new goes to the mission with its pose, and its
-decision is carried out before the next leg. The time that takes is measured, but the robot
-does not stand meanwhile.
+A daemon's planner has a time limit. Here it has a limit on the moves that it tries, so that every
+machine reproduces the same mission. The record of a mission has times, the share of each path that
+the next one keeps, and outdated plans.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Missions to tables."""
+"""Tables of missions."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What the robot sees of a building: its own map, and what of it is news.
+"""Map that a robot has of a building, and its changes.
 
-As a mapper publishes it: the whole map where it has grown, else an update of what changed.
+Like a mapper, it gives the whole map after it has grown, and otherwise an update of the changes.
 Localisation is perfect.
 """
 

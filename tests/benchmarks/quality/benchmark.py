@@ -1,4 +1,4 @@
-"""``benchmarks quality``: how near to the best known walks a plan comes in so much time."""
+"""``benchmarks quality``: cost of plans over that of the best known walks, by time budget."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--results",
         type=Path,
         metavar="FILE.json",
-        help="what other planners reached on the grids, by name: results {planner: {full, steps, "
+        help="results of other planners by the grid's name: results {planner: {full, steps, "
         "turns_90, turns_180, returns_home}}, proven_optimum {open_steps, closed_steps}, bounds; "
-        "without it ratios are to the search's own lower bound",
+        "without a file, ratios are to the search's own lower bound",
     )
     parser.add_argument(
         "--budgets",
@@ -44,10 +44,14 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=seconds_above_zero,
         default=[0.02, 0.1, 1.0],
         metavar="S",
-        help="plan for so long [s] (default: 0.02 0.1 1; there is a goal for 10, too)",
+        help="time budgets of a plan [s] (default: 0.02 0.1 1; there is a goal for 10, too)",
     )
     parser.add_argument(
-        "--seeds", type=positive, default=10, metavar="N", help="0 to N - 1 (default: %(default)s)"
+        "--seeds",
+        type=positive,
+        default=10,
+        metavar="N",
+        help="use seeds 0 to N - 1 (default: %(default)s)",
     )
     _add_choice(parser, "--end", ("anywhere", "home"), ["anywhere"], "where walks end")
     _add_choice(
@@ -55,23 +59,23 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--cost",
         ("steps", "turns"),
         ["steps", "turns"],
-        "what walks are to have little of: steps alone, or time with turns at their price",
+        "cost to minimise: steps alone, or time with turns",
     )
     parser.add_argument(
         "--turn-s",
         type=SECONDS,
         default=1.5,
         metavar="S",
-        help="a quarter-turn [s], where a step takes 1 s and a half turn two quarter-turns "
-        "(default: %(default)g, that of the goals)",
+        help="time of a quarter-turn [s]; a step takes 1 s, a half turn two quarter-turns "
+        "(default: %(default)g, as in the goals)",
     )
     _add_choice(
         parser,
         "--variants",
         ("ants", "flat", "none"),
         ["ants"],
-        "what perturbs the walk: ants on their trail in half of the perturbations; ants on a "
-        "uniform trail; or none",
+        "perturbations of the walk: half of them by ants on their trail; by ants on a uniform "
+        "trail; or without ants",
     )
 
 
@@ -265,13 +269,12 @@ def _at(end: str) -> str:
 
 QUALITY = Benchmark(
     name="quality",
-    summary="how near plans of so much time come to the best known walks",
-    description="Plan with colony-search on each grid, with each budget and seed, kernels "
-    "warm, on one thread; judge every walk by code that shares nothing with the "
-    "planner, and compare it with the best walk known, the search's own lower bound, and the "
-    "best of other planners by mission time. Reads: medians over the seeds, and below them the "
-    "worst; a ratio of 1.005 is half a percent above the best known, one below 1 better than "
-    "any other planner.",
+    summary="cost of plans over that of the best known walks, by time budget",
+    description="Plan with colony-search on each grid, with each budget and seed, on one thread, "
+    "with kernels loaded. A judge that shares no code with the planner compares every walk with "
+    "the best known walk, the search's own lower bound, and the best of other planners by mission "
+    "time. Results are medians over the seeds, and below them the worst. A ratio of 1.005 is half "
+    "a percent above the best known walk; below 1 it is better than all other planners.",
     add_options=_add_options,
     count=_count,
     measure=_measure,

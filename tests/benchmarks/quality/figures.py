@@ -1,7 +1,4 @@
-"""Runs of one setting and budget on one grid, over all seeds, in figures.
-
-What the planner's walks are to reach; of the goals, those that were measured.
-"""
+"""Figures of runs with one setting and budget on one grid over all seeds, and goals for them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Plans of several budgets, costs and ends on each grid, each judged.
+"""Plans with several budgets, costs and ends on each grid, each judged.
 
-What other planners reached on a grid, and what is proven of it, is read from a file, a JSON object
-with an entry for each grid, by name::
+Results of other planners, proven optima and bounds are read from a JSON file with an entry for each
+grid, by name::
 
     {"paper_simulated": {
         "cells": 169,
@@ -9,7 +9,7 @@ with an entry for each grid, by name::
         "proven_optimum": {"open_steps": 186, "closed_steps": 214},
         "bounds": {"hk_open": 186.0, "block_closed": 214}}}
 
-All parts but ``results`` may be missing. Walks that are not ``full``, not complete, do not count.
+Only ``results`` is required. Incomplete walks, which are not ``full``, do not count.
 """
 
 from __future__ import annotations

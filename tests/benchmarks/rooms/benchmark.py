@@ -74,7 +74,7 @@ def measure(kinds: Sequence[str], seeds: Sequence[int], pictures: Path | None) -
 def _add_options(parser: argparse.ArgumentParser) -> None:
     add_floors(parser, 10)
     parser.add_argument(
-        "--pictures", type=Path, metavar="DIR", help="draw each map with its rooms there"
+        "--pictures", type=Path, metavar="DIR", help="draw each map with its rooms into a folder"
     )
 
 
@@ -139,9 +139,9 @@ def _report(args: argparse.Namespace, samples: Sequence[Found]) -> Report:
 ROOMS = Benchmark(
     name="rooms",
     summary="rooms found on generated homes and offices, partly seen",
-    description="Find the rooms of generated homes and offices with furniture, walls at any angle, "
-    "at 100, 80, 50 and 20 % of their floor seen by a scanner, and compare them with those drawn: "
-    "recall and precision (Bormann et al. 2016), Matthews coefficient (MAORIS, 2017).",
+    description="Find the rooms of generated homes and offices with furniture, and walls at any "
+    "angle, after a scanner has seen 100, 80, 50 and 20 % of their floor. Compare them with the "
+    "true rooms: recall and precision (Bormann et al. 2016), Matthews coefficient (MAORIS, 2017).",
     add_options=_add_options,
     count=lambda args: len(KINDS) * len(SHARES) * int(args.floors),
     measure=_measure,

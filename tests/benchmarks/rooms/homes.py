@@ -1,8 +1,8 @@
-"""Homes and offices with furniture, of known rooms, and what a robot has seen of them.
+"""Homes and offices with furniture and known rooms, and the part that a robot has seen.
 
-A home has a hall with rooms on both sides, some behind others, some open to each other through a
-wide passage; an office a corridor with rooms and an open-plan one. Walls are turned by any angle.
-Furniture is as a laser scanner at ankle height sees it: a table is four legs, a cabinet unknown
+A home has a hall with rooms on both sides; some lie behind others, some are joined by a wide
+passage. An office has a corridor with rooms and an open-plan room. Walls are at any angle.
+Furniture is as seen by a laser scanner at ankle height: a table is four legs, a cabinet is unknown
 inside. The same seed gives the same floor (with the same release of numpy).
 """
 

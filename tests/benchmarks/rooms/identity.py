@@ -1,7 +1,7 @@
-"""``benchmarks room-ids``: whether rooms keep their numbers and names on maps of growing missions.
+"""``benchmarks room-ids``: whether rooms keep their numbers and names while a map grows.
 
-Each floor is mapped from place to place. Pixels beside walls flicker, each map lies a little aside,
-and now and then a loop closure moves it by decimetres, as the mission knows.
+Each floor is mapped from place to place. Pixels beside walls flicker, each map is a little
+displaced, and sometimes a loop closure, reported to the mission, moves it by decimetres.
 """
 
 from __future__ import annotations
@@ -179,8 +179,8 @@ def _report(args: argparse.Namespace, samples: Sequence[Kept]) -> Report:
             Goal("names that moved to another room", sum(one.moved for one in samples), 0),
         ),
         remarks=(
-            "rooms: of at least 1.5 m2; names lost: true rooms that no room is named after at the "
-            "end, as it was never found or is part of another",
+            "rooms: of at least 1.5 m2; names lost: true rooms without a room of their name at the "
+            "end, because they were not found, or are part of another room",
         ),
     )
 
@@ -189,8 +189,8 @@ ROOM_IDS = Benchmark(
     name="room-ids",
     summary="whether rooms keep numbers and names while the map grows",
     description="Map generated homes and offices from place to place: pixels beside walls flicker, "
-    "each map lies up to 3 cm aside, and one in twenty after a loop closure of up to 0.3 m and 2 "
-    "degrees. Count the numbers that rooms get, and names that move to another room.",
+    "each map is displaced by up to 3 cm, and one map in twenty by a loop closure of up to 0.3 m "
+    "and 2 degrees. Count the numbers that rooms get, and names that move to another room.",
     add_options=_add_options,
     count=lambda args: len(KINDS) * int(args.floors),
     measure=_measure,

@@ -1,9 +1,9 @@
-"""The judge of rooms: found ones against true ones, by pixels.
+"""Judge of rooms: compares found rooms with true rooms, by pixels.
 
-Recall and precision as in R. Bormann et al., "Room segmentation: survey, implementation, and
-analysis", ICRA 2016: how much of each true room its best match has, and how much of each found room
-lies in its best match. Matthews correlation as in M. Mielle et al., MAORIS, 2017, of each true room
-and its best match.
+Recall and precision follow R. Bormann et al., "Room segmentation: survey, implementation, and
+analysis", ICRA 2016: the share of each true room in its best match, and the share of each found
+room in its best match. The Matthews correlation of each true room and its best match follows
+M. Mielle et al., MAORIS, 2017.
 """
 
 from __future__ import annotations

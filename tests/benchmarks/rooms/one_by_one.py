@@ -1,7 +1,7 @@
-"""``benchmarks by-room``: what it costs to finish a room before the next, and what it saves.
+"""``benchmarks by-room``: costs and savings of finishing a room before the next.
 
-Missions in unknown homes and offices are simulated with and without ``mission.by_room``; the true
-rooms and the robot's track tell how often it came back to a room that it had left half done.
+Missions in unknown homes and offices are simulated with and without ``mission.by_room``. The true
+rooms and the robot's track give the number of its returns to unfinished rooms.
 """
 
 from __future__ import annotations
@@ -182,19 +182,19 @@ def _report(args: argparse.Namespace, samples: Sequence[Drive]) -> Report:
             Goal("rooms come back to, auto over never", share, round(GOAL_SHARE, 3)),
         ),
         remarks=(
-            "came back: stays with four new cells or more in a room that had such a stay before, "
-            "but for rooms on the way to others; also through: those, too; time: mean of the "
-            "ratios to the same mission without by_room",
+            "came back: stays with four or more new cells in a room with such a stay before, "
+            "except for rooms on the way to others; also through: including these rooms; time: "
+            "mean of the ratios to the same mission without by_room",
         ),
     )
 
 
 BY_ROOM = Benchmark(
     name="by-room",
-    summary="what finishing a room before the next costs, and saves",
+    summary="costs and savings of finishing a room before the next",
     description="Simulate missions in unknown generated homes and offices with mission.by_room "
-    "never and auto. Count by the robot's track and the true rooms how often it came back "
-    "to a room that it had left half done.",
+    "never and auto. Count the robot's returns to unfinished rooms, by its track and the true "
+    "rooms.",
     add_options=_add_options,
     count=lambda args: len(KINDS) * args.floors * args.starts * len(POLICIES),
     measure=_measure,
@@ -204,6 +204,6 @@ examples:
   python -m tests.benchmarks by-room
   python -m tests.benchmarks by-room --floors 2 --seed 900
 
-Some 30 s a mission on a quiet machine.
+A mission takes some 30 s on a quiet machine.
 """,
 )

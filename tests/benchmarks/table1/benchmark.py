@@ -27,14 +27,15 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_grid_options(parser, DEFAULT_MAPS)
     parser.add_argument("--ants", type=positive, default=1000, help="(default: %(default)s)")
     parser.add_argument(
-        "--seeds", type=positive, default=10, metavar="N", help="0 to N - 1 (default: %(default)s)"
-    )
+        "--seeds", type=positive, default=10, metavar="N",
+        help="use seeds 0 to N - 1 (default: %(default)s)",
+    )  # fmt: skip
     add_own_planners(parser)
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the page of results")
     parser.add_argument(
         "--png", type=Path, metavar="DIR", help="draw walks and pheromone of each grid"
     )
-    parser.add_argument("--png-of", nargs="+", default=[], metavar="GRID", help="draw these alone")
+    parser.add_argument("--png-of", nargs="+", default=[], metavar="GRID", help="draw only these")
 
 
 def _names(args: argparse.Namespace) -> tuple[str, ...]:
@@ -86,10 +87,10 @@ def _command(args: argparse.Namespace) -> str:
 TABLE1 = Benchmark(
     name="table1",
     summary="the paper's Table I, measured again, and its claims checked",
-    description="Run every planner of Table I (Carr and Wang 2022), and three more readings of "
-    "its baselines, start to start on each grid with each seed, on one thread; count revisits "
-    "in the paper's way and in two others; say of every claim of the paper on which grids it "
-    "holds. Reads: medians, and the range over the seeds in brackets.",
+    description="Run every planner of Table I (Carr and Wang 2022), and three more variants of its "
+    "baselines, start to start on each grid with each seed, on one thread. Count revisits as in "
+    "the paper and in two other ways; list the grids on which each claim of the paper holds. "
+    "Results are medians, with the range over the seeds in brackets.",
     add_options=_add_options,
     count=_count,
     measure=_measure,

@@ -1,12 +1,12 @@
-"""Grids of Table I from the maps that the paper's authors publish, by their own rule.
+"""Grids of Table I, made from the maps that the paper's authors publish, by their rule.
 
 ``python -m tests.benchmarks.table1.grids grid.yaml basement.yaml`` writes ``paper_simulated.npy``
 and ``paper_basement.npy``, each with its start beside it, for ``table1 --grids``. The maps are not
 in this repository: fetch ``maps/grid.yaml``, ``grid.png``, ``basement.yaml`` and ``basement.png``
 from github.com/nobleo/full_coverage_path_planner, on which the authors' code builds (Apache-2.0).
 
-A cell is occupied if one of its pixels is, an unknown pixel is free, cells begin at the map's first
-pixel, and what cannot be reached from the start does not count.
+A cell is occupied if one of its pixels is; unknown pixels are free. Cells begin at the map's first
+pixel. Cells that cannot be reached from the start do not count.
 """
 
 from __future__ import annotations
@@ -130,7 +130,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("maps", nargs="+", type=Path, metavar="MAP.yaml")
-    parser.add_argument("--cell", type=float, default=CELL_M, metavar="M", help="(default: 0.6)")
+    parser.add_argument(
+        "--cell", type=float, default=CELL_M, metavar="M", help="edge of a cell [m] (default: 0.6)"
+    )
     parser.add_argument(
         "--start-xy", type=pair_of_floats, default=(0.0, 0.0), metavar="X,Y", help="(default: 0,0)"
     )

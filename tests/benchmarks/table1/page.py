@@ -1,6 +1,6 @@
-"""The paper's figures: the walks of four planners on a grid, and the pheromone.
+"""Page of results in Markdown: measurements, what they show about the paper, and its figures.
 
-The page of results, in Markdown: what was measured, and what it says of the paper.
+The figures show the walks of four planners on a grid, and the pheromone.
 """
 
 from __future__ import annotations

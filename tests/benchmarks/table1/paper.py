@@ -1,12 +1,9 @@
-"""Table I of Carr and Wang 2022, and what is known of the grids it was made on.
+"""Table I of Carr and Wang 2022, facts about its grids, and the paper's claims.
 
-Of the paper's three maps two can be made again from its authors' public code
-(github.com/jynxmagic/FCPP-Survey, Apache-2.0): with a robot and a tool of 0.3 m
-radius, the start at the map's origin, unknown pixels free, and a cell occupied
-if one of its pixels is, their Spiral-STC and ZigZag give the table's 109, 487,
-113 and 407 exactly. No setting tried gives the office's figures.
-
-The paper's claims, one by one, beside what was measured.
+The authors' public code (github.com/jynxmagic/FCPP-Survey, Apache-2.0) reproduces two of the
+paper's three maps. With a robot and a tool of 0.3 m radius, the start at the map's origin, unknown
+pixels free, and cells occupied if one of their pixels is, its Spiral-STC and ZigZag give exactly
+the table's 109, 487, 113 and 407. No setting tried gives the office's figures.
 """
 
 from __future__ import annotations

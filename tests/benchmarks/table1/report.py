@@ -1,4 +1,4 @@
-"""Runs to tables: one for all grids, one for each grid, and one for the claims."""
+"""Tables of runs: one for all grids, one for each grid, and one for the claims."""
 
 from __future__ import annotations
 

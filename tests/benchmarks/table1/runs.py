@@ -1,4 +1,4 @@
-"""The rows of Table I and our own ones, and how they are measured."""
+"""Rows of Table I, additional rows, and their measurement."""
 
 from __future__ import annotations
 

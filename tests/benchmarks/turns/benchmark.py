@@ -1,4 +1,4 @@
-"""``benchmarks turns``: how good walks are where turns cost, and how close their bounds come."""
+"""``benchmarks turns``: quality of walks if turns cost, and of their lower bounds."""
 
 from __future__ import annotations
 
@@ -44,23 +44,23 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--instances",
         type=Path,
         metavar="FOLDER",
-        help="grids.npz and results.json of turn-cost instances; without it maps alone",
+        help="folder of turn-cost instances, grids.npz and results.json (default: only maps)",
     )
     parser.add_argument(
-        "--every", type=positive, default=1, metavar="N", help="take each N-th instance"
+        "--every", type=positive, default=1, metavar="N", help="use each N-th instance"
     )
     parser.add_argument(
-        "--first", type=int, default=0, metavar="N", help="from this one on (default: %(default)s)"
+        "--first", type=int, default=0, metavar="N", help="first instance (default: %(default)s)"
     )
     add_grid_options(parser, DEFAULT_MAPS)
-    parser.add_argument("--no-maps", action="store_true", help="instances alone")
+    parser.add_argument("--no-maps", action="store_true", help="use only instances")
     parser.add_argument(
         "--prices",
         nargs="+",
         type=SECONDS,
         default=[0.0, 1.25, 5.0, 20.0, 50.0],
         metavar="STEPS",
-        help="of a quarter-turn on maps, in steps (default: 0 1.25 5 20 50)",
+        help="prices of a quarter-turn on maps, in steps (default: 0 1.25 5 20 50)",
     )
     parser.add_argument(
         "--budgets",
@@ -68,15 +68,15 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=seconds_above_zero,
         default=[0.02, 0.1, 1.0],
         metavar="S",
-        help="processor time to plan for [s] (default: 0.02 0.1 1; there are goals for 10, too)",
+        help="processor time of a plan [s] (default: 0.02 0.1 1; there are goals for 10, too)",
     )
     parser.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
     parser.add_argument(
         "--png",
         type=Path,
         metavar="FILE",
-        help="draw the walks after the last budget: over the smallest ground, a middle one and the "
-        "largest, side by side",
+        help="draw the walks of the last budget on the smallest, a middle and the largest ground, "
+        "side by side",
     )
 
 
@@ -187,10 +187,10 @@ def _by(
 
 TURNS = Benchmark(
     name="turns",
-    summary="walks where turns cost: against best known tours, and against their bounds",
-    description="Plans tours over public turn-cost instances, and open walks over maps at several "
-    "prices of a turn, for several budgets; each walk is judged by code that shares nothing with "
-    "the planners.",
+    summary="walks with costly turns, against best known tours and their bounds",
+    description="Plan tours over public turn-cost instances, and open walks over maps at several "
+    "prices of a turn, with several budgets. A judge that shares no code with the planners checks "
+    "each walk.",
     add_options=_add_options,
     count=lambda args: _plan_of(args).count,
     measure=_measure,

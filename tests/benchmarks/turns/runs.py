@@ -1,13 +1,12 @@
-"""Plans where turns cost: tours over public instances, and walks over maps at several prices.
+"""Plans with costly turns: tours over public instances, and walks over maps at several prices.
 
 A folder of instances has ``grids.npz``, a bool array of free cells for each name, and
-``results.json``, what is known of tours over them at a second a step and 50 s a quarter-turn::
+``results.json``, known costs of tours with 1 s per step and 50 s per quarter-turn::
 
     {"grid_1": {"tour_best": 7786.0, "tour_approximation": 8254.0, "tour_lower_bound": 7784.0}}
 
-A tour turns where it ends and begins, too; a planned walk home does not have to. So its last turn
-is added to what the judge counts. Budgets are of processor time: other load on the computer does
-not change what is found.
+A tour also turns at its start, where it ends; a planned walk home need not. So the judge adds this
+last turn. Budgets are processor time, so other load on the computer does not change results.
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ def test_a_division_with_seeds_out_of_range_is_dropped_and_named(sign):
     assert (event.x, event.y) == (1.0 + sign * 9.0, 2.0)
     assert cells_of(event.tiles)
     (fault,) = receiver.take_faults()
-    assert str(fault) == "r2: its division has a seed farther off than cells may lie here"
+    assert str(fault) == "r2: its division has a seed outside this robot's limits"
     fits = structs.replace(said, origin=(-sign * 9.0, 0.0, 0.0))
     assert heard(fits).division == 7
     assert receiver.take_faults() == []
