@@ -274,6 +274,10 @@ def _index() -> dict[str, _BuiltIn]:
     return msgspec.convert(text.values, dict[str, _BuiltIn])
 
 
+# Keys whose numbers may be in quotes.
+NUMBERS = ("resolution", "occupied_thresh", "free_thresh")
+
+
 class MapKeys(Document, frozen=True):
     """The keys of a map_server YAML file, which may have further keys of other programs."""
 
@@ -294,10 +298,23 @@ class MapKeys(Document, frozen=True):
             yield MapFileError(text, key="free_thresh", others=["occupied_thresh"])
 
 
+def _unquoted(value: object) -> object:
+    """Return the number that a text contains, as map_server reads it; other values as they are."""
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+
+
 def _read_keys(path: Path) -> tuple[MapKeys, Path]:
     """Return the keys of a YAML file, and the image that it names."""
     text = read_written(path, MapFileError, missing=_MISSING_HINT, broken=_YAML_HINT)
-    keys, faults = inspected(MapKeys, text.values, MapFileError)
+    values = text.values
+    if isinstance(values, dict):
+        values = {
+            key: _unquoted(value) if key in NUMBERS else value for key, value in values.items()
+        }
+    keys, faults = inspected(MapKeys, values, MapFileError)
     image = path
     if keys and keys.image:
         image = path.parent / os.path.expanduser(keys.image)

@@ -16,6 +16,7 @@ import logging
 import os
 import platform
 import re
+import secrets
 import shutil
 import sys
 import tempfile
@@ -100,8 +101,14 @@ def temporary_folder() -> Path:
         names = [os.path.abspath(tempfile.gettempdir()), "/tmp", "/var/tmp"]
     except FileNotFoundError:  # nothing can be written anywhere
         names = ["/tmp"]
-    safe = (name for name in names if os.path.isdir(name) and not why_not_trusted(Path(name, "x")))
-    return Path(next(safe, names[0]))
+    folders = map(Path, filter(os.path.isdir, names))
+    safe = (folder for folder in folders if not why_not_trusted(unguessable(folder)))
+    return next(safe, Path(names[0]))
+
+
+def unguessable(folder: Path) -> Path:
+    """Return a path in a folder at which nobody can have put a file, to be judged for ours."""
+    return folder / secrets.token_hex(16)
 
 
 def _temporary(name: str) -> Path:

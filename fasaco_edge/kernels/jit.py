@@ -28,7 +28,13 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.host.processes import ctrl_c_waits
-from fasaco_edge.kernels.folder import KERNELS, kernel_module, temporary_folder, warn_of
+from fasaco_edge.kernels.folder import (
+    KERNELS,
+    kernel_module,
+    temporary_folder,
+    unguessable,
+    warn_of,
+)
 from fasaco_edge.kernels.manifest import (
     MANIFEST,
     UnsoundError,
@@ -174,7 +180,7 @@ class ScratchLocator(KernelLocator):
 @functools.cache
 def _scratch() -> str:
     base = temporary_folder()
-    if why := why_not_trusted(base / "kernels"):
+    if why := why_not_trusted(unguessable(base)):
         raise PermissionError(errno.EPERM, f"no folder for what is compiled: {why}", str(base))
     folder, maker = tempfile.mkdtemp(prefix="fasaco-edge-", dir=base), os.getpid()
 

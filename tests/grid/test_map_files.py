@@ -279,6 +279,13 @@ def test_an_incomplete_map_file_error_lists_its_keys(tmp_path, text, said):
     assert any(said in str(fault) for fault in (caught.value, *caught.value.rest))
 
 
+def test_numbers_may_be_in_quotes(tmp_path):
+    grey([0]).save(tmp_path / "map.png")
+    path = tmp_path / "map.yaml"
+    path.write_text(yaml.safe_dump(DESCRIPTION | {"resolution": "0.05", "free_thresh": "0.2"}))
+    assert read_map(path).geometry.resolution == 0.05
+
+
 def test_all_keys_are_judged_at_once(tmp_path):
     path = tmp_path / "map.yaml"
     path.write_text(

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fasaco_edge.kernels import folder as folders
-from fasaco_edge.kernels.folder import code_digest, processor, wanted_folder
+from fasaco_edge.kernels.folder import code_digest, processor, temporary_folder, wanted_folder
 from fasaco_edge.kernels.manifest import chosen_folder
 from tests.kernels.harm import NOBODY, needs_root
 from tests.kernels.installations import ALL_LOADED
@@ -43,6 +43,14 @@ needs_mounts = pytest.mark.skipif(not mounts_are_ours(), reason="needs mounts of
 def mounted(command: str) -> list[str]:
     """Return the words before those of a program that sees a mount nobody else sees."""
     return ["unshare", "--mount", "sh", "-ec", f'{command}; exec "$@"', "sh"]
+
+
+@needs_root
+def test_a_file_of_another_user_does_not_exclude_a_temporary_folder(tmp):
+    for name in ("x", "kernels"):
+        (tmp / name).touch()
+        os.chown(tmp / name, NOBODY, NOBODY)
+    assert temporary_folder() == tmp
 
 
 def test_the_given_folder_is_taken_and_not_made(tmp_path, monkeypatch):
