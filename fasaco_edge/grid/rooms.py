@@ -21,7 +21,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid, highest
 from fasaco_edge.grid.walls import THRESHOLDS
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.kernels.rooms.clearance import clearances
-from fasaco_edge.kernels.rooms.doors import DoorLimits, Pixels, find_doors
+from fasaco_edge.kernels.rooms.doors import LEAST_SURE, DoorLimits, Pixels, find_doors
 from fasaco_edge.kernels.rooms.islands import Limits, furniture
 from fasaco_edge.kernels.rooms.regions import beside_cuts, draw_cuts, grow
 
@@ -29,8 +29,10 @@ from fasaco_edge.kernels.rooms.regions import beside_cuts, draw_cuts, grow
 PIXEL_M = 0.05
 # Widest door; thickest wall with a door; distance beside a door in which floor has to widen [m].
 DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
-# Smallest room [m2].
-ROOM_M2 = 1.5
+# Shortest passage whose mouth separates it from a room [m].
+PASSAGE_M = 0.8
+# Smallest room with a door, and smallest one with mouths of passages alone [m2].
+ROOM_M2, WITHOUT_DOOR_M2 = 1.5, 4.0
 # Longest edge of furniture; edge up to which everything is furniture; least thickness of furniture
 # with a longer edge [m].
 LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
@@ -113,7 +115,8 @@ def _solid_and_doors(
         (kinds == _WALL) & ~things,
         _unseen(kinds, pixel_m),
     )
-    limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, round(BESIDE_M / pixel_m))
+    reach, passage = round(BESIDE_M / pixel_m), round(PASSAGE_M / pixel_m)
+    limits = DoorLimits(DOOR_M / pixel_m, WALL_M / pixel_m, reach, passage)
     return solid, find_doors(pixels, _DIRECTIONS, limits)
 
 
@@ -210,8 +213,14 @@ def _joined(
         if one and other and one != other:
             best = max(links[one].get(other, _NO_LINK), (kind, narrow))
             links[one][other] = links[other][one] = best
-    floor, into = sizes.tolist(), list(range(len(sizes)))
-    small = [(floor[room], room) for room, to in enumerate(links) if to and floor[room] < ROOM_M2]
+    floor: list[float] = sizes.tolist()
+    into = list(range(len(sizes)))
+
+    def is_small(room: int) -> bool:
+        has_door = any(kind >= LEAST_SURE for kind, _ in links[room].values())
+        return floor[room] < (ROOM_M2 if has_door else WITHOUT_DOOR_M2)
+
+    small = [(floor[room], room) for room, to in enumerate(links) if to and is_small(room)]
     heapq.heapify(small)
     while small:
         size, room = heapq.heappop(small)
@@ -230,7 +239,7 @@ def _joined(
             if third != other:
                 best = max(links[third].get(other, _NO_LINK), link)
                 links[third][other] = links[other][third] = best
-        if floor[other] < ROOM_M2 and links[other]:
+        if links[other] and is_small(other):
             heapq.heappush(small, (floor[other], other))
     rooms = np.zeros(len(sizes), np.int32)
     for region in range(1, len(sizes)):

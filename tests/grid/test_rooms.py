@@ -73,6 +73,26 @@ def test_a_door_separates_two_rooms(door_m, wall_m):
     assert (found.labels > 0).sum() == (two_rooms(door_m, wall_m=wall_m) == FREE).sum()
 
 
+@pytest.mark.parametrize("passage_m", [1.2, 3.0, 8.0])
+@pytest.mark.parametrize("resolution", [0.05, 0.1])
+def test_a_passage_separates_two_rooms(passage_m, resolution):
+    found = find_rooms(grid_of(two_rooms(1.0, resolution, passage_m), resolution))
+    # A long passage is a room of its own.
+    assert found.count == (3 if passage_m > 4.0 else 2)
+    assert len({*numbers(found, LEFT, (6.0 + passage_m, 1.0))}) == 2
+
+
+def test_crossing_passages_are_one_room():
+    cells = np.full((160, 160), WALL, np.int8)
+    cells[10:150, 70:90] = cells[70:90, 10:150] = FREE
+    assert find_rooms(grid_of(cells)).count == 1
+
+
+def test_a_gap_beside_a_bed_is_part_of_its_room():
+    cells = put(two_rooms(), 0.9, 0.2, 2.0, 2.0)
+    assert find_rooms(grid_of(cells)).count == 2
+
+
 def test_a_wide_opening_does_not():
     assert find_rooms(grid_of(two_rooms(1.6))).count == 1
 

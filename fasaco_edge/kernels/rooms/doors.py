@@ -4,6 +4,9 @@ A door is a short chord across free pixels, from jamb to jamb, beyond which the 
 both sides. A jamb is the end of a wall that continues along the chord: thin across it, with free
 pixels on both sides. Where the far side has not been seen yet, the near side has to do. Beside one
 such jamb the other may be a corner or the side of a cabinet.
+
+The mouth of a passage separates rooms as a door does, although its jambs are corners: on one side
+the gap stays as narrow, and on the other the free space widens by much.
 """
 
 from typing import NamedTuple
@@ -27,6 +30,9 @@ ASLANT = 1.2
 LEAST_SURE = THIN + THICK
 # How far a chord's middle may be from the middle of the gap [pixels].
 OFF_CENTRE = 2.0
+# Ratio of the squared clearances to that in the mouth of a passage: in the passage at most, and
+# before the mouth at least, within the passage's width. Where two passages cross, it is 2.
+EVEN, MOUTH = 1.3, 4.0
 # Ratio of the squared clearances beside a door to that in it: of the wider side, of the other side,
 # and of the other side if it is half seen.
 WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.8
@@ -57,11 +63,13 @@ class DoorLimits(NamedTuple):
         width: of a door [pixels].
         wall: thickness of a wall with a door [pixels].
         reach: how far beside a door the free space is looked at [pixels].
+        passage: length of a passage behind its mouth, the least [pixels].
     """
 
     width: float
     wall: float
     reach: int
+    passage: int
 
 
 class _Place(NamedTuple):
@@ -215,6 +223,20 @@ def _widest(clearance: NDArray[np.int32], place: _Place, reach: int) -> int:
 
 
 @lean_inner_kernel
+def _is_mouth(
+    clearance: NDArray[np.int32], inside: _Place, outside: _Place, narrow: int, wide: int, here: int
+) -> bool:
+    """Return whether a gap stays narrow for ``narrow`` pixels, and widens within ``wide``."""
+    for way in range(1, narrow + 1):
+        row = int(np.floor(inside.row + way * inside.down))
+        col = int(np.floor(inside.col + way * inside.right))
+        if not _holds(row, col, clearance.shape) or not 0 < clearance[row, col] <= EVEN * here:
+            return False
+    widens: bool = _widest(clearance, outside, wide) >= MOUTH * here
+    return widens
+
+
+@lean_inner_kernel
 def _door_at(
     pixels: Pixels, centre: tuple[int, int], directions: NDArray[np.float64], limits: DoorLimits,
     door: NDArray[np.float64],
@@ -240,14 +262,23 @@ def _door_at(
         return False
     last = _Place(row - behind * down, col - behind * right, -down, -right)
     other_kind = _jamb(pixels, last, limits.wall)
-    if other_kind == NONE or kind + other_kind < LEAST_SURE:
+    if other_kind == NONE:
         return False
-    here = pixels.clearance[centre]
-    one = _widest(pixels.clearance, _Place(row, col, -right, down), limits.reach)
-    other = _widest(pixels.clearance, _Place(row, col, right, -down), limits.reach)
-    least = OTHER_HALF_SEEN if HALF_SEEN in (kind, other_kind) else OTHER
-    if max(one, other) < WIDER * here or min(one, other) < least * here:
-        return False
+    clearance, here = pixels.clearance, pixels.clearance[centre]
+    left, right_of = _Place(row, col, -right, down), _Place(row, col, right, -down)
+    if kind + other_kind >= LEAST_SURE:
+        one = _widest(clearance, left, limits.reach)
+        other = _widest(clearance, right_of, limits.reach)
+        least = OTHER_HALF_SEEN if HALF_SEEN in (kind, other_kind) else OTHER
+        if max(one, other) < WIDER * here or min(one, other) < least * here:
+            return False
+    else:
+        narrow, wide = limits.passage, int(shortest)
+        if not (
+            _is_mouth(clearance, left, right_of, narrow, wide, here)
+            or _is_mouth(clearance, right_of, left, narrow, wide, here)
+        ):
+            return False
     door[0], door[1], door[2], door[3] = first.row, first.col, last.row, last.col
     door[4] = kind + other_kind
     return True
@@ -257,10 +288,10 @@ def _door_at(
 def find_doors(
     pixels: Pixels, directions: NDArray[np.float64], limits: DoorLimits
 ) -> NDArray[np.float64]:
-    """Return the chords of all doors, several of each, float64 (n, 5).
+    """Return the chords of all doors and mouths of passages, several of each, float64 (n, 5).
 
     Each is row and column of its first end and of its last [pixels], and how certain it is: the sum
-    of the kinds of its jambs.
+    of the kinds of its jambs, at least LEAST_SURE for a door.
 
     Args:
         pixels: what the pixels are.
