@@ -45,12 +45,12 @@ def hint_of(act, *given, kind=FasacoError, **named):
 @pytest.mark.parametrize(
     ("changes", "hint"),
     [
-        ({"image": "none.png"}, "correct image in this file: a path from this file's folder"),
-        ({"resolution": "five"}, "correct resolution in this file"),
+        ({"image": "none.png"}, "image is a path from this file's folder"),
+        ({"resolution": "five"}, "resolution is the edge of a pixel"),
         ({"resolution": 500}, "the edge of a pixel in metres"),
-        ({"free_thresh": 0.9}, "correct the thresholds in this file"),
-        ({"mode": "grey"}, "correct mode in this file"),
-        ({"origin": [0, 0]}, "correct origin in this file"),
+        ({"free_thresh": 0.9}, "map_saver writes free_thresh"),
+        ({"mode": "grey"}, "mode is trinary"),
+        ({"origin": [0, 0]}, "origin is [x, y, yaw]"),
     ],
 )
 def test_a_fault_inside_a_map_file_is_corrected_there(tmp_path, changes, hint):

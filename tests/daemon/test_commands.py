@@ -285,7 +285,10 @@ def begin_idle(outsider: Outsider) -> None:
         (("start", "--order", "missing.yaml"), "missing.yaml: No such file or directory"),
         (("start", "--order", "order.yaml"), "order.yaml, line 1: zones[0].name: missing"),
         (("start", "--order", "order.json"), "order.json: not plain JSON"),
-        (("start", "--order", "order.yaml", "--passes", "2"), "--order says it all, got --passe"),
+        (
+            ("start", "--order", "order.yaml", "--passes", "2"),
+            "--order must be the only option for the order, got --passe",
+        ),
         (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),
         (("start", "--zone", "a:0,0;1,1;1,0;0,1"), "zones[0].polygon: crosses or touches itself"),
         (("start", "--zone", "a:0,0;1,0;nan,1"), "zones[0].polygon[2]: must be finite"),

@@ -134,4 +134,4 @@ def test_commands_find_robot_and_bus_by_file_or_environment(tmp_path, monkeypatc
         # What is said here and now counts more.
         wrong = fasaco_edge("mission", "status", "--robot", "moritz")
         assert wrong.code == 1
-        assert "there are maja" in wrong.err
+        assert "robots on this bus: maja" in wrong.err
