@@ -280,7 +280,7 @@ def picture_of(plan: Plan, of: str = "", *, rooms: bool = False) -> Image.Image:
     shows_floor = judged is not None and plan.line != CELLS
     under = plan.rooms if rooms else None
     if under is not None:
-        lines.append(f"{under.found.count} rooms")
+        lines.append(f"{under.found.count} {'room' if under.found.count == 1 else 'rooms'}")
     return draw_walk(
         ground.lattice,
         path.cells,
