@@ -309,7 +309,7 @@ def _unquoted(value: object) -> object:
 def _read_keys(path: Path) -> tuple[MapKeys, Path]:
     """Return the keys of a YAML file, and the image that it names."""
     text = read_written(path, MapFileError, missing=_MISSING_HINT, broken=_YAML_HINT)
-    values = text.values
+    values = {} if text.values is None else text.values
     if isinstance(values, dict):
         values = {
             key: _unquoted(value) if key in NUMBERS else value for key, value in values.items()

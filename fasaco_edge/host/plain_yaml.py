@@ -70,7 +70,7 @@ class Written(Generic[_Error]):
 
     Attributes:
         file: the file.
-        values: plain values.
+        values: plain values; None for an empty file.
         lines: line of each key, from 1.
         twice: a fault for each key that occurs more than once; YAML would take the last.
     """
@@ -127,7 +127,8 @@ def read_written(
         if isinstance(refused, OSError):
             fault = error(str(refused.strerror), hint=missing)
         else:
-            fault = error(f"not plain {'JSON' if parse else 'YAML'}: {refused}", hint=broken)
+            why = "nested too deeply" if isinstance(refused, RecursionError) else refused
+            fault = error(f"not plain {'JSON' if parse else 'YAML'}: {why}", hint=broken)
         fault.file = path
         raise fault from refused
     lines: dict[str, int] = {}
@@ -137,7 +138,7 @@ def read_written(
             text = f"is given twice, in line {lines[key]} and in line {line}"
             twice.append(error(text, key=key))
         lines[key] = line
-    return Written(path, {} if values is None else values, lines, tuple(twice))
+    return Written(path, values, lines, tuple(twice))
 
 
 def _node_of_json(text: str) -> yaml.Node | None:

@@ -174,6 +174,9 @@ BARE = {"type": "Feature", "properties": {}, "geometry": None}
     [
         ("a.yaml", HALL, [(3, "zones[0].pases")]),
         ("a.yaml", "passes: 2\npasses: 3\n", [(2, "passes")]),
+        ("a.yaml", "# cut off", [(None, "")]),
+        ("a.json", "null", [(None, "")]),
+        ("a.json", "[" * 5000 + "]" * 5000, [(None, "")]),
         ("a.yaml", "passes: 1e0\nuntil_min: 1.5e1\n", [(1, "passes")]),
         (
             "a.yaml",
