@@ -184,6 +184,11 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
         raise PlainYamlError(str(error)) from error
 
 
+def dump(document: object) -> str:
+    """Return plain values as YAML, which ``compose`` reads back."""
+    return yaml.dump(document, Dumper=_Dumper, sort_keys=False)
+
+
 # What the parser says of frequent mistakes, and what that means.
 _PLAIN = {
     "found character '\\t' that cannot start any token": "a tab: indent by spaces",
@@ -251,4 +256,11 @@ class _Loader(yaml.SafeLoader):
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
 # As in YAML 1.2: YAML 1.1 takes 1e-6 for a text.
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
-_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes texts that ``_Loader`` would take for numbers."""
+
+
+for _kind in (_Loader, _Dumper):
+    _kind.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))
