@@ -113,7 +113,7 @@ def read_written(
     Args:
         path: the file.
         error: kind of the errors.
-        missing: hint for a file that cannot be read.
+        missing: hint for a file that does not exist.
         broken: hint for a file that is no plain YAML.
         parse: reads the values of a JSON file; None for YAML.
 
@@ -125,7 +125,9 @@ def read_written(
         node, values = compose(text) if parse is None else (_node_of_json(text), parse(text))
     except (OSError, ValueError, RecursionError) as refused:
         if isinstance(refused, OSError):
-            fault = error(str(refused.strerror), hint=missing)
+            is_missing = isinstance(refused, FileNotFoundError)
+            hint = missing if is_missing else "name a file that can be read"
+            fault = error(str(refused.strerror), hint=hint)
         else:
             why = "nested too deeply" if isinstance(refused, RecursionError) else refused
             fault = error(f"not plain {'JSON' if parse else 'YAML'}: {why}", hint=broken)
