@@ -122,7 +122,7 @@ def read_written(
     """
     try:
         text = read_bounded(path)
-        node, values = compose(text) if parse is None else (_node_of_json(text), parse(text))
+        keys, values = compose(text) if parse is None else (_keys_of_json(text), parse(text))
     except (OSError, ValueError, RecursionError) as refused:
         if isinstance(refused, OSError):
             is_missing = isinstance(refused, FileNotFoundError)
@@ -135,7 +135,7 @@ def read_written(
         raise fault from refused
     lines: dict[str, int] = {}
     twice = []
-    for key, line in _keys_and_lines(node):
+    for key, line in keys:
         if key in lines:
             text = f"is given twice, in line {lines[key]} and in line {line}"
             twice.append(error(text, key=key))
@@ -143,12 +143,12 @@ def read_written(
     return Written(path, values, lines, tuple(twice))
 
 
-def _node_of_json(text: str) -> yaml.Node | None:
-    """Return JSON, whose tabs YAML does not take, as nodes; None where YAML takes it in no way."""
+def _keys_of_json(text: str) -> list[tuple[str, int]]:
+    """Return the keys of JSON, of which YAML takes no tabs; none where it takes nothing."""
     try:
         return compose(text.replace("\t", " "))[0]
     except PlainYamlError:
-        return None
+        return []
 
 
 def _keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:
@@ -165,8 +165,8 @@ def _keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[
             yield from _keys_and_lines(item, key)
 
 
-def compose(text: str) -> tuple[yaml.Node | None, object]:
-    """Return a document as nodes, with their lines, and as plain values.
+def compose(text: str) -> tuple[list[tuple[str, int]], object]:
+    """Return each key of a document and its line, from 1; and the document as plain values.
 
     Raises:
         PlainYamlError: it is no YAML, or not plain.
@@ -174,7 +174,9 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
-        return node, None if node is None else loader.construct_document(node)
+        # Construction adds the keys that << merges; those beside it may replace them.
+        keys = list(_keys_and_lines(node))
+        return keys, None if node is None else loader.construct_document(node)
     except PlainYamlError:
         raise
     except RecursionError as error:

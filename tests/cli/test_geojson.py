@@ -203,5 +203,13 @@ def test_all_faults_of_an_order_have_their_lines(tmp_path, name, text, places):
     assert [(fault.line, fault.key) for fault in faults] == places
 
 
+def test_a_zone_may_replace_keys_of_another_that_it_merges(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("zones:\n  - &a {name: a, passes: 2}\n  - {<<: *a, name: b}\n")
+    assert [(zone.name, zone.passes) for zone in read_order_file(file).zones] == [
+        *(("a", 2), ("b", 2)),
+    ]
+
+
 def screen(capsys):
     return " ".join(capsys.readouterr().err.split())
