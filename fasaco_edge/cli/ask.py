@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import yaml
 from rich.table import Table
 
 from fasaco_edge.cli.console.arguments import (
@@ -23,6 +22,7 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import figures, known, out
 from fasaco_edge.client import phrases
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
+from fasaco_edge.host.plain_yaml import dump
 from fasaco_edge.text import one_line
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents import replies
@@ -199,8 +199,7 @@ def show(name: str, reply: Reply) -> None:
     elif name == "rooms":
         show_rooms(decode_tolerant(reply.payload, Rooms))
     else:
-        document = decode_json(reply.payload)
-        print(yaml.safe_dump(document, sort_keys=False), end="")
+        print(dump(decode_json(reply.payload)), end="")
 
 
 def _figures(reply: Reply) -> dict[str, object]:

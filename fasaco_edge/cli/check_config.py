@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import yaml
-
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
@@ -14,6 +12,7 @@ from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import inspect_config, with_mask
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.plain_yaml import dump
 from fasaco_edge.host.processes import memory_limit
 
 EPILOG = """\
@@ -60,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     elif config is None:
         _print(args.file, faults)
     elif args.show:
-        print(yaml.safe_dump(_shown(config), sort_keys=False), end="")
+        print(dump(_shown(config)), end="")
     else:
         print(f"{args.file}: in order")
         for remark in filter(None, (config.robot.assumed, *cautions(config))):

@@ -8,8 +8,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import yaml
-
 from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.cli.console.arguments import (
     DEFAULT_CELL_M,
@@ -24,6 +22,7 @@ from fasaco_edge.cli.console.arguments import (
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err, out
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.host.plain_yaml import dump
 from fasaco_edge.text import shown
 
 if TYPE_CHECKING:
@@ -161,7 +160,7 @@ def run(args: argparse.Namespace) -> int:
     check_outputs([file])
     _ask(args)
     document = document_of(args)
-    text = HEAD + (yaml.safe_dump(document, sort_keys=False) if document else "")
+    text = HEAD + (dump(document) if document else "")
     config = _checked(document)
     with writing(file) as new:
         new.write_text(text, encoding="utf-8")

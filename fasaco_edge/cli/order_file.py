@@ -22,6 +22,10 @@ def read_order_file(path: Path) -> MissionOrder:
     # JSON is not read as YAML 1.1, in which 1e3 is a text.
     parse = json.loads if path.suffix in (".json", SUFFIX) else None
     text = read_written(path, OrderError, missing="name a file that can be read", parse=parse)
+    if text.values is None:
+        # It may be the rest of a file that was not written in full.
+        hint = 'write what to cover; for everything, `passes: 1` (in JSON {"passes": 1})'
+        text.check([OrderError("there is no order in it", hint=hint)])
     if is_geojson(text.values):
         order, faults = drawn_order(text.values)
     else:

@@ -80,7 +80,7 @@ def inspect_config(
         )
     except BadConfiguration as error:
         return None, [error]
-    document, removed = without_removed(text.values)
+    document, removed = without_removed({} if text.values is None else text.values)
     config, faults = inspected(DaemonConfig, with_credentials(document), BadConfiguration)
     if config:
         faults += [*removed, *refused(lambda: check(config))]

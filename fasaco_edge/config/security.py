@@ -311,7 +311,8 @@ def read_client_security(file: str, connect: Sequence[str]) -> SecurityConfig:
         BadConfiguration: it cannot be read, is incomplete, or does not fit the endpoints.
     """
     text = read_written(Path(file), BadConfiguration, missing="name the file of --security")
-    security, faults = inspected(SecurityConfig, text.values, BadConfiguration)
+    values = {} if text.values is None else text.values
+    security, faults = inspected(SecurityConfig, values, BadConfiguration)
     text.check(faults)
     for fault in security_faults(security, (), connect):
         raise BadConfiguration(

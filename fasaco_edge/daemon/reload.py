@@ -127,8 +127,8 @@ class Reload:
             written, faults = reading.result()
         except BadConfiguration as error:
             text = "configuration refused, the previous one stays in force: %s (%s)"
-            extra = {"event": "reload_refused", "code": error.code}
             for fault in (refused := [error, *error.rest]):
+                extra = {"event": "reload_refused", "code": fault.code}
                 LOG.error(text, fault, fault.hint, extra=extra)
             return running, refused
         for fault in faults:

@@ -85,7 +85,7 @@ def findings(
             yield "configuration", ok(found, details=assumed)
     except BadConfiguration as error:
         config, refused = DaemonConfig(), error
-        yield "configuration", fail(str(error), error.hint)
+        yield "configuration", fail(str(error), error.hint, map(str, error.rest))
     context = CheckContext(config, path, find_unit(), recordings)
     possible = [check for check in checks if refused is None or check.of_machine]
     for check, running in [(check, _RunningCheck(check, context)) for check in possible]:

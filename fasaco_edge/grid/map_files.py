@@ -274,8 +274,8 @@ def _index() -> dict[str, _BuiltIn]:
     return msgspec.convert(text.values, dict[str, _BuiltIn])
 
 
-# Keys whose numbers may be in quotes.
-NUMBERS = ("resolution", "occupied_thresh", "free_thresh")
+# Keys whose numbers may be texts: in quotes, or written as YAML 1.1 has no number, like -.5.
+NUMBERS = ("resolution", "origin", "occupied_thresh", "free_thresh")
 
 
 class MapKeys(Document, frozen=True):
@@ -299,7 +299,9 @@ class MapKeys(Document, frozen=True):
 
 
 def _unquoted(value: object) -> object:
-    """Return the number that a text contains, as map_server reads it; other values as they are."""
+    """Return the numbers that texts contain, as map_server reads them; other values as they are."""
+    if isinstance(value, list):
+        return [_unquoted(each) for each in value]
     try:
         return float(value) if isinstance(value, str) else value
     except ValueError:
@@ -309,7 +311,7 @@ def _unquoted(value: object) -> object:
 def _read_keys(path: Path) -> tuple[MapKeys, Path]:
     """Return the keys of a YAML file, and the image that it names."""
     text = read_written(path, MapFileError, missing=_MISSING_HINT, broken=_YAML_HINT)
-    values = text.values
+    values = {} if text.values is None else text.values
     if isinstance(values, dict):
         values = {
             key: _unquoted(value) if key in NUMBERS else value for key, value in values.items()
@@ -320,7 +322,7 @@ def _read_keys(path: Path) -> tuple[MapKeys, Path]:
         image = path.parent / os.path.expanduser(keys.image)
         if not os.path.isfile(image):
             faults.append(MapFileError(f"no file {shown(str(image))}", key="image"))
-    for fault in faults:
+    for fault in (*text.twice, *faults):
         fault.hint = _KEY_HINTS.get(fault.key.partition("[")[0], _YAML_HINT)
     text.check(faults)
     return keys, image

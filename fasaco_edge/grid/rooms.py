@@ -1,9 +1,9 @@
-"""Rooms of an occupancy grid: regions of free floor that doors separate.
+"""Rooms of an occupancy grid: regions of free floor that doors and mouths of passages separate.
 
-Free-standing furniture is ignored. Doors are narrow gaps between the ends of walls
-(``kernels.rooms.doors``). Each door is cut, and each connected part is then a region. A region too
-small for a room is joined to a neighbour through the least certain door. On an incomplete map, a
-room is found once enough of its floor has been seen through the door.
+Free-standing furniture is ignored. Doors are narrow gaps between the ends of walls, and a mouth is
+the end of a narrow passage (``kernels.rooms.doors``). Each door and mouth is cut, and each
+connected part is then a region. A region too small for a room is joined to a neighbour through the
+least certain of them. On an incomplete map, a room is found once enough of its floor has been seen.
 """
 
 from __future__ import annotations

@@ -70,7 +70,7 @@ class Written(Generic[_Error]):
 
     Attributes:
         file: the file.
-        values: plain values.
+        values: plain values; None for an empty file.
         lines: line of each key, from 1.
         twice: a fault for each key that occurs more than once; YAML would take the last.
     """
@@ -113,7 +113,7 @@ def read_written(
     Args:
         path: the file.
         error: kind of the errors.
-        missing: hint for a file that cannot be read.
+        missing: hint for a file that does not exist.
         broken: hint for a file that is no plain YAML.
         parse: reads the values of a JSON file; None for YAML.
 
@@ -122,30 +122,33 @@ def read_written(
     """
     try:
         text = read_bounded(path)
-        node, values = compose(text) if parse is None else (_node_of_json(text), parse(text))
+        keys, values = compose(text) if parse is None else (_keys_of_json(text), parse(text))
     except (OSError, ValueError, RecursionError) as refused:
         if isinstance(refused, OSError):
-            fault = error(str(refused.strerror), hint=missing)
+            is_missing = isinstance(refused, FileNotFoundError)
+            hint = missing if is_missing else "name a file that can be read"
+            fault = error(str(refused.strerror), hint=hint)
         else:
-            fault = error(f"not plain {'JSON' if parse else 'YAML'}: {refused}", hint=broken)
+            why = "nested too deeply" if isinstance(refused, RecursionError) else refused
+            fault = error(f"not plain {'JSON' if parse else 'YAML'}: {why}", hint=broken)
         fault.file = path
         raise fault from refused
     lines: dict[str, int] = {}
     twice = []
-    for key, line in _keys_and_lines(node):
+    for key, line in keys:
         if key in lines:
             text = f"is given twice, in line {lines[key]} and in line {line}"
             twice.append(error(text, key=key))
         lines[key] = line
-    return Written(path, {} if values is None else values, lines, tuple(twice))
+    return Written(path, values, lines, tuple(twice))
 
 
-def _node_of_json(text: str) -> yaml.Node | None:
-    """Return JSON, whose tabs YAML does not take, as nodes; None where YAML takes it in no way."""
+def _keys_of_json(text: str) -> list[tuple[str, int]]:
+    """Return the keys of JSON, of which YAML takes no tabs; none where it takes nothing."""
     try:
         return compose(text.replace("\t", " "))[0]
     except PlainYamlError:
-        return None
+        return []
 
 
 def _keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[str, int]]:
@@ -162,8 +165,8 @@ def _keys_and_lines(node: yaml.Node | None, before: str = "") -> Iterator[tuple[
             yield from _keys_and_lines(item, key)
 
 
-def compose(text: str) -> tuple[yaml.Node | None, object]:
-    """Return a document as nodes, with their lines, and as plain values.
+def compose(text: str) -> tuple[list[tuple[str, int]], object]:
+    """Return each key of a document and its line, from 1; and the document as plain values.
 
     Raises:
         PlainYamlError: it is no YAML, or not plain.
@@ -171,7 +174,9 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
-        return node, None if node is None else loader.construct_document(node)
+        # Construction adds the keys that << merges; those beside it may replace them.
+        keys = list(_keys_and_lines(node))
+        return keys, None if node is None else loader.construct_document(node)
     except PlainYamlError:
         raise
     except RecursionError as error:
@@ -181,6 +186,11 @@ def compose(text: str) -> tuple[yaml.Node | None, object]:
     # Invalid UTF-8, an impossible date, or a number in base 60 beyond the range of floats.
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise PlainYamlError(str(error)) from error
+
+
+def dump(document: object) -> str:
+    """Return plain values as YAML, which ``compose`` reads back."""
+    return yaml.dump(document, Dumper=_Dumper, sort_keys=False)
 
 
 # What the parser says of frequent mistakes, and what that means.
@@ -250,4 +260,11 @@ class _Loader(yaml.SafeLoader):
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
 # As in YAML 1.2: YAML 1.1 takes 1e-6 for a text.
 _EXPONENT = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+")
-_Loader.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes texts that ``_Loader`` would take for numbers."""
+
+
+for _kind in (_Loader, _Dumper):
+    _kind.add_implicit_resolver("tag:yaml.org,2002:float", _EXPONENT, list("-+0123456789"))

@@ -88,6 +88,13 @@ def test_an_invalid_configuration_is_a_failed_check(doctor, anywhere):
     assert "bus.open_to_everyone" in told["configuration"]["to_do"]
 
 
+def test_a_configuration_with_two_faults_is_reported_in_full(doctor):
+    told, _ = doctor(listen=["x"])
+    assert "bus.listen[0]: 'x': no protocol" in told["configuration"]["found"]
+    (other,) = told["configuration"]["details"]
+    assert "bus.listen[0]: x can be reached from other computers" in other
+
+
 def test_an_open_endpoint_is_a_warning(doctor, anywhere):
     told, code = doctor(listen=[anywhere], open_to_everyone=True)
     assert code == 0

@@ -174,6 +174,9 @@ BARE = {"type": "Feature", "properties": {}, "geometry": None}
     [
         ("a.yaml", HALL, [(3, "zones[0].pases")]),
         ("a.yaml", "passes: 2\npasses: 3\n", [(2, "passes")]),
+        ("a.yaml", "# cut off", [(None, "")]),
+        ("a.json", "null", [(None, "")]),
+        ("a.json", "[" * 5000 + "]" * 5000, [(None, "")]),
         ("a.yaml", "passes: 1e0\nuntil_min: 1.5e1\n", [(1, "passes")]),
         (
             "a.yaml",
@@ -198,6 +201,14 @@ def test_all_faults_of_an_order_have_their_lines(tmp_path, name, text, places):
         read_order_file(file)
     faults = [caught.value, *caught.value.rest]
     assert [(fault.line, fault.key) for fault in faults] == places
+
+
+def test_a_zone_may_replace_keys_of_another_that_it_merges(tmp_path):
+    file = tmp_path / "a.yaml"
+    file.write_text("zones:\n  - &a {name: a, passes: 2}\n  - {<<: *a, name: b}\n")
+    assert [(zone.name, zone.passes) for zone in read_order_file(file).zones] == [
+        *(("a", 2), ("b", 2)),
+    ]
 
 
 def screen(capsys):

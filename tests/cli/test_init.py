@@ -34,6 +34,16 @@ def test_it_has_nothing_in_it_but_what_differs_from_the_defaults(tmp_path, capsy
     assert load_config(file) == DaemonConfig()
 
 
+def test_a_name_like_a_number_is_written_in_quotes(tmp_path, capsys):
+    file = tmp_path / "robot.yaml"
+    assert init(file, *GIVEN, "--name", "2e1") == 0
+    assert load_config(file).robot.name == "2e1"
+    capsys.readouterr()
+    assert main(["check-config", str(file), "--show"]) == 0
+    file.write_text(capsys.readouterr().out)
+    assert load_config(file).robot.name == "2e1"
+
+
 def test_ros_and_a_router(tmp_path, capsys):
     file = tmp_path / "robot.yaml"
     words = ["--robot-radius", "0,18", "--tool-width", "0.4", "--map-by", "rmw_zenoh"]

@@ -357,6 +357,12 @@ def test_the_command_ends_with_ex_config(tmp_path, capsys, text, said):
     assert f"hint: {'correct the named key' if text else 'name another file'}" in told
 
 
+def test_a_file_that_cannot_be_read_is_not_to_be_written_again(tmp_path):
+    with pytest.raises(BadConfiguration, match="Is a directory") as caught:
+        load_config(tmp_path)
+    assert caught.value.hint == "name a file that can be read"
+
+
 def test_ros_is_left_out_unless_it_stands_there(load):
     assert not load("").ros2
     config = load("ros2: {kind: bridge, namespace: /robot1, pose: nav_msgs/msg/Odometry}")

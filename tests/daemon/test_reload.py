@@ -16,7 +16,7 @@ from fasaco_edge.daemon.reload import (
     is_changeable,
     with_changeable,
 )
-from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.errors import BadConfiguration, OpenToEveryone, together
 from tests.support.outsider import TIMEOUT_S
 
 RUNNING = DaemonConfig()
@@ -94,15 +94,19 @@ def test_changeable_and_other_keys_are_separated():
 
 def test_an_invalid_file_changes_nothing(caplog):
     def read() -> DaemonConfig:
-        raise BadConfiguration("planner.ants: expected int, got 'many'")
+        first = BadConfiguration("expected int, got 'many'", key="planner.ants")
+        raise together([first, OpenToEveryone("anybody may join", key="bus.listen[0]")])
 
     reload = Reload(read, ServiceManager({}))
     reload.asked.set()
     taken, faults = taken_by(reload)
     assert taken == RUNNING
-    assert [str(fault) for fault in faults] == ["planner.ants: expected int, got 'many'"]
-    assert "configuration refused" in caplog.text
-    assert "planner.ants" in caplog.text
+    said = ["planner.ants: expected int, got 'many'", "bus.listen[0]: anybody may join"]
+    assert [str(fault) for fault in faults] == said
+    assert all(
+        f"configuration refused, the previous one stays in force: {s}" in caplog.text for s in said
+    )
+    assert [record.code for record in caplog.records] == ["bad_configuration", "open_to_everyone"]
 
 
 def test_every_changeable_key_is_one():

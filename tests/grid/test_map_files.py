@@ -282,8 +282,10 @@ def test_an_incomplete_map_file_error_lists_its_keys(tmp_path, text, said):
 def test_numbers_may_be_in_quotes(tmp_path):
     grey([0]).save(tmp_path / "map.png")
     path = tmp_path / "map.yaml"
-    path.write_text(yaml.safe_dump(DESCRIPTION | {"resolution": "0.05", "free_thresh": "0.2"}))
-    assert read_map(path).geometry.resolution == 0.05
+    changes = {"resolution": "0.05", "free_thresh": "0.2", "origin": ["-1.5", 2, "-.5"]}
+    path.write_text(yaml.safe_dump(DESCRIPTION | changes).replace("'-.5'", "-.5"))
+    geometry = read_map(path).geometry
+    assert (geometry.resolution, geometry.origin) == (0.05, Pose2D(-1.5, 2, -0.5))
 
 
 def test_all_keys_are_judged_at_once(tmp_path):
@@ -300,6 +302,7 @@ def test_all_keys_are_judged_at_once(tmp_path):
         *((4, "ocupied_thresh"), (6, "mode")),
     ]
     assert "expected float with a decimal point, got '0,05'" in faults[2].what
+    assert faults[5].hint == "mode is trinary for maps of map_saver"
 
 
 @pytest.mark.parametrize(
