@@ -5,7 +5,7 @@
 Takes minutes.
 
 A hall of 75 m x 75 m, 250 x 250 cells of the lattice: a map of 1,500 x 1,500 pixels once a second
-that comes to be known while the robot drives, poses at 20 Hz, coverage and status once a second,
+that comes to be known while the robot drives, poses at 20 Hz, a status once a second,
 every half minute a plan of four cohorts and its path: 10,000 messages in seven minutes. With
 --picture it is opened in the viewer, too. Exit code 1 where a goal is missed or a view complains.
 """
@@ -112,8 +112,6 @@ class Hall:
             yield tick / POSES_HZ, "pose", self._pose(place + tick / POSES_HZ * SPEED_M_S), b""
         row, col = self._walk[int(place)]
         self._covered[row, col] = 75 if self._covered[row, col] else 50
-        geometry = GridGeometry(SIDE, SIDE, CELL_M, Pose2D(0.0, 0.0))
-        yield 0.95, "coverage", encode_occupancy_grid(OccupancyGrid(geometry, self._covered)), b""
         yield 0.96, "status", self._status(second), b""
 
     def _map(self, second: int) -> bytes:
