@@ -146,8 +146,11 @@ class LatchedSubscription(Subscription):
         found = {"/".join(key.rpartition("/@adv/pub/")[2].split("/")[:2]): key for key in tokens}
         with self._lock:
             self._awaits_tokens = False
-            for name in self._publishers.forget_others(found) if is_whole else ():
+            gone = self._publishers.forget_others(found) if is_whole else []
+            for name in gone:
                 self._order.forget(name)
+            if gone and not self._publishers.open_queries:
+                self._order.deliver_held()  # no reply of these publishers will come
             added = self._publishers.add(found, time.monotonic())
             for name in added:
                 self._order.confirm(name)

@@ -3,7 +3,7 @@
 Samples arrive as they are published, and as replies to queries. A reply may overtake published
 samples: it has a higher priority, and samples are delivered by another thread. Samples that a reply
 has overtaken are dropped as older. Where several samples of a publisher count, all wait until the
-replies are complete.
+replies are complete, and those after a lost sample wait for the next reply, which may have it.
 
 The cache of each publisher is queried at most once a second, and not while a reply is pending. Up
 to MOST_PUBLISHERS of a key are queried.
@@ -169,7 +169,9 @@ class SampleOrder:
     def take_published(self, sample: zenoh.Sample) -> None:
         """Take a published sample."""
         name, mark = _origin(sample)
-        waits = self._depth > 1 and self._publishers.is_asking
+        last = self._last_mark.get(name)
+        is_gap = name in self._publishers and _leaves_gap(name, mark, last)
+        waits = self._depth > 1 and (self._publishers.is_asking or is_gap)
         is_listed = sample.source_info or name in self._last_mark or name in self._publishers
         if not name or not (is_listed or waits):
             # The publisher has no cache, or has not been found yet.
@@ -177,7 +179,6 @@ class SampleOrder:
                 _remember(self._unconfirmed, name, mark)
             self._receive(sample)
             return
-        last = self._last_mark.get(name)
         if last and not mark and _ticks(sample) >= self._stamps.get(name, 0):
             # Number 0 and a newer stamp: the publisher was restarted under the same name.
             del self._last_mark[name]
@@ -246,3 +247,8 @@ def _is_newer(mark: int, last: int | None) -> bool:
     if last is None or last >= _SEQUENCE_NUMBERS:
         return last is None or mark > last
     return 0 < (mark - last) % _SEQUENCE_NUMBERS < _SEQUENCE_NUMBERS // 2
+
+
+def _leaves_gap(name: str, mark: int, last: int | None) -> bool:
+    """Return whether samples between the last one and this one are missing."""
+    return last is not None and not name.endswith("/uhlc") and _is_newer(mark, last + 1)

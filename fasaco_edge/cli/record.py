@@ -136,10 +136,10 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
 
 
 COMMAND = Command(
-    description="Record map, coverage, pheromone, path, pose, states and latencies of one robot, "
-    "and all messages to its mission, byte for byte; or record all robots of a fleet on one map. "
-    "It ends at SIGTERM or SIGINT. Open the result with `rerun FILE.rrd`; run its mission again "
-    "with `fasaco-edge replay FILE.rrd`.",
+    description="Record map, swept floor, pheromone, path, pose, states and latencies of one "
+    "robot, and all messages to its mission, byte for byte; or record all robots of a fleet on one "
+    "map. It ends at SIGTERM or SIGINT. Open the result with `rerun FILE.rrd`; run its mission "
+    "again with `fasaco-edge replay FILE.rrd`.",
     run=run,
     add_options=_add_options,
 )

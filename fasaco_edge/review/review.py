@@ -78,7 +78,9 @@ def read_review(
         UnreadableRecording: a file is missing, no recording, or without samples.
         DifferentRuns: the parts are not of one run.
     """
-    record = read_run_record(paths, lambda *amounts: progress("reading", *amounts))
+    record = read_run_record(
+        paths, lambda done, total: progress("reading kB", done // 1000, total // 1000)
+    )
     samples = RecordedSamples((), record.batches)
     # The number of the last batch's first sample approximates the number of samples.
     about = max(batch.place.first for batch in record.batches) + 1

@@ -152,6 +152,32 @@ def test_cached_and_live_samples_arrive_in_order(bus, endpoint):
     assert heard == list(range(heard[0], 2000))
 
 
+@pytest.mark.parametrize("stays", [True, False])
+def test_where_several_samples_count_a_lost_one_is_queried(bus, endpoint, monkeypatch, stays):
+    """A full link drops samples; of a publisher that is gone nobody has them any more."""
+    samples, lost, receive = Queue(), [], latched.LatchedSubscription._on_sample
+
+    def lose(self, sample):
+        if sample.payload.to_bytes() == b"1":
+            lost.append(sample)
+        else:
+            receive(self, sample)
+
+    monkeypatch.setattr(latched.LatchedSubscription, "_on_sample", lose)
+    with publishing(endpoint, cache=10) as publisher:
+        subscription = bus.subscribe(KEY, samples.put, latched=True, history=100)
+        publisher.put(b"0")
+        assert taken(samples, 1) == [b"0"]
+        publishers = subscription._publishers
+        until(lambda: len(publishers) == 1 and not publishers.is_asking)
+        publisher.put(b"1")
+        publisher.put(b"2")
+        until(lambda: lost)
+        if stays:
+            assert taken(samples, 2) == [b"1", b"2"]
+    assert stays or taken(samples, 1)[0] in (b"1", b"2")
+
+
 def test_samples_held_for_a_missing_answer_are_bounded(bus, endpoint, monkeypatch):
     """A publisher that does not answer, and another one that sends megabytes meanwhile."""
     monkeypatch.setattr(latched, "ANSWER_S", 1000.0)

@@ -205,6 +205,22 @@ def test_the_line_ahead_is_timed_and_bounded_from_below():
     assert robot.mission.line.ahead().gap is None
 
 
+def test_the_time_of_a_long_segment_runs_down():
+    robot = Robot(Mission(CONFIG))
+    robot.tell(MapReceived(room(4.8, 2.4)))
+    while math.dist(robot.at, START) < 1.5:
+        robot.drive(is_checked=False)
+    robot.tell(CommandReceived(1, "home"))
+    times = [robot.mission.line.ahead().seconds]
+    while robot.mission.state is not State.PAUSED:
+        robot.drive(is_checked=False)
+        times.append(robot.mission.line.ahead().seconds)
+    assert times[0] > 1.5 / 0.25
+    drives_s = STEP_M / 0.25
+    assert np.diff(times)[2:15] == pytest.approx(-drives_s, abs=0.1 * drives_s)
+    assert times[-1] < drives_s
+
+
 def test_the_status_says_what_of_the_floor_is_left_and_why():
     robot = Robot(Mission(CONFIG))
     assert floor_report(robot.mission) == FloorReport(0.0)

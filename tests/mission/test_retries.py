@@ -266,3 +266,22 @@ def test_a_door_behind_a_keep_out_that_was_removed_is_waited_for():
     drive.tell(MapReceived(two_rooms()))
     drive.run(State.BLOCKED)
     assert "tried again after 30 s (1 of 2)" in drive.mission.reason
+
+
+def test_a_door_that_shut_behind_a_keep_out_is_waited_for_without_it():
+    drive = between_rooms(0)
+    drive.command("keep_out_add", keep_out=FENCE)
+    drive.tell(MapReceived(two_rooms()))
+    drive.command("keep_out_remove", keep_out=KeepOut("fence"))
+    drive.run(State.BLOCKED)
+    assert "tried again after 30 s (1 of 2)" in drive.mission.reason
+
+
+def test_a_second_keep_out_lets_nobody_wait_behind_the_first():
+    drive = between_rooms(0)
+    drive.command("keep_out_add", keep_out=FENCE)
+    drive.command(
+        "keep_out_add", keep_out=KeepOut("vase", tuple(map(tuple, rectangle(3, 0, 4, 1))))
+    )
+    drive.run(State.DONE)
+    assert drive.now < 10.0

@@ -6,6 +6,7 @@ import pytest
 
 pytest.importorskip("rerun")
 
+from fasaco_edge.cli.review.screen import print_comparison
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.review.comparison import (
     compared_rows,
@@ -173,6 +174,14 @@ def test_differing_setups_are_listed(other, what, compares):
     assert both["compare"] is compares
     words = setup_words(setup_differences(run(), other))
     assert ("cannot be compared" in words) is not compares
+
+
+def test_long_values_of_differing_settings_are_cut(capsys):
+    mask = {letter: f"inline:{letter * 9000}" for letter in "AB"}
+    print_comparison(*(run(config={"mission.keep_out_mask": mask[letter]}) for letter in mask))
+    text = capsys.readouterr().out
+    assert "mission.keep_out_mask" in text
+    assert text.count("A") < 200 > text.count("B")
 
 
 def test_numbers_have_a_difference():

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 EIGHTHS, PLAIN_EIGHTHS = " ▁▂▃▄▅▆▇█", " ..::++##"
 PLOT_WIDTH, PLOT_HEIGHT, SCREEN_PLOT_HEIGHT = 64, 6, 4
 MOST_VERDICTS = 4
+# Longest shown value of a setting; a keep-out mask has kilobytes [characters].
+MOST_OF_SETTING = 80
 
 
 def print_review(review: Review, document: ReviewDocument, *, full: bool) -> None:
@@ -95,7 +97,8 @@ def print_comparison(one: ReviewDocument, other: ReviewDocument) -> None:
     names = (one.recording, other.recording)
     setup = setup_differences(one, other)
     _say(console, setup_words(setup), style="bold")
-    _print_table(console, "Set-up", ("", *names), setup)
+    shown = [(what, *(one_line(text, MOST_OF_SETTING) for text in texts)) for what, *texts in setup]
+    _print_table(console, "Set-up", ("", *names), shown)
     compared = compared_rows(one, other)
     _print_table(console, "Two runs", ("", *names, "difference"), compared)
     for document in (one, other):

@@ -177,7 +177,9 @@ class OrderReach:
         if before is not None and (area := self._map.area) is not None:
             window = area.lattice.window
             lost = _on(window, (before.lattice.window, before.reachable)) & ~area.reachable
-            self._cut_off = window, lost | _on(window, self._cut_off)
+            # Other cells may be behind a door that has shut since then.
+            still = _on(window, self._cut_off) & self._without_keep_outs(area)
+            self._cut_off = window, lost | still
 
     def note_map_motion(self) -> None:
         """Note that the newest map has moved; ``move_reached`` follows with the motion."""
@@ -347,16 +349,21 @@ class OrderReach:
         causes[lattice.coverable & ~reachable] = Cause.BEHIND_OBSTACLES
         if free is not lattice:
             causes[free.coverable & (lattice.states == BLOCKED)] = Cause.KEPT_OUT
-        if free is not lattice and reachable.any():
-            row, col = divmod(int(np.argmax(reachable)), reachable.shape[1])
-            cell = row + lattice.window.row0, col + lattice.window.col0
-            without_zones = ReachableArea.around(free, cell).reachable
-            causes[without_zones & lattice.coverable & ~reachable] = Cause.BEHIND_KEEP_OUT
+        behind = self._without_keep_outs(area) & lattice.coverable & ~reachable
+        causes[behind] = Cause.BEHIND_KEEP_OUT
         if self.order_state.stage is not Stage.COVERING:
             # While covering, reachable cells are still to come.
             causes[reachable] = Cause.LEFT_OVER
         causes[~self._uncovered(order, area)] = 0
         return causes
+
+    def _without_keep_outs(self, area: ReachableArea) -> NDArray[np.bool_]:
+        """Return which cells would be reachable without keep-outs, bool (rows, cols) of an area."""
+        free, reachable, window = self._map.free, area.reachable, area.lattice.window
+        if free is None or free is area.lattice or not reachable.any():
+            return reachable
+        row, col = divmod(int(np.argmax(reachable)), reachable.shape[1])
+        return ReachableArea.around(free, (row + window.row0, col + window.col0)).reachable
 
     def _uncovered(self, order: MissionOrder, area: ReachableArea) -> NDArray[np.bool_]:
         """Return the cells that are asked for and not covered."""

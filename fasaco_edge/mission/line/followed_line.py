@@ -185,10 +185,10 @@ class FollowedLine:
 
     def next_xy(self, count: int) -> Points:
         """Return the first points of ``xy``, from the robot's place on, at most ``count``."""
-        return raster_to_map(self._floor.geometry, self._from_place()[:count])
+        return raster_to_map(self._floor.geometry, self.from_place()[:count])
 
-    def _from_place(self) -> Points:
-        """Return the line from the robot's place on it."""
+    def from_place(self) -> Points:
+        """Return the line from the robot's place on it, float64 (n, 2), in pixels."""
         points = self.line.points
         if len(points) > 1:
             points = points.copy()

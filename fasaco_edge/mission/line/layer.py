@@ -202,7 +202,7 @@ class LineLayer:
         to_sweep, floor = self.left.areas, self._map.floor
         if self._ahead is None or self._config is None or to_sweep is None or floor is None:
             return None
-        seconds = self._config.seconds(self._ahead.line.points, self._ahead.tally.unit_m)
+        seconds = self._config.seconds(self._ahead.from_place(), self._ahead.tally.unit_m)
         tool_m = floor.discs.tool_m
         length_m = (to_sweep.ahead_m2 - math.pi * tool_m**2 / 4.0) / tool_m
         return AheadFigures(seconds, max(length_m, 0.0) / self._config.speed_m_s)

@@ -155,7 +155,7 @@ class LineAhead(FollowedLine):
         It begins at the robot's place on the line; if the disc does not fit at the robot's pose, it
         begins at that pose.
         """
-        points, here = self._from_place(), self._place.here
+        points, here = self.from_place(), self._place.here
         if len(points) > 1:
             on = points[0]
             radius = fitting_radius(self._floor, here)
