@@ -1,8 +1,8 @@
 """Benchmark: options, samples one by one, and a report on any number of them.
 
-A new benchmark is a file that ends with a ``Benchmark``, and a row of ``BENCHMARKS`` in
-``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. If a user interrupts it, it reports on
-the samples so far.
+To add a benchmark, write a file that ends with a ``Benchmark``, and add it to ``BENCHMARKS`` in
+``fasaco_edge.cli.bench`` or ``tests.benchmarks.__main__``. A benchmark that a user interrupts
+reports on the samples so far.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Report:
         goals: the goals, with the measured values.
         remarks: sentences below the table.
         further: tables after the first.
-        faults: errors of single measurements; the others are in the results.
+        faults: errors that ended single measurements; the tables hold the others.
     """
 
     title: str

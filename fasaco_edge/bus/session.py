@@ -148,9 +148,9 @@ class Bus:
     def serve(
         self, key: str, answer: Callable[[Request], Reply | Shared | None], complete: bool = True
     ) -> None:
-        """Reply to queries on ``key``, on a Zenoh thread; for None, only other queryables reply.
+        """Reply to queries on ``key``, on a Zenoh thread; no reply if ``answer`` returns None.
 
-        ``complete``: whether this queryable alone can reply to a query.
+        ``complete``: whether this queryable's reply is enough, without others.
         """
 
         def receive(query: zenoh.Query) -> None:
@@ -182,7 +182,7 @@ class Bus:
         self._served.append(_Served(key, receive, complete, declared))
 
     def let_others_answer(self, yes: bool) -> None:
-        """Set whether other queryables come first: then this one only gets queries to all."""
+        """Set whether other queryables come first; if so, this one gets only queries to all."""
         for served in self._served:
             if served.complete:
                 served.declared.undeclare()
@@ -261,12 +261,12 @@ class Bus:
         return session == self.id or session in map(str, self._session.info.routers_zid())
 
     def keep_in_touch(self, now: float) -> bool:
-        """Return whether samples can arrive; take over the port of the joined process if it ended.
+        """Return whether samples can arrive. To be polled; ``now`` is monotonic [s].
 
-        To be polled; ``now`` is monotonic [s].
+        If the process that listens on the shared port has ended, take the port over.
         """
         info = self._session.info
-        # A listener can be connected to at any time.
+        # Other sessions can connect to a listener at any time.
         in_touch = self._listens or bool(info.routers_zid() or info.peers_zid())
         if self._stand_in is not None:
             self._stand_in.poll(now, is_alone=not in_touch)

@@ -53,7 +53,6 @@ def rooms_collection(rooms: Rooms) -> dict[str, object]:
 
 
 def _feature(kind: str, coordinates: object, properties: dict[str, object]) -> Members:
-    """Return a feature of one geometry."""
     geometry = {"type": kind, "coordinates": coordinates}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
 
@@ -102,7 +101,7 @@ class _Polygon(_Drawn, frozen=True):
 
 
 class _Properties(_Drawn, frozen=True):
-    """Members of a zone, checked as those of an order; and whether it is another thing."""
+    """Members of a zone, checked as those of an order; and marks of other features."""
 
     name: Any = None
     passes: Any = None
@@ -119,11 +118,10 @@ class _Feature(_Drawn, frozen=True):
 
     @property
     def known(self) -> _Properties:
-        """Its properties."""
         return self.properties or _Properties()
 
     def polygon(self) -> tuple[_Polygon, list[OrderError]]:
-        """Return its outline, and the faults of that, if it counts."""
+        """Return its outline and the outline's faults; both empty if no outline is needed."""
         known = self.known
         if not known.keep_out and (known.skip or known.room is not None):
             return _Polygon(coordinates=[]), []
@@ -138,7 +136,7 @@ class _Feature(_Drawn, frozen=True):
 
 
 class _Collection(_Drawn, frozen=True):
-    """Features, and members of an order, which are checked as those of one."""
+    """Features, and members of an order; ``OrderDocument`` checks the members."""
 
     type: Literal["FeatureCollection"]
     features: Annotated[list[_Feature], Meta(min_length=1)]
@@ -193,7 +191,7 @@ def drawn_order(document: Members) -> tuple[OrderDocument, list[OrderError]]:
             part = ".geometry.coordinates[0]" if is_corner else ".properties"
             fault.key = f"{origins[place]}{part}{rest.removeprefix('.polygon')}"
     for fault in (faults := faults + found):
-        # A file may be one line, so that its number says nothing.
+        # Name the feature: line numbers do not help if the file is one line.
         if name := names.get(fault.key[: fault.key.find("]") + 1]):
             fault.what += f" (feature {name!r:.80})"
         fault.hint = HINT if fault.hint == OrderError.hint else fault.hint

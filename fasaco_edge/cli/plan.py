@@ -64,7 +64,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _check_together(args: argparse.Namespace, request: PlanRequest) -> None:
-    """Refuse options that do not go together."""
     search = request.search
     if args.rooms and args.passes is not None:
         raise BadConfiguration("--rooms is for one pass, not for several")
@@ -137,7 +136,7 @@ def _warn(request: PlanRequest, planned: Plan | PassPlans) -> None:
             left,
             "s do" if left > 1 else " does",
             request.robot.turn_radius_m,
-            "" if request.robot.reverses else ", or drive backward: without --forward-only",
+            "" if request.robot.reverses else "; without --forward-only it may drive backward",
         )
 
 

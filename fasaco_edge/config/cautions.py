@@ -1,6 +1,6 @@
 """Cautions: valid settings that together have no effect, or an unexpected one.
 
-The daemon starts with them; invalid values are faults of ``loading``.
+The daemon starts nevertheless; invalid values are faults of ``loading``.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ def _clearance(config: DaemonConfig) -> Iterator[str]:
     if config.planner.line != "cells" and robot.clearance_m > most_m:
         yield (
             f"robot.clearance_m {robot.clearance_m:g} is more than a fifth of robot.tool_width_m, "
-            f"{most_m:.2g}: lines give up that clearance along walls, as so wide a strip of floor "
-            "is worth it; a distance that must always be kept belongs in robot.radius_m"
+            f"{most_m:.2g}: lines come closer to walls, as that clearance would leave a wide strip "
+            "unswept; a distance that must always be kept belongs in robot.radius_m"
         )
 
 

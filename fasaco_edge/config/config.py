@@ -67,10 +67,10 @@ class PlannerConfig(Document, frozen=True):
     While the robot drives, ``spare_share`` of a processor core is used to improve the rest of its
     path; only colony-search can do that.
 
-    colony-search minimises the seconds of driving until the budget ends; ``ants``, ``visibility``
-    and ``threads`` apply to fasaco and aco, which may end earlier.
+    colony-search shortens the driving time until the budget ends; ``ants``, ``visibility`` and
+    ``threads`` apply to fasaco and aco, which may end earlier.
 
-    ``velocities`` is ``8:1`` for cohorts from 8 down to 1, ``1:8``, ``4`` or ``8,4,1``.
+    ``velocities`` are those of the cohorts: ``8:1`` for 8, 7, ... 1; or ``1:8``, ``4``, ``8,4,1``.
     ``visibility`` is eta of the ants: ``neighbour`` as in the paper; with ``fewest-open`` they
     prefer cells that would soon be cut off, which saves revisits
     (``tests/benchmarks/RESULTS.md``).
@@ -187,8 +187,8 @@ class FleetConfig(Document, frozen=True):
             )
         if self.map_frame:
             yield BadConfiguration(
-                "expected fleet.frame beside it, the name of the frame in which that map has a "
-                "place",
+                "expected fleet.frame, too: the name of the fleet's frame, in which that map is "
+                "placed",
                 key="map_frame",
                 others=["frame"],
             )
@@ -316,8 +316,8 @@ class DaemonConfig(Document, frozen=True):
     def lattice_deg(self) -> float | None:
         """The angle of the cells' rows to the x axis of the map frame [deg]; None for the walls.
 
-        Cells are aligned with the axes if walks lead through cell centres. They are in a fleet,
-        too, as each of its robots would see other walls first.
+        Cells are aligned with the axes if walks lead through cell centres. In a fleet the axes
+        take the place of the walls, as each robot would see other walls first.
         """
         if self.planner.line == "cells" or self.planner.align == "axes":
             return 0.0

@@ -63,7 +63,7 @@ def _one(value: Callable[[Status], float | None]) -> Callable[[Status], list[Sam
 
 
 def _member(part: str, name: str) -> Callable[[Status], list[Sample]]:
-    """Return the sampler of a member of a part of the status that may be missing."""
+    """Return the sampler of a member of a section of the status; None without that section."""
     return lambda status: [({}, getattr(getattr(status, part), name, None))]
 
 

@@ -174,8 +174,8 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
         to_do = f"{'correct what comes' if come else 'publish'} on {keys_lacking}"
         if "map" in lacking and elsewhere.places():
             to_do += (
-                ", or use a map found elsewhere: robot.name, bus.base, ros2.domain and "
-                "ros2.namespace set where this daemon looks"
+                ", or use a map found elsewhere: set robot.name, bus.base, ros2.domain and "
+                "ros2.namespace to those of that map"
             )
         return warn(found, to_do, details)
     if status.troubles:

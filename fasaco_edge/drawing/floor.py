@@ -26,7 +26,7 @@ def draw_visits(
     visits: NDArray[np.integer],
     start: Cell,
 ) -> list[KeyEntry]:
-    """Tint the lattice's cells by number of visits; return the key of the tints.
+    """Tint the lattice's cells by number of visits; return the tints' legend.
 
     Args:
         plot: the plot to draw on.

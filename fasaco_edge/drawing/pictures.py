@@ -20,27 +20,27 @@ from fasaco_edge.grid.rooms import FoundRooms
 
 
 def draw_swept(plot: Plot, swept: MapLayer, words: str) -> list[KeyEntry]:
-    """Paint the swept floor; return the key of its colour and of a line's marks."""
+    """Paint the swept floor; return the legend entries of its colour and of a line's marks."""
     plot.paint(swept, palette.COVERED)
     return [*ENDS, KeyEntry("tile", palette.COVERED, f"{words} ({swept.area_m2:,.1f} m2)")]
 
 
 def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
-    """Paint unswept reachable floor; return the key of its colour."""
+    """Paint unswept reachable floor; return its legend entry."""
     plot.paint(unswept, palette.UNSWEPT)
     label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
 
 
 def draw_by_others(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
-    """Paint floor that other robots swept; return the key of its colour."""
+    """Paint floor that other robots swept; return its legend entry."""
     plot.paint(swept, palette.BY_OTHERS)
     label = f"swept by other robots of its fleet ({swept.area_m2:,.1f} m2)"
     return [KeyEntry("tile", palette.BY_OTHERS, label)]
 
 
 def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
-    """Outline the zones and keep-out zones of an order; return the key of their colours."""
+    """Outline the zones and keep-out zones of an order; return their legend entries."""
     key = []
     for polygons, colour, label in (
         (zones, palette.BLUE, "zone to cover"),
@@ -167,7 +167,7 @@ def draw_walk(
 def draw_driven(
     plot: Plot, line: Points, is_backward: NDArray[np.bool_] | None, cell_m: float
 ) -> list[KeyEntry]:
-    """Draw a line, or a curve, with its ends; return the key of its colours."""
+    """Draw a line, or a curve, with its ends; return its legend entries."""
     key: list[KeyEntry] = []
     if is_backward is None:
         draw_line(plot, in_pieces(line, cell_m), cell_m)
@@ -205,7 +205,7 @@ def draw_line(plot: Plot, line: Points, cell_m: float) -> None:
 def draw_curve(
     plot: Plot, curve: Points, is_backward: NDArray[np.bool_], cell_m: float
 ) -> list[KeyEntry]:
-    """Draw a curve, points (n, 2) [m], and arrows along it; return the key of its colours.
+    """Draw a curve, points (n, 2) [m], and arrows along it; return its legend entries.
 
     ``is_backward``: which segments are driven backward, bool (n - 1,).
     """

@@ -1,4 +1,4 @@
-"""Nav2's controller on the bus: sends the follower's requests, and passes on replies by cycle."""
+"""Nav2's controller on the bus: sends the follower's requests, returns replies once a cycle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Map images: decoded at once, processed in stripes of rows; and the cell values of their levels.
+"""Map images, decoded whole and processed in stripes of rows; the cell value of each level.
 
 Pillow's decoded image takes one byte per grey pixel, and four per colour pixel. It is processed in
 stripes, which bounds the additional memory.
@@ -55,12 +55,13 @@ RAW = (
     "wall, write mode: trinary"
 )
 NEGATED = (
-    "negate: 1 makes walls of white, and of {} pixels of the grey 205 that map_saver writes for "
-    "never seen: if white is floor, write negate: 0"
+    "negate: 1 turns white pixels into walls, and {} pixels of the grey 205, which map_saver "
+    "writes for never seen: if white is floor, write negate: 0"
 )
 UNSEEN = (
-    "{} pixels of the grey 205, which map_saver writes for never seen, are {} by its keys: they "
-    "are taken for unknown; write mode: trinary and free_thresh: 0.196, or give floor another grey"
+    "{} pixels of the grey 205, which map_saver writes for never seen, are {} by the keys of the "
+    "map file: they are taken for unknown; write mode: trinary and free_thresh: 0.196, or give "
+    "floor another grey"
 )
 
 
@@ -216,12 +217,11 @@ def values_of(
 def settle(
     image: MapImage, values: NDArray[np.int8], mode: str, *, negate: bool, is_mask: bool
 ) -> str:
-    """Resolve the grey of map_saver; return how keys contradict the image, with a remedy, or "".
+    """Make map_saver's grey for never seen unknown; return a fault of the keys, "" for none.
 
     Args:
         image, mode, negate: content of the map file.
-        values: int8 (white + 1,), the cell value of each level. Changed in place: map_saver's grey
-            for never seen becomes unknown.
+        values: int8 (white + 1,), the cell value of each level. Changed in place.
         is_mask: whether unknown counts as free.
     """
     never_seen = NEVER_SEEN * image.white // 255

@@ -69,9 +69,9 @@ class Plan:
     Attributes:
         map: the map.
         robot: the robot.
-        line: through the centres of ``cells``, or over the floor, ``quick`` or ``thorough``.
+        line: ``cells`` through the cells' centres; ``quick`` or ``thorough`` over the floor.
         search: settings of the search.
-        ground: the cells and their stands.
+        ground: the cells, and the robot's stand for each.
         problem: what to cover, from where.
         path: the walk, with its cost and bound.
         xy: float64 (n, 2), n >= 1: points (x, y) [m] in the map frame, joined by straight

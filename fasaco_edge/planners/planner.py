@@ -1,7 +1,7 @@
 """Interface of all planners: progress of a search, and stopping criteria: time, work, quality.
 
-Work is counted, so it can be repeated. Imports no numba, so that code that only reads search
-results stays light.
+Work is counted, so that a search can be repeated exactly. No numba is imported here: code that
+only reads search results stays light.
 """
 
 from __future__ import annotations
@@ -88,12 +88,12 @@ class Interrupt:
 
 @dataclass(slots=True)
 class StopRecorder:
-    """Stops with another criterion, and records the calls that stop; ``StopAt`` repeats them.
+    """Asks another criterion, and records at which calls it stops; ``StopAt`` stops at the same.
 
-    The work of a path does not reproduce it: a repair and the search after it may both be stopped.
+    A path's work does not reproduce it: a repair and the search after it may both stop.
 
     Attributes:
-        criterion: the other criterion.
+        criterion: the criterion asked.
         stops: numbers of the calls that returned True, from 1.
     """
 
@@ -135,13 +135,13 @@ class AnyOf:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColonySnapshot:
-    """The colony after a cohort, or where local search restarts.
+    """Pheromone of a colony after a cohort, of colony-search at its end, or of a living trail.
 
     Attributes:
         window: window of the lattice that ``trail`` spans.
         cell_m: edge of a cell [m].
-        trail: float32 (rows, cols): mean pheromone on the moves into a cell after a cohort, or the
-            strongest of a living trail; 0 if the cell is not coverable.
+        trail: float32 (rows, cols): pheromone on the moves into a cell: the mean, or the largest
+            of a living trail; 0 if the cell is not coverable.
         cohort: index of the last cohort, from 0.
         velocity: its velocity [cells/move].
         ants: number of ants so far.

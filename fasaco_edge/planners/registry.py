@@ -23,7 +23,7 @@ class Entry(NamedTuple):
         factory: "module:callable", the module in ``fasaco_edge.planners``; it takes the colony's
             configuration and a number of threads.
         about: description for the command line's help.
-        has_local_search: whether it searches until stopped, and has directions of lanes.
+        has_local_search: whether it searches until stopped, and takes a direction for its lanes.
     """
 
     factory: str

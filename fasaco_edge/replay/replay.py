@@ -1,4 +1,4 @@
-"""Replay by time: the samples of a recording through the daemon's inbox and mission.
+"""Replay by time: passes the samples of a recording to the daemon's inbox and mission.
 
 Time is that of the samples, and planning is counted in work, so that the same samples give the
 same decisions, bit for bit, on any machine. A recording without a turn log shows neither in which
@@ -55,7 +55,7 @@ class RecordedRun:
         ready_ns: arrival of the first status of its mission with a map, as ``Arrival.at_ns``; None
             without such a status.
         restored_cells: number of covered cells from an earlier run, which the recording lacks.
-        starts: number of starts of a daemon after the first.
+        starts: how often the daemon was started again.
         paths: reasons of its published paths by revision, without those of a second daemon.
         path_ns: arrival of each of these paths, by the recorder's clock [ns].
     """
@@ -179,7 +179,7 @@ class Replay:
         return 1e-9 * (arrival.wall_ns + self._base_ns)
 
     def _take(self, arrivals: list[Arrival]) -> Iterator[ReplayStep]:
-        """Take samples in one cycle, after the cycles without samples before it."""
+        """Make the cycles without samples that are due; then take samples in one cycle."""
         now = max(self._at(arrivals[0]), self._now)
         yield from self._wait(now)
         yield self._cycle(now, arrivals)

@@ -22,7 +22,7 @@ from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
 
 ENDS = ("cancel", "reset")
-# States without an order in force: the same order would begin anew.
+# States without an order in force: in them even the same order begins anew.
 OVER = ("done", "idle")
 
 
@@ -136,7 +136,7 @@ def _by_zones(zones: Sequence[ZoneReport]) -> OrderDocument | None:
 def _held(
     data: RunData, states: Sequence[Span], end_s: float
 ) -> Iterator[tuple[str, float, float, str | None, MissionOrder | None]]:
-    """Yield for each order its source, beginning and end [s], the command that ended it, itself."""
+    """Yield for each order its source, beginning and end [s], ending command, content."""
     # Daemon or recorder may have been restarted during an order.
     first_s = next((at_s for at_s, name, _ in data.commands if name == "start"), end_s)
     reported = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)

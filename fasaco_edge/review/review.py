@@ -155,7 +155,8 @@ class Review:
         """Times [s] and covered shares of the cells coverable at the end, float64 (n, 2).
 
         The recorded curve has a point every two seconds: a share of the cells coverable at that
-        time. The statuses, four a minute and one at the end, count them.
+        time. The statuses, four a minute and one at the end, have the
+        numbers of cells.
         """
         known = [
             (each.at_s, *cells, each.status.state in OVER)

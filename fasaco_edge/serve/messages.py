@@ -3,8 +3,8 @@
 All text is sanitized here before it is sent; the page shows it as text only, never as HTML.
 
 A grid is sent as marks, a byte of flags for each pixel. Large grids are reduced: pixels are merged
-by OR, so that no thin wall is lost. A level has the bits of all lower levels, so that OR gives the
-maximum. There is no NumPy here, to save memory on the robot.
+by OR, so that no thin wall is lost. Amounts become levels: a level has the bits of all lower ones,
+so that OR gives the highest. NumPy is not imported, to save memory on the robot.
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def _coverage_marks() -> bytes:
 
 
 def level_marks(top: int) -> bytes:
-    """Return the mark of each value: ``LEVELS`` levels for 1 to ``top``, 0 for 0."""
+    """Return the mark of each value: values 1 to ``top`` get ``LEVELS`` levels, 0 gets no bit."""
     levels = (-(-min(value, top) * LEVELS // top) for value in range(256))
     return bytes((1 << level) - 1 for level in levels)
 

@@ -129,7 +129,7 @@ def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
 
 @lru_cache(maxsize=2 * len(_LOOKS) ** 2)
 def _style(_: ColorSystem, above: int, below: int) -> Style:
-    """Return the style of a character, one per colour system: a style caches its rendering."""
+    """Return a character's style, one for each colour system, as a style caches its rendering."""
     front, back = _LOOKS[above][0], _LOOKS[below][0]
     return Style(color=Color.from_rgb(*front), bgcolor=Color.from_rgb(*back))
 
@@ -158,7 +158,7 @@ class Blocks:
         options = self._console.options.update(width=width, height=None)
         lines = self._console.render_lines(shown, options, pad=True)
         if len(lines) > height > 1:
-            more = Text(f"{len(lines) - height + 1} more rows: a taller terminal", FAINT)
+            more = Text(f"{len(lines) - height + 1} more rows: enlarge the terminal", FAINT)
             lines[height - 1 :] = self._console.render_lines(more, options, pad=True)
         lines = lines[:height]
         drawn = [self.glyphs.drawn(line) for line in lines]

@@ -147,8 +147,8 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ),
         (
             "fleet: {name: hall, map_frame: floor1}",
-            "fleet.map_frame: expected fleet.frame beside it, the name of the frame in which "
-            "that map has a place",
+            "fleet.map_frame: expected fleet.frame, too: the name of the fleet's frame, in which "
+            "that map is placed",
         ),
         (
             "map: {free_at_most: 65}",

@@ -63,7 +63,7 @@ def test_the_keys_of_todays_map_saver_are_consistent(tmp_path, caplog):
             [0, -1, -1],
             "20 pixels of greys from 101 to 254 are unknown in mode raw",
         ),
-        ({"negate": 1}, [0, 100, 100], "negate: 1 makes walls of white, and of 10 pixels"),
+        ({"negate": 1}, [0, 100, 100], "negate: 1 turns white pixels into walls, and 10 pixels"),
         ({"origin": [0, 0, 90]}, [100, -1, 0], "origin's yaw is in radians, got 90"),
     ],
 )

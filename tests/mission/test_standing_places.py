@@ -60,7 +60,8 @@ def test_keep_outs_of_another_floor_leave_the_robot_standing():
     assert drive.mission.state is State.BLOCKED
     assert drive.mission.reason == (
         "mission.zones, mission.keep_out, mission.home: given for the map in frame 'map_1' "
-        "(mission.map_frame), this one is in 'map_2': waits for places of this map, or for that map"
+        "(mission.map_frame), this one is in 'map_2': waits "
+        "until this map has places, or the other map is back"
     )
     assert drive.walk == []
     assert codes(faults) == ["ledger_mismatch", "places_elsewhere"], "each is said once"

@@ -274,5 +274,5 @@ def test_no_number_that_a_status_may_have_ends_the_page():
 def test_a_block_says_how_many_rows_have_no_place():
     blocks = Blocks(Console(file=io.StringIO(), width=40))
     lines = [line.strip() for line in blocks.block(Text("a\nb\nc\nd"), 40, 3)]
-    assert lines == ["a", "b", "2 more rows: a taller terminal"]
+    assert lines == ["a", "b", "2 more rows: enlarge the terminal"]
     assert [line.strip() for line in blocks.block(Text("a\nb"), 40, 3)] == ["a", "b", ""]

@@ -41,7 +41,7 @@ SPENT_PERIOD_S = 30.0
 
 
 class _Kept(NamedTuple):
-    """The state last passed to the writer; ``spent``: time of the order in whole periods."""
+    """The state last passed to the writer; ``spent``: time of the order, in SPENT_PERIOD_S."""
 
     visits: int
     floor_changes: int
@@ -73,7 +73,7 @@ class LedgerKeeper:
         self._kept_at = float("-inf")
 
     def restore(self, mission: Mission, rooms: RoomBook) -> None:
-        """Let a mission continue where the previous one ended, in its rooms."""
+        """Let a mission continue where the previous one ended; ``rooms``: the known rooms."""
         mission.restore(self._before, self.order_state, rooms)
 
     def take_back(self, mission: Mission) -> None:
@@ -122,7 +122,7 @@ class LedgerKeeper:
                 self._begin_anew(fault, "mismatch")
 
     def check_loss(self, command: str) -> None:
-        """Check that no covered cell is forgotten; without a map, zones are not considered.
+        """Check that a command forgets no covered cell; all count, as zones need a map.
 
         Raises:
             WouldForget: there is a loss; the text gives its size.

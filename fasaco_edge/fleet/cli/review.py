@@ -55,7 +55,7 @@ def _print(figures: FleetFigures) -> None:
     console = terminal.out()
     console.print(f"fleet {one_line(figures.fleet)}: {len(figures.robots)} robots", style="bold")
     if simulated := scale_words(figures.time_scale):
-        console.print(f"{simulated}: times are the robots'")
+        console.print(f"{simulated}: times are by the robots' clocks")
     console.print(
         terminal.figures(
             [
@@ -103,8 +103,8 @@ def _print(figures: FleetFigures) -> None:
         )
     console.print(table)
     console.print(
-        "swept [m2]; through, again: m2 that another robot had swept, driven through or swept "
-        "again. kB/s: messages to the fleet (in brackets the most over 5 s). plan ms: median and "
-        "99 %, by the recorder's clock.",
+        "swept [m2]; through, again [m2]: driven through, or swept again, after another robot had "
+        "swept there. kB/s: messages to the fleet (in brackets the most over 5 s). plan ms: median "
+        "and 99 %, by the recorder's clock.",
         style="dim",
     )

@@ -47,7 +47,7 @@ def refuge(
 
     The refuge is the nearest cell off the discs and paths of other robots; the way avoids their
     discs. The way begins at the robot's cell or a cell beside it: the robot can drive there without
-    coming nearer to any robot. Without such a way, one from the robot's cell is returned.
+    coming nearer to any robot. If there is no such way, it begins at the robot's cell anyway.
 
     Args:
         area: the reachable area.

@@ -49,9 +49,9 @@ class Remainder:
             self._waiting_since = now
 
     def note(self, cells: int, own: int, swept: int, now: float) -> None:
-        """Take in the numbers of cells left, in all and in this robot's part, and of cells swept.
+        """Take in numbers of cells: left, left in this robot's part, and swept.
 
-        Cells of its part that only maps of others show are included: it must go there to look.
+        ``own`` includes cells that only maps of others show: the robot goes there to look.
         """
         if own > 0:
             self._most, self.others_go_on = None, False
@@ -63,7 +63,7 @@ class Remainder:
         self.others_go_on = cells > 0 and not is_stuck and waiting_s <= WAITING_S
 
     def note_division(self, cells: int, own: int, swept: int, now: float) -> None:
-        """Take in a new division, as ``note`` does."""
+        """Take in the same numbers for a new division."""
         self.had_part, self.divided = own > 0, cells
         self.note(cells, own, swept, now)
 
@@ -114,7 +114,6 @@ class DivisionNumbers:
         self.number, self.by = min(max([self.number, *numbers]) + 1, MOST_NUMBER), self._robot
 
     def _most_valid(self) -> int:
-        """Return the highest valid number."""
         numbers = self._others.division_numbers()
         first = min((number for number in numbers.values() if number), default=0)
         return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
@@ -163,7 +162,7 @@ class AtWork:
                 found.append(Robot(part.robot, part.seed, part.step_s))
                 continue
             row, col = lattice.cell_at(member.newest.x, member.newest.y)
-            # A seed farther away does not fit into a message.
+            # The cell is sent as the seed of the robot's part: a message holds no larger index.
             if max(abs(row), abs(col)) <= MOST_INDEX:
                 found.append(Robot(part.robot, (row, col), member.newest.step_s))
         return found

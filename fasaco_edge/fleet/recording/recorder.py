@@ -55,8 +55,8 @@ NOTE_NS, WRITE_NS = 1_000_000_000, 5_000_000_000
 GATHER_NS, MOST_GATHERED = 2_000_000_000, 1_000
 # Number of unknown robots and topics whose faults are counted separately.
 MOST_FAULTS = 256
-TOO_LARGE = "what is larger than its share of the memory is left out, its map, say"
-TOO_WIDE = "cells farther apart than are recorded, or more, are left out"
+TOO_LARGE = "messages too large for its share of the memory are left out, such as its map"
+TOO_WIDE = "its cells are too many or too far apart: some are left out"
 
 
 def run_fleet_recorder(
@@ -178,7 +178,6 @@ class FleetRecorder(BusRecorder):
                 )
 
     def _warn_once(self, robot: str, fault: str) -> None:
-        """Log once that a robot's recording is incomplete."""
         if (robot, fault) not in self._faults:
             self._scene.add_line(one_line(f"{robot}: {fault}"), "WARN")
         self._faults[robot, fault] += 1
@@ -227,7 +226,6 @@ class FleetRecorder(BusRecorder):
         self._pending[robot].note_cells(member, has_moved=bool(news))
 
     def _join(self, member: Member) -> None:
-        """Record a robot from now on."""
         self._poses[member.name] = PoseDecoder(self._schema)
         self._pending[member.name] = PendingNote()
         self._subscriptions.subscribe(member.name)

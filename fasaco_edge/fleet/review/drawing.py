@@ -134,6 +134,6 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
         f"{figures.swept_m2:.1f} m2 swept, {figures.again_share:.1%} of it swept again",
     ]
     if simulated := scale_words(figures.time_scale):
-        lines.insert(0, f"{simulated}: times are the robots'")
+        lines.insert(0, f"{simulated}: times are by the robots' clocks")
     title = f"Fleet {figures.fleet}: {len(figures.robots)} robots"
     return Sheet(title, lines, key, None, plot.view.scale).around(plot.finished())

@@ -40,7 +40,7 @@ def is_marked(bits: NDArray[np.uint64], i: int, j: int) -> bool:
 
 @inlined
 def any_between(row: NDArray[np.uint64], first: int, last: int) -> bool:
-    """Return whether any pixel of a row from ``first`` to ``last``, no less, is marked."""
+    """Return whether any pixel of a row from ``first`` to ``last`` is marked: ``last >= first``."""
     at, end = first >> 6, last >> 6
     low = ALL << np.uint64(first & 63)
     high = ALL >> np.uint64(63 - (last & 63))

@@ -135,13 +135,13 @@ MARGIN = 2
 
 
 class _Part(NamedTuple):
-    """A part of the lattice in the rectangle from its cell (row, col) on.
+    """A part of the lattice, in a rectangle whose first cell is (``row``, ``col``).
 
     Attributes:
         inside: bool (rows, cols), the rectangle's cells that belong to it.
         labels: int32 (rows, cols), number of the connected piece of each of them, from 1.
         queue: int32 (rows * cols,).
-        row, col: place of the rectangle.
+        row, col: first cell of the rectangle.
     """
 
     inside: NDArray[np.bool_]
@@ -153,7 +153,6 @@ class _Part(NamedTuple):
 
 @lean_inner_kernel
 def _holds(part: _Part, row: int, col: int) -> bool:
-    """Return whether a cell of the lattice belongs to the part."""
     rows, cols = part.inside.shape
     row, col = row - part.row, col - part.col
     return bool(0 <= row < rows and 0 <= col < cols and part.inside[row, col])

@@ -1,4 +1,7 @@
-"""One step of the dynamic program: the successor states of one cell."""
+"""One step of the dynamic program: the successor states of one cell.
+
+Read ``passages`` (sides, lanes) and ``memory`` (identifiers, mates) first.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,9 +36,9 @@ CODES = (1 << CODE_BITS) - 1
 
 @inlined
 def _words(here: Here) -> int:
-    """Return how many words of a state are in use, an even number: four identifiers each.
+    """Return how many words of a state are in use, rounded up to an even number.
 
-    Four of them are spare.
+    A word holds four identifiers; the four spare ones count.
     """
     return (here.spare_id + 11) >> 3 << 1
 
@@ -52,7 +55,7 @@ def _leads_nowhere(parts: Parts, state: NDArray[np.int16], ends: Ends, closed: i
 
 @inlined
 def _order_sides(state: NDArray[np.int16], here: Here) -> int:
-    """Order the lanes of the next sides; return which were swapped: 1 ahead, 2 below."""
+    """Order the lanes ahead and below; return which were swapped: 1 ahead, 2 below."""
     swaps = order_lanes(state, here.ahead_id) if here.to_ahead else 0
     if here.to_below:
         swaps += 2 * order_lanes(state, here.below_id)
@@ -122,7 +125,7 @@ def decide(
     states.clock[LAYER_STAMP] += 1
     for kind in range(KINDS):
         program.choice.listed[kind] = -1
-    # Costs from which a state before the cell, and one after it, cannot stay below the limit.
+    # A state of cost ``most`` before the cell, or ``threshold`` after it, cannot beat the limit.
     most, threshold = limit - program.left[here.number], limit - program.left[here.number + 1]
     cheapest = MUCH
     for state in range(count):

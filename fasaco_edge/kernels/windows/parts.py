@@ -1,9 +1,9 @@
 """Connected parts of the undecided cells of a window, and states that can no longer cover them.
 
-A walk that enters a part leaves it again, except at its end. So the number of open ends that lead
-into a part is even, or odd in one part while the walk may end there; and each part with a cell to
-cover has at least one open end, unless it may have a ring of its own. A state that breaks this rule
-is infeasible and is dropped.
+A walk that enters a part leaves it again, or ends there. So an even number of open ends leads into
+each part; into one part an odd number may lead if the walk may end there. At least one leads into
+each part with a cell to cover; none has to if the part may have a ring, a closed walk, of its own.
+States that break these rules are dropped. Read ``memory`` (identifiers, mates) first.
 """
 
 import numpy as np
@@ -79,7 +79,7 @@ def label_parts(
 
 @inlined
 def leads_to(parts: Parts, identifier: int, cell: int) -> None:
-    """Note that an identifier leads into the part of a cell."""
+    """Note that the end with an identifier leads into the part of a cell."""
     parts.leads[parts.sizes[LEADS], 0] = identifier
     parts.leads[parts.sizes[LEADS], 1] = parts.label[cell]
     parts.sizes[LEADS] += 1
@@ -89,7 +89,7 @@ def leads_to(parts: Parts, identifier: int, cell: int) -> None:
 def list_rim(
     parts: Parts, rim: NDArray[np.int32], number: int, first: int, ids: int, is_free: bool
 ) -> None:
-    """Note which part each identifier of the rim leads into, if its cell comes after a number."""
+    """Note which part the ends at the rim lead into, for cells after the one of ``number``."""
     for identifier in range(first, ids):
         cell = rim[identifier, 0]
         if is_free and rim[identifier, 1] == END:
@@ -104,7 +104,7 @@ def is_stuck(parts: Parts, state: NDArray[np.int16], is_open: bool, may_ring: bo
 
     Args:
         parts: of these cells.
-        state: int16 (MOST_IDS,), its mates.
+        state: int16 (MOST_IDS,), the mate of each identifier; NO_END if there is no open end.
         is_open: whether the walk may end in any remaining cell.
         may_ring: whether a part of two cells or more may have a ring of its own.
     """

@@ -17,8 +17,9 @@ Measured on 13 buildings, 10 to 100 % of them covered, all robots starting at th
 frame. In another building, complete maps reject 66 % of the ledgers (most of the rest overlap too
 little), and single scans of 3.5 m and 8 m reject 32 % and 47 %, more as the map grows. In the same
 building, maps reject no ledger, even if moved by 0.1 m, and 2 % if moved by 0.22 m and 1 degree.
-With obstacles on 3 % of the covered cells they reject none, and on 10 % of them 8 %. On a map that
-has moved by more than a cell, a ledger is as wrong as in another building, and may be rejected.
+With obstacles on 3 % of the covered cells they reject no ledger, on 10 % they reject 8 % of the
+ledgers. On a map that has moved by more than a cell, a ledger is as wrong as in another building,
+and may be rejected.
 """
 
 from __future__ import annotations

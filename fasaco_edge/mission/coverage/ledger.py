@@ -57,7 +57,7 @@ class LedgerSnapshot:
         under_tool: cells under the tool; staying on them adds no visit.
         floor: the swept floor.
         note: order and progress as JSON, see ``orders.order_state``; "" for none.
-        trail: the living trail.
+        trail: the pheromone of the living trail.
         fleet: cells swept by other robots, see ``fleet.shared``; b"" for none.
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg], about its
             origin. Cells, floor and trail are in the rotated frame; the order is in the map frame.
@@ -182,7 +182,6 @@ class CoverageLedger:
                 self.visit(cell)
 
     def _districts(self) -> list[list[Cell]]:
-        """Return the tiles, grouped by district."""
         found: dict[Cell, list[Cell]] = {}
         for row, col in self._tiles:
             found.setdefault((row // DISTRICT, col // DISTRICT), []).append((row, col))

@@ -1,7 +1,7 @@
 """Swept floor: the pixels of the map frame that the tool has passed over.
 
 A pixel is swept if its centre was under the tool, a disc, on the straight segment between two
-consecutive poses, and no wall lay between them (``tool_sight``).
+consecutive poses, and no wall lay between pixel and robot (``tool_sight``).
 
 With noisy poses, the union of tool discs is wider than the strip that is swept. So the disc moves
 along the steady track and shrinks by the track's error bound: not at all with exact poses, and
@@ -64,7 +64,7 @@ NOWHERE = Window(0, 0, 0, 0)
 MOST_AHEAD = 1 << 22
 # Limit on segments times pixels in one array operation, which bounds memory.
 MOST_TOGETHER = 1 << 16
-# Number of the last changes with remembered windows.
+# Number of changes whose windows are remembered.
 REMEMBERED = 64
 ANYWHERE = Window(-(2**40), -(2**40), 2**40, 2**40)
 # Grids are processed in blocks of about BLOCK x BLOCK pixels of floor.
@@ -102,7 +102,7 @@ class SweptFloor:
         self._around_ahead: Window | None = None
         blank = np.zeros((FLOOR_TILE, ROW_BYTES), np.uint8)
         self._tiles = SharedTiles(MOST_FLOOR_TILES, DROPPED_FLOOR_TILES, blank)
-        # The numbers of the last changes, with their windows.
+        # The newest changes: the value of ``changes`` after each, and its window.
         self._news: deque[tuple[int, Window]] = deque(maxlen=REMEMBERED)
 
     @classmethod
@@ -229,13 +229,11 @@ class SweptFloor:
         self._note(before)
 
     def _note(self, window: Window | None) -> None:
-        """Note that pixels of a window may have changed."""
         if window is not None:
             self.changes += 1
             self._news.append((self.changes, window))
 
     def _keep(self, places: list[Place]) -> None:
-        """Store the sweeps that lead to places."""
         for place in places:
             for segment in segments_between(self._kept_to or place, place, self._tool_m):
                 window = window_around(segment)

@@ -101,7 +101,7 @@ def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _on(window: Window, cells: tuple[Window, NDArray[np.bool_]] | None) -> NDArray[np.bool_]:
-    """Return a copy of cells, given with their window, on another one; without any, none."""
+    """Return a copy of cells, given with their window, on another window; None: no cells."""
     if cells is None:
         return np.zeros((window.rows, window.cols), bool)
     return carried_copy(cells[1], cells[0], window)
@@ -124,10 +124,10 @@ class OrderReach:
         self._newest: ReachableArea | None = None
         # A window around all maps received, and which of its cells have ever been reachable.
         self._once: tuple[Window, NDArray[np.bool_]] | None = None
-        # The same before the map moved; and whether cells have moved since the newest area.
+        # ``_once`` before the map moved; and whether its cells have moved since the newest area.
         self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
         self._have_moved = False
-        # Cells that keep-outs drawn since then cut off.
+        # Cells that keep-out zones drawn during the order have cut off.
         self._cut_off: tuple[Window, NDArray[np.bool_]] | None = None
         self._found: tuple[object, Unreached] = (None, Unreached())
 
@@ -186,7 +186,7 @@ class OrderReach:
         self._before_motion = self._before_motion or self._once
 
     def move_reached(self, motion: Motion) -> None:
-        """Move the cells with the map; areas found since then are from an old pose."""
+        """Move the cells with the map; drop what was noted since it moved: the pose was old."""
         before, self._before_motion = self._before_motion, None
         if before is not None and not motion.is_still:
             lattice = self._map.lattice
@@ -366,7 +366,6 @@ class OrderReach:
         return ReachableArea.around(free, (row + window.row0, col + window.col0)).reachable
 
     def _uncovered(self, order: MissionOrder, area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells that are asked for and not covered."""
         window = area.lattice.window
         asked = in_zones(order.zones, window, area.lattice.cell_m)
         uncovered: NDArray[np.bool_] = asked & (self._ledger.visits(window) == 0)

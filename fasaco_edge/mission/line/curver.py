@@ -1,8 +1,8 @@
-"""Curver: converts the line just ahead of a robot that cannot turn on the spot into curves.
+"""Curver: fits curves to the line just ahead, for a robot that cannot turn on the spot.
 
 The line further ahead may still change, and becomes a curve when the robot comes near. A curve
-continues the one before it; after a change at the robot, it begins at the robot's pose. Curves are
-not polished.
+continues the one before it; if the line changes at the robot, it begins at the robot's pose. Curves
+are not polished.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ AGAIN_M, LEAST_M = 0.5, 0.1
 ASTRAY_RAD, ASTRAY_M, MOVED_M = math.radians(35.0), 0.1, 0.05
 # Segments of the published line shorter than this have no direction of their own [m].
 SHORT_M = 2e-3
-# A robot that can drive backward changes between forward and backward at a sharper bend [rad].
+# At a bend sharper than this, a robot that can drive backward reverses its direction [rad].
 REVERSAL_RAD = math.radians(120.0)
 # A curve stays within BESIDE_RADII turning radii and BESIDE_M [m] of its line.
 BESIDE_RADII, BESIDE_M = 5.0, 1.0
@@ -159,7 +159,7 @@ class Curver:
         return np.append(yaw, yaw[-1])
 
     def _has_left(self, ahead: LineAhead, floor: FloorMap, pose: Pose2D) -> bool:
-        """Return whether the robot has left its curve; False where it last did so."""
+        """Return whether the robot has left its curve; False near the place where it last did."""
         beside, here = ahead.beside, (pose.x, pose.y)
         edge_m = math.dist(*ahead.line.points[:2]) * floor.geometry.resolution
         if beside is None or edge_m < SHORT_M or math.dist(here, self._astray_at) < MOVED_M:
@@ -174,7 +174,6 @@ class Curver:
     def _piece(
         self, ahead: LineAhead, floor: FloorMap, pose: Pose2D, first: int, end: int
     ) -> Curve:
-        """Return the curve along the points from ``first`` to ``end``."""
         points = ahead.line.points[:end].copy()
         if not first:
             points[0] = ahead.place

@@ -29,10 +29,9 @@ from fasaco_edge.mission.orders.sequencer import Sequencer
 
 # The robot does not drive to a cell with less unswept floor than this [m2].
 LEAST_LEFT_M2 = 0.04
-# A passed cell is kept in the ledger while the unswept floor in it, and in a rim of RIM_M [m]
-# around it, is worth WORTH_S [s]. With each cell passed, CHECKED_CELLS kept cells are checked. The
-# robot does not return to kept cells: with four robots, returns took a tenth more time for 0.1 % of
-# the floor.
+# In a fleet, the ledger holds a passed cell while the unswept floor in it and in a rim of RIM_M [m]
+# is worth WORTH_S [s]. With each cell passed, CHECKED_CELLS held cells are checked. The robot does
+# not return to them: with four robots, returns took a tenth more time for 0.1 % of the floor.
 WORTH_S, RIM_M, CHECKED_CELLS = 4.0, 0.1, 24
 # The robot returns for missed floor if it is more than this share of the floor asked for: the base
 # may have driven beside its line, or poses may be rare. On the map of a real scan matcher, returns
@@ -66,8 +65,8 @@ class FloorToSweep(NamedTuple):
 
 
 class FloorLeft:
-    """Keeps the tally of the line up to date with map, order and ledger; inactive without a floor,
-    when only cells are counted."""
+    """Keeps the tally of the line up to date with map, order and ledger; without a floor, does
+    nothing: then only cells are counted."""
 
     def __init__(
         self,
@@ -162,8 +161,8 @@ class FloorLeft:
     def _credit(self, passed: NDArray[np.int32]) -> None:
         """Count passed cells as covered if hardly any of their floor is left.
 
-        A polished line may skip the stand of a cell. A cell without floor asked for, for instance
-        in another robot's part, seems swept but needs a visit.
+        A polished line may pass a cell without reaching its stand. A cell without floor asked for,
+        for instance in another robot's part, seems swept but needs a visit.
         """
         tally, floor, covered = self._tally, self._map.floor, self._ledger.current
         assert tally is not None

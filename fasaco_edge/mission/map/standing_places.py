@@ -1,4 +1,4 @@
-"""Standing places: zones, keep-out zones, home and dock of the configuration, valid on one map.
+"""Configured places: zones, keep-out zones, home and dock, valid on one map.
 
 That map is in the configured frame ``map_frame``, or else in the first frame used with these
 places, which is kept with the ledger. On a map in another frame, or of another building, the places
@@ -23,7 +23,7 @@ from fasaco_edge.mission.orders.placing import located
 
 
 class StandingPlaces:
-    """Returns the places of the configuration while the map is theirs.
+    """Returns the configured places while the map they belong to is in use.
 
     Attributes:
         note: which map they belong to; kept with the order.
@@ -99,7 +99,7 @@ class StandingPlaces:
         """Why the keep-out zones of this map are unknown; "" if known, or if none are given."""
         is_given = "keep_out" in self._names or "keep_out_mask" in self._names
         why = self.why if is_given and self.why else self._why_no_mask
-        return f"{why}: waits for places of this map, or for that map" if why else ""
+        return f"{why}: waits until this map has places, or the other map is back" if why else ""
 
     @property
     def _why_no_mask(self) -> str:

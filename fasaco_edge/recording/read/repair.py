@@ -64,7 +64,7 @@ class Repair:
     def __str__(self) -> str:
         if self.failed:
             return f"{self.path.name} could not be checked: {self.failed}"
-        return f"{self.path.name} was torn: {self.cut_bytes} bytes behind the last frame cut"
+        return f"{self.path.name} was torn: cut {self.cut_bytes} bytes after the last frame"
 
 
 def scan_recording(recording: BinaryIO, known_bytes: int = HEADER_BYTES) -> Scan | None:

@@ -170,7 +170,7 @@ def _lost_way(review: Review) -> str:
     if ways_m.sum() < LEAST_LOST_M:
         return ""
     gaps = f"{len(ways_m)} gap{'s' * (len(ways_m) != 1)}"
-    return f"{gaps} over {ways_m.sum():.0f} m: floor between them does not count"
+    return f"{gaps} over {ways_m.sum():.0f} m: floor swept in them does not count"
 
 
 def _stood(document: ReviewDocument) -> str:

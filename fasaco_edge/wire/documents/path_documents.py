@@ -1,4 +1,4 @@
-"""Path documents: attachments to a path's poses and to the trail's field, a path's digest."""
+"""Path documents: the attachments of paths and of trail fields, and the digest of a path."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class PlanFigures(Document, frozen=True):
         lower_bound_steps: no walk has fewer steps.
         lower_bound_cost_s: no walk takes fewer seconds, steps and turns together.
         gap: planned_cost_s / lower_bound_cost_s - 1.
-        saved_by_ants_s: seconds saved on the first walk by ants, and by local search on their
+        saved_by_ants_s: seconds saved on the first walk by ants and by the local search of their
             walks.
         saved_by_local_search_s: seconds saved by local search on the first walk, or on the one
             still to drive.
@@ -94,8 +94,8 @@ class PathReport(PlanFigures, frozen=True):
         steps: as published.
         remaining_steps: still to drive.
         line_s: seconds that the line ahead takes; null where cells are counted.
-        line_gap: how far that is above the least time of any line that sweeps as much floor, as a
-            share of it; null if it sweeps none.
+        line_gap: line_s / bound - 1, bound being the least time of any line that sweeps as much
+            floor; null if the line sweeps none.
         reason: why it replaced the previous one.
     """
 
@@ -133,8 +133,9 @@ class PathAttachment(PlanFigures, frozen=True):
         steps: steps from pose to pose.
         plan_ms: duration of planning; 0 if no plan was needed.
         changed: rectangle of the map in which cells appeared, vanished or have other neighbours;
-            null if that is not the reason.
-        speed_m_s: speed to drive it at, below the robot's usual one [m/s]; null for that.
+            null if the path has another reason.
+        speed_m_s: speed to drive the path at, below the robot's usual speed [m/s]; null for the
+            usual speed.
     """
 
     daemon: ZenohId = ""
@@ -157,7 +158,7 @@ class TrailAttachment(Document, frozen=True):
         revision: of the path in force.
         cells: number of cells that the trail spans: those with a step to another one.
         branching: mean number of directions of a cell that are close to its strongest: 1 if each
-            cell is decided.
+            cell has a single one.
     """
 
     revision: Count = 0
