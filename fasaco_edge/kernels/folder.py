@@ -107,7 +107,7 @@ def temporary_folder() -> Path:
 
 
 def unguessable(folder: Path) -> Path:
-    """Return a path in a folder at which nobody can have put a file, to be judged for ours."""
+    """Return a path in a folder where no other user can have put a file: to judge the folder."""
     return folder / secrets.token_hex(16)
 
 

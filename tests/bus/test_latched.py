@@ -154,7 +154,7 @@ def test_cached_and_live_samples_arrive_in_order(bus, endpoint):
 
 @pytest.mark.parametrize("stays", [True, False])
 def test_where_several_samples_count_a_lost_one_is_queried(bus, endpoint, monkeypatch, stays):
-    """A full link drops samples; of a publisher that is gone nobody has them any more."""
+    """A full link drops samples; once their publisher is gone, they cannot be queried."""
     samples, lost, receive = Queue(), [], latched.LatchedSubscription._on_sample
 
     def lose(self, sample):

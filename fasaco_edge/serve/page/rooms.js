@@ -73,7 +73,7 @@ function roomAt(at) {
 
 // The card of the tapped room.
 function pickRoom(id) {
-  // What was typed is of the room picked until now: without focus, a field tells of its change.
+  // A typed number belongs to the room picked until now: a field that loses focus sends its change.
   if (find("room").contains(document.activeElement)) document.activeElement.blur();
   pickedRoom = id;
   showRooms();
