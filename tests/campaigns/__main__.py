@@ -24,7 +24,7 @@ TAKES = re.compile(r"^Takes (.+)\.$", re.M)
 
 
 def campaigns() -> list[tuple[str, str, str]]:
-    """Return command, purpose and duration on two quiet cores of each campaign, by name."""
+    """Return command, purpose and approximate duration of each campaign, by name."""
     found = []
     for path in sorted([*HERE.glob("*.py"), *HERE.glob("*/__main__.py")]):
         about = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import shutil
+from contextlib import contextmanager
 
 import pytest
 
@@ -101,17 +102,24 @@ def test_no_area_has_no_label():
     assert label_place(()) is None
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
-def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
+@contextmanager
+def two_rooms_shown(folder):
+    """Yield a page that shows a map of two rooms, and who published the map."""
     with (
-        daemon_process(tmp_path, mission={"autostart": False}) as daemon,
+        daemon_process(folder, mission={"autostart": False}) as daemon,
         Outsider(daemon.endpoint) as outsider,
-        served(tmp_path, daemon.endpoint, "--allow-commands") as page,
-        browsing(page.url, tmp_path / "browser") as tab,
+        served(folder, daemon.endpoint, "--allow-commands") as page,
+        browsing(page.url, folder / "browser") as tab,
     ):
         outsider.put("map", map_bytes(two_rooms(door=True)))
         outsider.put("pose", pose_bytes(1.05, 1.05))
         until(lambda: tab.js("foundRooms().length") == 2 and tab.js("Boolean(model.map)"))
+        yield tab, outsider
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
+def test_rooms_are_named_set_ordered_merged_and_split_by_finger(tmp_path):
+    with two_rooms_shown(tmp_path) as (tab, outsider):
         for xy, name in (((1.05, 2.5), "kitchen"), ((4.65, 2.5), "bath")):
             tap(tab, *xy)
             tab.js(f"find('roomname').value = {name!r}")
@@ -207,15 +215,7 @@ def tap(tab: Tab, x: float, y: float) -> None:
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="needs chromium")
 def test_words_and_typed_numbers_are_of_the_right_room(tmp_path):
-    with (
-        daemon_process(tmp_path, mission={"autostart": False}) as daemon,
-        Outsider(daemon.endpoint) as outsider,
-        served(tmp_path, daemon.endpoint, "--allow-commands") as page,
-        browsing(page.url, tmp_path / "browser") as tab,
-    ):
-        outsider.put("map", map_bytes(two_rooms(door=True)))
-        outsider.put("pose", pose_bytes(1.05, 1.05))
-        until(lambda: tab.js("foundRooms().length") == 2 and tab.js("Boolean(model.map)"))
+    with two_rooms_shown(tmp_path) as (tab, _):
         # On a page that is opened anew, rooms come after the state.
         tab.js("start({ zones: foundRooms().map((room) => zoneOf(room.id)) })")
         until(lambda: "room" in tab.js("find('share-of').textContent"))
