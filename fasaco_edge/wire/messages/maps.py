@@ -152,18 +152,6 @@ def direction_values(pointed: NDArray[np.int8], share: NDArray[np.float32]) -> N
     return np.where(pointed < 0, np.int8(UNKNOWN), pointed * np.int8(DIRECTION_VALUES) + steps)
 
 
-def directions_of(grid: OccupancyGrid) -> tuple[NDArray[np.int8], NDArray[np.float32]]:
-    """Return the directions, int8, and shares, float32 (rows, cols), in a grid of directions.
-
-    Cells without a step, or with an invalid value, have -1 and 0.
-    """
-    values = grid.cells
-    is_step = (values >= 0) & (values < 4 * DIRECTION_VALUES)
-    pointed = np.where(is_step, values // np.int8(DIRECTION_VALUES), np.int8(-1))
-    share = np.where(is_step, values % np.int8(DIRECTION_VALUES), 0) / (DIRECTION_VALUES - 1)
-    return pointed, share.astype(np.float32)
-
-
 def coverage_values(states: NDArray[np.uint8], visits: NDArray[np.uint16]) -> NDArray[np.int8]:
     """Return the values, int8 (rows, cols), of a coverage grid.
 
