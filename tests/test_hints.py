@@ -8,7 +8,7 @@ from PIL import Image
 from fasaco_edge.errors import FasacoError, MapFileError, NothingToCover
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map
 from fasaco_edge.mission.orders.order import Command
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.offline.maps import load_map
 from fasaco_edge.offline.plan import plan
 from fasaco_edge.wire import schemas

@@ -24,7 +24,7 @@ from fasaco_edge.replay.replay import PROPOSALS, Replay, read_run
 from fasaco_edge.wire.documents.path_documents import PlanFigures, digest
 
 if TYPE_CHECKING:
-    from fasaco_edge.mission.core.events import PathUpdate
+    from fasaco_edge.mission.events import PathUpdate
     from fasaco_edge.recording.read.run import RecordedSamples
     from fasaco_edge.replay.cycle_replay import CycleRecord
     from fasaco_edge.replay.mission_drive import ReplayStep

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
-from fasaco_edge.mission.company_kind import ALONE, CompanyKind
+from fasaco_edge.mission.core.company_kind import ALONE, CompanyKind
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from fasaco_edge.bus.session import Bus
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.errors import FasacoError
-    from fasaco_edge.mission.core.events import MemberReceived
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.events import MemberReceived
     from fasaco_edge.wire.documents.status import FleetReport
 
 

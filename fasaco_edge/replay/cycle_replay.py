@@ -24,7 +24,7 @@ from fasaco_edge.daemon.loop.turn_log import (
     kernels_name,
 )
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.mission.core.events import CommandReceived, PlanReady, PlanRequest
+from fasaco_edge.mission.events import CommandReceived, PlanReady, PlanRequest
 from fasaco_edge.mission.orders.commands import read_recorded
 from fasaco_edge.planners.planner import StopAt, ignore
 from fasaco_edge.replay.mission_drive import MissionDrive, ReplayStep

@@ -16,9 +16,9 @@ from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loader import Loader
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
-from fasaco_edge.mission.map.room_book import RoomBook
+from fasaco_edge.mission.events import CommandReceived, Decision, PlanReady
+from fasaco_edge.mission.rooms.room_book import RoomBook
 from fasaco_edge.planners.registry import planner_of
 
 LOAD_S = 1.0

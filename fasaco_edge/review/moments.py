@@ -29,7 +29,7 @@ TROUBLES = ("degraded", "blocked", "silent")
 RECORDER_IN_ORDER = ("recording", "stopping")
 # Begin of the details in a reason: "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
-# Texts of ``mission.map.reachable_area.AreaChange``.
+# Texts of ``grid.reachable_area.AreaChange``.
 _MAP = "map: "
 _CHANGES = ("more", "fewer", "passages changed")
 # Log lines of a recorder without a fault.

@@ -29,7 +29,7 @@ from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
 from fasaco_edge.grid.polygons import is_near
 from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.judge.pixels import Mask, Patches, within
-from fasaco_edge.mission.core.events import BETTER
+from fasaco_edge.mission.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.drawn import DrawnLine, lines_in, read_drawings
 from fasaco_edge.recording.read.robot_clock import clock

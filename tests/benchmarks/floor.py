@@ -123,8 +123,8 @@ def drive(building: str, truth: OccupancyGrid, start: tuple[float, float], case:
     from fasaco_edge.grid.lattice import Footprint
     from fasaco_edge.kernels.floor.turning import proportional_turning
     from fasaco_edge.mission.config import Sweeping
-    from fasaco_edge.mission.core.events import MapReceived, PlanReady, PoseReceived, State
     from fasaco_edge.mission.core.mission import Mission, MissionConfig
+    from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived, State
     from fasaco_edge.planners.cost import CoverageCost, SearchWork
     from fasaco_edge.planners.line import LINES
     from fasaco_edge.planners.planner import WorkLimit

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from fasaco_edge.mission.core.events import Event
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.events import Event
 
 TOOL_M, RADIUS_M, OVERLAP = 0.3, 0.18, 0.08
 SPEED_M_S, TURN_S = 0.25, 1.5
@@ -101,8 +101,7 @@ class Replan:
 
 def _timed_parts() -> tuple[tuple[str, type, str], ...]:
     """Return the methods that are timed: name of the part, class, name of the method."""
-    from fasaco_edge.mission.core.route import Route
-    from fasaco_edge.mission.core.trail_layer import TrailLayer
+    from fasaco_edge.grid.reachable_area import ReachableArea
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
     from fasaco_edge.mission.line.floor_left import FloorLeft
     from fasaco_edge.mission.line.layer import LineLayer
@@ -111,8 +110,9 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
     from fasaco_edge.mission.line.tally import SweepTally
     from fasaco_edge.mission.map.ground import Ground
     from fasaco_edge.mission.map.map_state import MapState
-    from fasaco_edge.mission.map.reachable_area import ReachableArea
-    from fasaco_edge.mission.orders.sequencer import Sequencer
+    from fasaco_edge.mission.path.route import Route
+    from fasaco_edge.mission.path.trail_layer import TrailLayer
+    from fasaco_edge.mission.work.sequencer import Sequencer
 
     return (
         ("ingest", MapState, "take_map"),
@@ -240,7 +240,7 @@ class Robot:
     def _map(self) -> Event:
         from fasaco_edge.grid.geometry import GridGeometry, Pose2D
         from fasaco_edge.grid.occupancy import OccupancyGrid
-        from fasaco_edge.mission.core.events import MapReceived
+        from fasaco_edge.mission.events import MapReceived
 
         rim = RIM_PX // 3 * (self._maps % 3) if self._case == GROWING else 0
         self._maps += 1
@@ -251,12 +251,12 @@ class Robot:
 
     def _pose(self) -> Event:
         from fasaco_edge.grid.geometry import Pose2D, StampedPose
-        from fasaco_edge.mission.core.events import PoseReceived
+        from fasaco_edge.mission.events import PoseReceived
 
         return PoseReceived(StampedPose(Pose2D(*self.at), "map"))
 
     def _hear(self, events: Sequence[Event]) -> None:
-        from fasaco_edge.mission.core.events import PlanReady
+        from fasaco_edge.mission.events import PlanReady
         from fasaco_edge.planners.cost import SearchWork
         from fasaco_edge.planners.planner import WorkLimit
 

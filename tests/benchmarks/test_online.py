@@ -8,7 +8,7 @@ import pytest
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, PatchReceived
+from fasaco_edge.mission.events import MapReceived, PatchReceived
 from fasaco_edge.planners.grids import NamedGrid
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.online.buildings import BuildingChoice, of_grid

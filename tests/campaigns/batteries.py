@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fasaco_edge.mission.config import BatteryPolicy, Dock, MissionPolicy
-from fasaco_edge.mission.core.events import BatteryReceived, Event, State
+from fasaco_edge.mission.events import BatteryReceived, Event, State
 from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import MAP_FOOTPRINT
 from fasaco_edge.simulation.robot import CHARGING, Battery

@@ -32,8 +32,8 @@ from fasaco_edge.grid.fine_raster import (
     map_to_raster,
 )
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.host.processes import own_mb, peak_mb
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path

@@ -32,7 +32,9 @@ from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.core.path_exit import PathExit, PublishedPath
+from fasaco_edge.mission.events import (
     CommandReceived,
     Decision,
     MapReceived,
@@ -42,11 +44,9 @@ from fasaco_edge.mission.core.events import (
     PlanRequest,
     PoseReceived,
 )
-from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.core.path_exit import PathExit, PublishedPath
 from fasaco_edge.mission.map.ground import Ground
 from fasaco_edge.mission.orders.commands import read_command
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.planner import ColonySnapshot, SearchProgress, StopRecorder
 from fasaco_edge.planners.registry import planner_of
 from fasaco_edge.wire.documents.json_text import encode_json

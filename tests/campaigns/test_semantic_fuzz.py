@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.wire.messages.paths import encode_path
 from tests.campaigns.path_in_force import PathInForce
 from tests.campaigns.semantic_fuzz import (

@@ -25,14 +25,14 @@ from fasaco_edge.daemon.loop.inbox import (
 from fasaco_edge.daemon.loop.mission_runner import HeldEvents
 from fasaco_edge.errors import MalformedMessage, PatchWithoutBase
 from fasaco_edge.grid.lattice import Footprint
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.mission.events import (
     BatteryReceived,
     MapReceived,
     PatchesLost,
     PatchReceived,
     PoseReceived,
 )
-from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_PRIORITY_BYTES
 from fasaco_edge.wire.messages.battery import BatteryState, encode_battery

@@ -29,7 +29,7 @@ from fasaco_edge.daemon.ledger.writer import (
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
 from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
 from fasaco_edge.mission.orders.keep_outs import KeepOut
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
+from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at
 from tests.support.ledgers import CELL_M, contents, lane
 from tests.support.waiting import until

@@ -22,10 +22,10 @@ from fasaco_edge.daemon.ledger.rooms_file import (
 from fasaco_edge.errors import RoomsFileError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.rooms import FoundRooms
-from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
-from fasaco_edge.mission.map.room_edits import split
-from fasaco_edge.mission.map.room_matching import HOLD_CHANGE
-from fasaco_edge.mission.map.room_watch import update
+from fasaco_edge.mission.rooms.room_book import RoomBook, RoomSettings
+from fasaco_edge.mission.rooms.room_edits import split
+from fasaco_edge.mission.rooms.room_matching import HOLD_CHANGE
+from fasaco_edge.mission.rooms.room_watch import update
 from fasaco_edge.planners.passes import Pass
 
 

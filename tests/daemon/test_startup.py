@@ -14,7 +14,7 @@ from fasaco_edge.daemon.loop.mission_runner import HeldEvents, MissionRunner
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.events import (
     CommandReceived,
     MapReceived,
     PatchesLost,
@@ -22,7 +22,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
 )
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.daemon.test_rooms_file import two_rooms
 from tests.support.ledgers import lane
 

@@ -13,8 +13,8 @@ from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.status import BEGUN_S, StatusBoard
 from fasaco_edge.doctor import session
 from fasaco_edge.doctor.finding import CheckContext, Level
-from fasaco_edge.mission.map.idle_places import PERIOD_S as LOOK_S
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.idle_places import PERIOD_S as LOOK_S
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.wire.messages.battery import BatteryState, encode_battery
 from fasaco_edge.wire.schemas import BATTERY_STATE
 from tests.mission.test_idle_places import FAR, drive_with, in_or_beside

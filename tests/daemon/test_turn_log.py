@@ -6,7 +6,7 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.loop.inbox import Batch, Received
 from fasaco_edge.daemon.loop.turn_log import TurnLog
-from fasaco_edge.mission.core.events import Decision
+from fasaco_edge.mission.events import Decision
 from fasaco_edge.samples import SampleDecoder
 from fasaco_edge.wire.documents.turns import decode_turns
 

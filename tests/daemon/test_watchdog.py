@@ -14,7 +14,7 @@ from fasaco_edge.daemon.notify import Watchdog, status_line
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import PlanRequest
+from fasaco_edge.mission.events import PlanRequest
 from fasaco_edge.planners.paper.fasaco import Fasaco
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.wire.documents.path_documents import PathReport

@@ -9,7 +9,7 @@ import pytest
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.kernels.floor import certain
 from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, PIXEL_M, FloorSnapshot, window_of
-from fasaco_edge.mission.map.loop_closure import MOST_BETWEEN, Motion, certain_floor
+from fasaco_edge.mission.coverage.loop_closure import MOST_BETWEEN, Motion, certain_floor
 from tests import naive
 from tests.support.examples import PLAIN
 

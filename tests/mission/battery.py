@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from fasaco_edge.mission.config import BatteryPolicy, Dock
-from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
+from fasaco_edge.mission.events import BatteryReceived, MapReceived, State
 from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, with_policy
 
 ROOM = ("........",) * 6

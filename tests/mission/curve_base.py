@@ -12,8 +12,8 @@ from fasaco_edge.follow.supervision import State as Following
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.config import MissionConfig, MissionPolicy, Sweeping
-from fasaco_edge.mission.core.events import MapReceived, PlanReady, PoseReceived, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived, State
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.line import LINES

@@ -13,7 +13,9 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig, Sweeping
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.core.path_exit import PathExit
+from fasaco_edge.mission.events import (
     CommandReceived,
     Event,
     MapReceived,
@@ -21,11 +23,9 @@ from fasaco_edge.mission.core.events import (
     PlanRequest,
     PoseReceived,
 )
-from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.core.path_exit import PathExit
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import CommandName
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LINES
 from tests.mission.world import answer

@@ -17,8 +17,8 @@ from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.mission.config import MissionConfig, MissionPolicy, Sweeping
-from fasaco_edge.mission.core.events import MapReceived, PlanReady, PoseReceived, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import MapReceived, PlanReady, PoseReceived, State
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.planner import WorkLimit

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.errors import LedgerMismatchError
-from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.events import MapReceived, State
 from tests.mission.line_robot import LineRobot
 from tests.mission.test_other_building import FLOOR, HERE, NEW, OLD, stand, swept
 from tests.mission.test_reached_cells import START, two_rooms

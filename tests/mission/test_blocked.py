@@ -11,7 +11,7 @@ import pytest
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.mission.config import MissionPolicy
-from fasaco_edge.mission.core.events import FollowerBlocked, PatchReceived
+from fasaco_edge.mission.events import FollowerBlocked, PatchReceived
 from fasaco_edge.mission.map.obstacles import CLOSED_S, WIDEN_AFTER_S, Obstacles
 from tests.mission.line_robot import CONFIG, RADIUS_M, LineRobot, map_of
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.errors import PlanFailed
-from fasaco_edge.mission.core.events import MapReceived, PlanBroken, State
-from fasaco_edge.mission.core.plan_requests import BROKEN_S
+from fasaco_edge.mission.events import MapReceived, PlanBroken, State
+from fasaco_edge.mission.path.plan_requests import BROKEN_S
 from tests.fleet.mission.test_standing_robots import member, planned
 from tests.mission.world import CELL, building, patch, pose_at, started
 

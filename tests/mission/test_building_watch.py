@@ -9,8 +9,8 @@ import pytest
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.coverage.loop_closure import Motion
 from fasaco_edge.mission.map.building_watch import FOREIGN, Agreement
-from fasaco_edge.mission.map.loop_closure import Motion
 from tests.mission.test_fit import MAPS, ROBOT, from_its_start, moved, seen_within
 
 

@@ -8,10 +8,10 @@ import pytest
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry
-from fasaco_edge.mission.coverage.progress import seconds_in
-from fasaco_edge.mission.map.room_cells import RoomCells
-from fasaco_edge.mission.map.room_watch import RoomWatch, update
-from fasaco_edge.mission.orders.by_room import RoomPrice
+from fasaco_edge.mission.rooms.room_cells import RoomCells
+from fasaco_edge.mission.rooms.room_watch import RoomWatch, update
+from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.work.progress import seconds_in
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.rooms.homes import home

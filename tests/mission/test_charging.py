@@ -7,8 +7,8 @@ import pytest
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.config import BatteryPolicy, Dock
 from fasaco_edge.mission.core.charging import FULL_AFTER_S, BatteryGauge
-from fasaco_edge.mission.core.events import BatteryReceived, PoseReceived, State
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
+from fasaco_edge.mission.events import BatteryReceived, PoseReceived, State
+from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState
 from tests.mission.battery import AT_DOCK, WALLED, Battery
 from tests.mission.world import CELL, patch, pose_at
 

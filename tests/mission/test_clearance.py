@@ -10,8 +10,8 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.loader import mission_config
 from fasaco_edge.judge.floor import judge_floor
-from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.grid.test_floor import room
 from tests.mission.test_line import CONFIG, RADIUS_M, ROBOT, Robot, with_obstacle

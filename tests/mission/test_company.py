@@ -5,9 +5,10 @@ import sys
 
 import pytest
 
-from fasaco_edge.mission.company import Company, OthersCells
+from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.coverage.others_cells import OthersCells
 from tests.mission.world import CONFIG
 
 LOADED = """

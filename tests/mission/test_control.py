@@ -5,8 +5,8 @@ import pytest
 from fasaco_edge.daemon.loop.mission_reports import zone_progress
 from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CONFIG,
     Drive,

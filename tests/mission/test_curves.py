@@ -14,9 +14,9 @@ from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.judge.driven_line import ArcBends
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
-from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.path_exit import PublishedPath
+from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.line.curver import Curver
 from fasaco_edge.mission.line.polyline import CURVED, POLISHED, Line, edges_between
 from fasaco_edge.planners.curve_config import CurveConfig

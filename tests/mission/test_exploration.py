@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import MapPatch
-from fasaco_edge.mission.core.events import MapReceived, PatchReceived, State
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.events import MapReceived, PatchReceived, State
+from fasaco_edge.mission.work.order_state import OrderState
 from tests import naive
 from tests.mission.world import (
     FOOTPRINT,

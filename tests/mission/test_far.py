@@ -7,7 +7,7 @@ from fasaco_edge.errors import MapTooFar
 from fasaco_edge.grid.geometry import FARTHEST_M, MOST_INDEX, GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.events import MapReceived, PoseReceived, State
 from tests.mission.world import CELL, CONFIG, Drive, building
 
 # Easting and northing of a place in Germany, and the largest northing there is [m].

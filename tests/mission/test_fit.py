@@ -8,10 +8,10 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.mission.core.events import Decision, MapReceived, State
+from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.coverage.fit import Fit, Verdict
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
-from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.mission.events import Decision, MapReceived, State
 from tests.mission.world import CELL, Drive, building, patch, placed, pose_at, started
 
 MAPS = ("office", "flat", "basement", "walled_grid", "warehouse")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from fasaco_edge.errors import LedgerMismatchError, WrongFrame
-from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from tests.mission.world import CONFIG, Drive, building, patch, pose_at, started, with_policy
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.coverage.progress import FreeArea
+from fasaco_edge.mission.coverage.counts import FreeArea
 from tests.mission.world import CELL, building, started
 from tests.support.examples import examples
 from tests.support.grids import occupancy_grids

@@ -7,9 +7,9 @@ import pytest
 from msgspec import structs
 
 from fasaco_edge.mission.config import Dock, Place
-from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.orders.keep_outs import KeepOut
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CELL,
     CONFIG,

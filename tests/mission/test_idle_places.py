@@ -10,11 +10,11 @@ import pytest
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import Dock, Place
-from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.map.idle_places import PERIOD_S, IdlePlaces
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.idle_places import PERIOD_S, IdlePlaces
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.test_standing_zones import mask_file
 from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
 from tests.support.processes import slowness

@@ -7,7 +7,7 @@ import pytest
 from fasaco_edge.errors import CommandError
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import Command, read_order
-from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER, OrderState, Stage
+from fasaco_edge.mission.work.order_state import AT_HOME, NO_ORDER, OrderState, Stage
 
 SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 A = read_order({"zones": [{"name": "a", "polygon": SQUARE}], "passes": 3, "return_home": True})

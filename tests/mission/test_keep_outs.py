@@ -3,9 +3,9 @@
 import pytest
 
 from fasaco_edge.errors import OrderError
-from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT, KeepOut
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import CELL, Drive, building, pose_at, rectangle, started
 
 ROOM = ("........",) * 6

@@ -14,18 +14,18 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_point, rotated_points, rotated_pose
 from fasaco_edge.judge.floor import judge_floor
 from fasaco_edge.mission.config import Dock, Place
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.lattice_layout import WallWatch
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
+from fasaco_edge.mission.events import (
     CommandReceived,
     MapReceived,
     PlanReady,
     PoseReceived,
 )
-from fasaco_edge.mission.core.lattice_layout import WallWatch
-from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.planner import WorkLimit
 from fasaco_edge.planners.search.near_optimal import NearOptimal

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.geometry import Pose2D, Window
-from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.coverage.ledger import (
     DROPPED_TILES,
     JUMP_CELLS,
@@ -16,6 +15,7 @@ from fasaco_edge.mission.coverage.ledger import (
     TILE,
     CoverageLedger,
 )
+from fasaco_edge.mission.events import MapReceived
 from tests.mission.world import Drive, building, pose_at
 from tests.support.examples import examples
 

@@ -3,8 +3,8 @@
 import pytest
 
 from fasaco_edge.mission.config import Place
-from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.events import MapReceived
+from fasaco_edge.mission.work.order_state import OrderState, Stage
 from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, with_policy
 
 # Home is in the small room.

@@ -1,6 +1,6 @@
 """Limits count the thing itself: nothing but progress begins them anew."""
 
-from fasaco_edge.mission.core.events import State
+from fasaco_edge.mission.events import State
 from tests.mission.test_retries import drives
 from tests.mission.world import answer, patch, pose_at
 

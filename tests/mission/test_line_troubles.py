@@ -18,8 +18,8 @@ from fasaco_edge.host.processes import peak_mb
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import Sweeping
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import NO_EDGES, POLISHED, edges_between
 from fasaco_edge.mission.orders.keep_outs import KeepOut

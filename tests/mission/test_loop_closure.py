@@ -10,9 +10,14 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
-from fasaco_edge.mission.map.loop_closure import Motion, has_moved, moved_cells, uncertain_cells
+from fasaco_edge.mission.coverage.loop_closure import (
+    Motion,
+    has_moved,
+    moved_cells,
+    uncertain_cells,
+)
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.search.near_optimal import NearOptimal
 from tests.mission.world import Drive, pixels, placed, pose_at
 

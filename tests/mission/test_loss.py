@@ -3,8 +3,8 @@
 import pytest
 
 from fasaco_edge.errors import WouldForget
-from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.events import MapReceived
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import Drive, building, pose_at, rectangle, started
 
 ROOM = ("........",) * 6

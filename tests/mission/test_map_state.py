@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.zones import kept_out, without
 from tests.support.examples import examples
 from tests.support.grids import displaced, grid, occupancy_grids, part_of, repainted

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.mission.core.events import CommandReceived, FollowerBlocked
+from fasaco_edge.mission.events import CommandReceived, FollowerBlocked
 from fasaco_edge.mission.orders.order import read_order
 from tests.mission.line_robot import LineRobot
 from tests.mission.test_path_begins import two_rooms

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import floor_report
-from fasaco_edge.mission.core.events import State
+from fasaco_edge.mission.events import State
 from tests.mission.offset_base import bare_room, driven
 from tests.mission.test_swept_truth import small_flat
 

@@ -20,8 +20,8 @@ from fasaco_edge.mission.orders.order import (
     order_document,
     read_order,
 )
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
-from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.mission.work.order_state import OrderState, Stage
+from fasaco_edge.mission.work.reached_cells import ReachedCells
 from fasaco_edge.planners.passes import Pass
 from tests.support.examples import examples
 

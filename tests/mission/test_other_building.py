@@ -3,7 +3,7 @@
 import pytest
 
 from fasaco_edge.errors import LedgerMismatchError
-from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.events import MapReceived, State
 from tests.mission.world import Drive, building, patch, pose_at
 
 HERE = (1, 1)

@@ -7,10 +7,10 @@ import pytest
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PlanReady, State
 from fasaco_edge.mission.core.lattice_layout import LatticeLayout
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PlanReady, State
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.passes import Laid
 from fasaco_edge.planners.planner import WorkLimit

@@ -10,7 +10,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.events import MapReceived
 from tests.mission.line_robot import RADIUS_M, TOOL_M, LineRobot
 
 

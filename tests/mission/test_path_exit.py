@@ -2,8 +2,8 @@
 
 import pytest
 
-from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.path_exit import PathExit
+from fasaco_edge.mission.events import MapReceived, State
 from tests.mission.world import Drive, building, pose_at
 
 ROOM = ["......"] * 4

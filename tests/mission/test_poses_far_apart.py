@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import floor_report, mission_report
-from fasaco_edge.mission.core.events import PoseReceived
+from fasaco_edge.mission.events import PoseReceived
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.status import Status
 from tests.mission.line_robot import CONFIG, SPEED_M_S, LineRobot

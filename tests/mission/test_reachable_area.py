@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fasaco_edge.grid import reachable_area as area_module
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.coverage.progress import FAR_CELLS, LOOK_AHEAD, PathProgress
-from fasaco_edge.mission.map import reachable_area as area_module
-from fasaco_edge.mission.map.reachable_area import AreaChange, ReachableArea, anchor_cell
+from fasaco_edge.grid.reachable_area import AreaChange, ReachableArea, anchor_cell
+from fasaco_edge.mission.work.progress import FAR_CELLS, LOOK_AHEAD, PathProgress
 from tests import naive
 from tests.support.examples import examples
 from tests.support.grids import lattice, placed, problems, with_passages_closed

@@ -11,9 +11,9 @@ import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.mission.orders.keep_outs import KeepOut
-from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.mission.work.reached_cells import ReachedCells
 from tests.mission.line_robot import PIXEL_M, LineRobot
 from tests.mission.test_path_begins import two_rooms
 from tests.mission.test_shut_in import room_with_niche, shut_in

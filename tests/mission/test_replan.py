@@ -6,8 +6,8 @@ import pytest
 
 from fasaco_edge.errors import CommandError
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.events import MapReceived
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import Drive, building, pose_at, started
 
 ROOM = ("........",) * 6

@@ -7,9 +7,9 @@ import numpy as np
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
-from fasaco_edge.mission.coverage.unreached import viewpoints
+from fasaco_edge.mission.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.orders.keep_outs import KeepOut
+from fasaco_edge.mission.work.unreached import viewpoints
 from tests.mission.world import (
     CELL,
     CONFIG,

@@ -12,12 +12,12 @@ from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.polygons import area_m2, polygon_flaw
 from fasaco_edge.grid.rooms import FoundRooms
-from fasaco_edge.mission.map import room_book
-from fasaco_edge.mission.map.loop_closure import Motion
-from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
-from fasaco_edge.mission.map.room_edits import merge, move, split
-from fasaco_edge.mission.map.room_matching import HOLD_CHANGE, HOLD_NEW
-from fasaco_edge.mission.map.room_watch import update
+from fasaco_edge.mission.coverage.loop_closure import Motion
+from fasaco_edge.mission.rooms import room_book
+from fasaco_edge.mission.rooms.room_book import RoomBook, RoomSettings
+from fasaco_edge.mission.rooms.room_edits import merge, move, split
+from fasaco_edge.mission.rooms.room_matching import HOLD_CHANGE, HOLD_NEW
+from fasaco_edge.mission.rooms.room_watch import update
 
 # A letter is a square of 1 m, drawn as 10 x 10 pixels of 0.1 m; equal letters are one region.
 PIXELS, SIDE_M = 10, 0.1

@@ -12,9 +12,9 @@ from numpy.random import PCG64, Generator
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.grid.rooms import find_rooms
-from fasaco_edge.mission.map.room_book import RoomBook
-from fasaco_edge.mission.map.room_raster import centres
-from fasaco_edge.mission.map.room_watch import update
+from fasaco_edge.mission.coverage.floor_tiles import centres
+from fasaco_edge.mission.rooms.room_book import RoomBook
+from fasaco_edge.mission.rooms.room_watch import update
 from tests.benchmarks.rooms.homes import home, seen
 from tests.support.poses import composed
 

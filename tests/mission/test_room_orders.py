@@ -15,18 +15,18 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.polygons import is_near
 from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
-from fasaco_edge.mission.map import room_watch
+from fasaco_edge.mission.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.map.inputs import PATIENCE_S
-from fasaco_edge.mission.map.room_watch import PERIOD_S
-from fasaco_edge.mission.orders import sequencer
+from fasaco_edge.mission.map.placing import are_same
 from fasaco_edge.mission.orders.commands import command_document, read_command
 from fasaco_edge.mission.orders.order import Command, StandingZone, order_document, read_order
-from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.passes import PassDocument
-from fasaco_edge.mission.orders.placing import are_same
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.rooms import room_watch
+from fasaco_edge.mission.rooms.room_watch import PERIOD_S
+from fasaco_edge.mission.work import sequencer
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.passes import Pass
 from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
 

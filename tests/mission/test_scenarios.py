@@ -10,7 +10,8 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.standing import PATIENCE_S
+from fasaco_edge.mission.events import (
     Decision,
     MapReceived,
     PatchesLost,
@@ -18,7 +19,6 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     State,
 )
-from fasaco_edge.mission.core.standing import PATIENCE_S
 from fasaco_edge.planners.path import CoveragePath
 from tests.mission.world import (
     Drive,

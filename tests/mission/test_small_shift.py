@@ -5,7 +5,7 @@ import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.map.loop_closure import small_shift
+from fasaco_edge.mission.coverage.loop_closure import small_shift
 from tests.mission.line_robot import CONFIG, PIXEL_M
 from tests.mission.test_reached_cells import changed, two_rooms
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fasaco_edge.daemon.loop.outbox import path_attachment
-from fasaco_edge.mission.core.events import MapReceived, PlanReady
 from fasaco_edge.mission.core.path_exit import PublishedPath
-from fasaco_edge.mission.core.plan_requests import (
+from fasaco_edge.mission.events import MapReceived, PlanReady
+from fasaco_edge.mission.path.plan_requests import (
     NEW_WALK_SHARE,
     SKIPPED_S,
     Attempt,

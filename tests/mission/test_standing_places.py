@@ -6,10 +6,10 @@ import pytest
 
 from fasaco_edge.errors import PlacesElsewhere
 from fasaco_edge.mission.config import BatteryPolicy, Dock, Place
-from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
+from fasaco_edge.mission.events import BatteryReceived, MapReceived, State
 from fasaco_edge.mission.orders.mask import inline_grid
 from fasaco_edge.mission.orders.order import StandingZone
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.test_other_building import FLOOR, OTHER
 from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
 

@@ -9,12 +9,12 @@ import pytest
 from PIL import Image
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.mission.core.events import MapReceived, State
+from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask, mask_polygons
 from fasaco_edge.mission.orders.order import StandingZone, order_document, read_order
-from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.zones import cells_inside, with_kept_out
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CELL,
     CONFIG,

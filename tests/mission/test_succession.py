@@ -2,9 +2,9 @@
 
 import pytest
 
-from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.standing import STANDING_S
+from fasaco_edge.mission.events import MapReceived, State
 from tests.mission.test_trouble_at_rest import (
     A_MINUTE_S,
     AT_REST,

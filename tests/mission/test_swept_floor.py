@@ -14,6 +14,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     PIXEL_M,
     pixels_under,
 )
+from fasaco_edge.mission.coverage.loop_closure import Motion, certain_floor
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.steady_track import PoseScatter, SteadyTrack
 from fasaco_edge.mission.coverage.swept_floor import (
@@ -24,7 +25,6 @@ from fasaco_edge.mission.coverage.swept_floor import (
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from fasaco_edge.mission.map.loop_closure import Motion, certain_floor
 from tests.mission.world import CELL, Drive, MapReceived, building, pose_at, rectangle
 from tests.support.examples import examples
 

@@ -10,8 +10,8 @@ from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.mission.config import MissionConfig, Sweeping
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import MapReceived, PoseReceived
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.simulation.robot import SimulationConfig

@@ -7,10 +7,10 @@ import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.mission.config import MissionPolicy
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PoseReceived, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PoseReceived, State
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.work.order_state import OrderState, Stage
 from tests.mission.battery import AT_DOCK, Battery
 from tests.mission.line_robot import CONFIG as LINES
 from tests.mission.line_robot import LineRobot

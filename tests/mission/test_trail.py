@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from fasaco_edge.daemon.ledger.codec import decode_ledger, encode_ledger
-from fasaco_edge.mission.core.events import MapReceived
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.living_trail import branching
 from tests.mission.world import CELL, CONFIG, Drive, building, patch, pose_at, started
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from fasaco_edge.mission.core.events import BatteryReceived, MapReceived, State
 from fasaco_edge.mission.core.in_dock import FLAT_S
 from fasaco_edge.mission.core.trouble import RULES
+from fasaco_edge.mission.events import BatteryReceived, MapReceived, State
 from fasaco_edge.wire.documents.replies import TROUBLES
 from tests.mission.battery import AT_DOCK, Battery
 from tests.mission.world import CONFIG, Drive, building, patch, pose_at, with_policy

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.standing import PATIENCE_S
+from fasaco_edge.mission.events import CommandReceived, MapReceived, State
 from fasaco_edge.mission.orders.order import read_order
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CONFIG,
     Drive,

@@ -12,11 +12,11 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
+from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.charging import LINE_FACTOR
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.way import corners_between, is_clear_between, way_s
-from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.planners.line import LineConfig
 from tests.follow.closed_loop import CONFIG, ClosedLoop
 

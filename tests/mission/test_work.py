@@ -14,10 +14,10 @@ from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.polygons import polygon_flaw
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PoseReceived
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
-from fasaco_edge.mission.coverage.unreached import MOST_AREAS, MOST_VIEWPOINTS, viewpoints
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PoseReceived
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
+from fasaco_edge.mission.work.unreached import MOST_AREAS, MOST_VIEWPOINTS, viewpoints
 
 FOOTPRINT = Footprint(0.3, 0.14)
 # Pixels of a chamber's side with one wall; it holds a few cells.

@@ -10,14 +10,14 @@ import pytest
 from fasaco_edge.daemon.loop.mission_reports import room_progress, zone_progress
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, PriorityReceived, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import CommandReceived, MapReceived, PriorityReceived, State
+from fasaco_edge.mission.map.placing import are_same
 from fasaco_edge.mission.orders.order import EVERYTHING, Zone, order_document, read_order
-from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.mission.orders.placing import are_same
 from fasaco_edge.mission.orders.room_requests import RoomRequest
-from fasaco_edge.mission.orders.sequencer import MAX_IN_VAIN
-from fasaco_edge.mission.orders.worth import WorthFirst, least_priority
+from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.sequencer import MAX_IN_VAIN
+from fasaco_edge.mission.work.worth import WorthFirst, least_priority
 from tests.mission.battery import Battery
 from tests.mission.test_room_orders import (
     BOTH,

@@ -13,9 +13,10 @@ from msgspec import structs
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose, Window
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
-from fasaco_edge.mission.company_kind import ALONE
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.company_kind import ALONE
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import (
     CommandReceived,
     MapReceived,
     PatchReceived,
@@ -23,7 +24,6 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     State,
 )
-from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.paper.fasaco import Fasaco

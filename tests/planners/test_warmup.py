@@ -17,7 +17,8 @@ from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.kernels.folder import KERNEL_SOURCES, kernel_module
 from fasaco_edge.kernels.manifest import chosen_folder
 from fasaco_edge.mission.config import Sweeping
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.mission.events import (
     CommandReceived,
     MapReceived,
     PatchReceived,
@@ -25,7 +26,6 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     State,
 )
-from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.compiling import compile_missing, warm_up
 from fasaco_edge.planners.cost import CoverageCost, SearchWork

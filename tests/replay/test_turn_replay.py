@@ -17,10 +17,10 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms
-from fasaco_edge.mission.core.events import PriorityReceived
-from fasaco_edge.mission.map.room_book import RoomBook
-from fasaco_edge.mission.map.room_matching import HOLD_NEW
-from fasaco_edge.mission.map.room_watch import update
+from fasaco_edge.mission.events import PriorityReceived
+from fasaco_edge.mission.rooms.room_book import RoomBook
+from fasaco_edge.mission.rooms.room_matching import HOLD_NEW
+from fasaco_edge.mission.rooms.room_watch import update
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, inflated_sample, read_turns
 from fasaco_edge.replay.replay import read_run

@@ -7,8 +7,8 @@ import re
 import pytest
 
 from fasaco_edge.daemon.loop import mission_reports
-from fasaco_edge.mission.coverage import unreached
 from fasaco_edge.mission.line import unswept
+from fasaco_edge.mission.work import unreached
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import STATES, TROUBLES

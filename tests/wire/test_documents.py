@@ -11,7 +11,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.mission.core.events import State
+from fasaco_edge.mission.events import State
 from fasaco_edge.planners.path import CoveragePath, Saved
 from fasaco_edge.wire.documents.json_text import (
     MAX_TEXT,

@@ -6,7 +6,7 @@ import ast
 import inspect
 
 from fasaco_edge.client.phrases import swept
-from fasaco_edge.mission.core.events import BETTER
+from fasaco_edge.mission.events import BETTER
 from fasaco_edge.mission.line import floor_left, published_line
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.reasons import WORDS, plain

@@ -34,7 +34,10 @@ from fasaco_edge.grid.geometry import (
 )
 from fasaco_edge.host.durable import make_folder, sync_folder, write_through
 from fasaco_edge.host.files import read_own
-from fasaco_edge.mission.map.room_book import (
+from fasaco_edge.mission.orders.keep_outs import PlaceName, name_faults
+from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_faults, passes_of
+from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY, Priority
+from fasaco_edge.mission.rooms.room_book import (
     LIKE_NUMBER,
     MOST_CUTS,
     MOST_NUMBER,
@@ -45,10 +48,7 @@ from fasaco_edge.mission.map.room_book import (
     RoomSettings,
     RoomSheet,
 )
-from fasaco_edge.mission.map.room_raster import MOST_SQUARES, RoomRaster
-from fasaco_edge.mission.orders.keep_outs import PlaceName, name_faults
-from fasaco_edge.mission.orders.passes import Passes, passes_document, passes_faults, passes_of
-from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY, Priority
+from fasaco_edge.mission.rooms.room_raster import MOST_SQUARES, RoomRaster
 
 MOST_BYTES = 16_000_000
 """Limit on the bytes of a file; longer ones are not read."""

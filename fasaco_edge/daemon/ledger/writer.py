@@ -21,12 +21,12 @@ from fasaco_edge.errors import (
 )
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.orders.keep_outs import KeepOuts
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
+from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState
 from fasaco_edge.wire.documents.status import LedgerReport
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
-    from fasaco_edge.mission.map.room_book import RoomBook
+    from fasaco_edge.mission.rooms.room_book import RoomBook
 
 LOG = logging.getLogger(__name__)
 

@@ -21,7 +21,7 @@ from fasaco_edge.bus.queries import Question, Reply, Request, Shared, matches
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadQuery, CommandError, FasacoError, UnknownQuery
-from fasaco_edge.mission.core.events import Answer, CommandReceived
+from fasaco_edge.mission.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.order import Command
 from fasaco_edge.wire import topics

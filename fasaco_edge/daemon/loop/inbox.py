@@ -17,7 +17,7 @@ from fasaco_edge.daemon.loop.answers import error_reply
 from fasaco_edge.daemon.memory import most_bytes, queues
 from fasaco_edge.errors import CommandError, FasacoError, MalformedMessage, MapTooLarge
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.events import (
     BatteryReceived,
     Event,
     FollowerBlocked,

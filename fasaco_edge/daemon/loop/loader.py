@@ -16,7 +16,7 @@ from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.daemon.memory import floor_pixels
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.mission.config import MissionConfig, Sweeping
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState
+from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState
 from fasaco_edge.planners.compiling import compile_missing, warm_up
 from fasaco_edge.planners.stages import stages_of_mission
 

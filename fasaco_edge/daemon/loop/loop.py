@@ -28,7 +28,7 @@ from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import FasacoError, MissionBroke, PatchWithoutBase
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.events import (
     Answer,
     CommandReceived,
     Decision,

@@ -10,8 +10,8 @@ import numpy as np
 
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.mission.orders.placing import left_out
+from fasaco_edge.mission.map.placing import left_out
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.wire.documents.replies import (
     CoverageReport,
     FloorLeft,
@@ -34,7 +34,7 @@ from fasaco_edge.wire.documents.status import (
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission
-    from fasaco_edge.mission.coverage.progress import RoomProgress, ZoneProgress
+    from fasaco_edge.mission.work.progress import RoomProgress, ZoneProgress
     from fasaco_edge.planners.cost import CoverageCost
 
 PASSED = "passed, or in narrow strips, and not known to be swept"
@@ -257,14 +257,14 @@ def _centre(mission: Mission, cell: tuple[int, int], cell_m: float) -> tuple[flo
 def zone_progress(mission: Mission) -> list[ZoneProgress]:
     """Return the progress of each zone of the order."""
     # Imports kernels, which a daemon without a mission does not load.
-    from fasaco_edge.mission.coverage import progress  # noqa: PLC0415
+    from fasaco_edge.mission.work import progress  # noqa: PLC0415
 
     return progress.zone_progress(mission.order_state, mission.map.area, mission.covered)
 
 
 def room_progress(mission: Mission) -> dict[int, RoomProgress]:
     """Return the progress in each room, by its number."""
-    from fasaco_edge.mission.coverage import progress  # noqa: PLC0415
+    from fasaco_edge.mission.work import progress  # noqa: PLC0415
 
     area, ahead, line = mission.map.area, mission.route.path.ahead, mission.line.ahead()
     rooms = None if area is None else mission.room_cells.on(area.lattice)

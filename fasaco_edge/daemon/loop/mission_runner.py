@@ -18,7 +18,8 @@ from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.loader import Loader
 from fasaco_edge.errors import CommandError, FasacoError, PatchWithoutBase
 from fasaco_edge.grid.occupancy import MapPatch, without_base
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.path_exit import PathExit
+from fasaco_edge.mission.events import (
     Answer,
     BatteryReceived,
     CommandReceived,
@@ -31,17 +32,16 @@ from fasaco_edge.mission.core.events import (
     PriorityReceived,
     in_runs,
 )
-from fasaco_edge.mission.core.path_exit import PathExit
-from fasaco_edge.mission.map.room_book import RoomBook
+from fasaco_edge.mission.map.placing import is_named
 from fasaco_edge.mission.map.standing_places import StandingPlaces
-from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.mission.orders.placing import is_named
-from fasaco_edge.mission.orders.room_commands import carry_out, check_before_map
+from fasaco_edge.mission.rooms.room_book import RoomBook
+from fasaco_edge.mission.rooms.room_commands import carry_out, check_before_map
+from fasaco_edge.mission.work.order_state import OrderState
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.loop.worker import PlanningWorker
-    from fasaco_edge.mission.core.events import PlanRequest
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.events import PlanRequest
 
 
 class MissionRunner:

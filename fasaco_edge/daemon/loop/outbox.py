@@ -21,7 +21,7 @@ from fasaco_edge.daemon.figures import log_fault
 from fasaco_edge.daemon.loop.answers import AnyReply, answering, check
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import FasacoError, NotPublished, NotYet
-from fasaco_edge.mission.core.events import Answer, CommandReceived
+from fasaco_edge.mission.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.commands import command_document
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json

@@ -15,8 +15,8 @@ from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_geometry
-from fasaco_edge.mission.map.room_book import Room, RoomBook
 from fasaco_edge.mission.orders.passes import passes_document
+from fasaco_edge.mission.rooms.room_book import Room, RoomBook
 from fasaco_edge.planners.living_trail import (
     TrailSnapshot,
     branching,
@@ -34,7 +34,7 @@ from fasaco_edge.wire.topics import COVERAGE, DIRECTIONS, FLOOR, PHEROMONE, ROOM
 if TYPE_CHECKING:
     from fasaco_edge.daemon.fleet_wing import PeriodicMessage
     from fasaco_edge.mission.core.mission import Mission
-    from fasaco_edge.mission.coverage.progress import RoomProgress
+    from fasaco_edge.mission.work.progress import RoomProgress
 
 # Least period of the coverage [s].
 COVERAGE_PERIOD_S = 0.5

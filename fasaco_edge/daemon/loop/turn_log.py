@@ -21,8 +21,8 @@ from fasaco_edge.daemon.ledger.codec import encode_ledger
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Received
 from fasaco_edge.kernels.folder import sources_digest
-from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroken, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
+from fasaco_edge.mission.events import CommandReceived, Decision, PlanBroken, PlanReady
 from fasaco_edge.mission.orders.commands import command_document
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.wire.documents.json_text import encode_json

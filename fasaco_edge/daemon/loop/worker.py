@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 from fasaco_edge.bus.mailbox import LatestSlot
 from fasaco_edge.errors import PlanFailed
-from fasaco_edge.mission.core.events import PlanBroken, PlanReady, PlanRequest
-from fasaco_edge.mission.core.plan_requests import most_s
+from fasaco_edge.mission.events import PlanBroken, PlanReady, PlanRequest
+from fasaco_edge.mission.path.plan_requests import most_s
 from fasaco_edge.planners.planner import (
     AnyOf,
     CoveragePlanner,

@@ -24,7 +24,7 @@ from fasaco_edge.fleet.mission.message import Messages, waits_for
 from fasaco_edge.fleet.mission.shared import MapPlace
 from fasaco_edge.fleet.mission.tiles import Placed
 from fasaco_edge.grid.geometry import Point, Pose2D
-from fasaco_edge.mission.core.events import MemberReceived, Part
+from fasaco_edge.mission.events import MemberReceived, Part
 from fasaco_edge.wire.documents.fleet import (
     FLEET_VERSION,
     CellTile,

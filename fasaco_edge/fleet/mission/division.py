@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fasaco_edge.fleet.mission.travel import Seconds, Travel, cell_of, on_ground, times_of, ways
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.kernels.fleet.nearest import walk_parts
-from fasaco_edge.mission.core.events import Part
+from fasaco_edge.mission.events import Part
 
 # Largest number of cells used: of more cells, every second (third, ...) is used.
 # Limit on rounds x robots x cells: the number of rounds is lowered to keep it, but not below one.

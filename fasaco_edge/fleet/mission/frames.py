@@ -16,8 +16,8 @@ import numpy as np
 from fasaco_edge.fleet.mission.shared import MOST_TILES_OF_ONE
 from fasaco_edge.fleet.mission.tiles import EMPTY, Placed, bits_of, packed, unpacked
 from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
-from fasaco_edge.mission.core.events import MemberReceived
 from fasaco_edge.mission.coverage.ledger import TILE
+from fasaco_edge.mission.events import MemberReceived
 
 # Number of robots tracked at once. It exceeds the number of members: a refused robot may become a
 # member later, and would need many messages to send its tiles again.

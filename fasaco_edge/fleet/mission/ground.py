@@ -27,9 +27,9 @@ from fasaco_edge.fleet.mission.tiles import (
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.kernels.lattice.ways import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 
 # Largest number of cells that the ground of others may add to the lattice; more are left out.
 MOST_ADDED = 1_000_000

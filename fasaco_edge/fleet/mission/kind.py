@@ -9,15 +9,15 @@ from fasaco_edge.fleet.mission.giving_way import GivingWay
 from fasaco_edge.fleet.mission.layer import FleetLayer
 from fasaco_edge.fleet.mission.shared import MapPlace, SharedProgress
 from fasaco_edge.mission.company import Company
-from fasaco_edge.mission.company_kind import CompanyKind
+from fasaco_edge.mission.core.company_kind import CompanyKind
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.config import MissionConfig
     from fasaco_edge.mission.core.mission import Mission
-    from fasaco_edge.mission.core.route import Route
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
     from fasaco_edge.mission.map.map_state import MapState
-    from fasaco_edge.mission.orders.sequencer import Sequencer
+    from fasaco_edge.mission.path.route import Route
+    from fasaco_edge.mission.work.sequencer import Sequencer
 
 
 @dataclass(frozen=True, slots=True)

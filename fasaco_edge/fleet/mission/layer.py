@@ -21,11 +21,11 @@ from fasaco_edge.fleet.mission.shared_work import AtWork, DivisionNumbers, Remai
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company, OpenCells
-from fasaco_edge.mission.core.events import MemberReceived, Part
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.events import MemberReceived, Part
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.planners.cost import CoverageCost
 
 # Period of checks; least age of a division at which a new one replaces it, in general and for

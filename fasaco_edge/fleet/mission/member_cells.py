@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES, Bits, bits_of
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.mission.core.events import SAME_LATTICE
+from fasaco_edge.mission.events import SAME_LATTICE
 
 if TYPE_CHECKING:
     # For types only: a daemon announces itself to its fleet before the kernels are loaded.

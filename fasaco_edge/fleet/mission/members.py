@@ -15,9 +15,9 @@ from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, SharedProgress
 from fasaco_edge.fleet.mission.traffic import OLD_S, Neighbour, least_apart_m
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import MemberReceived, State
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.events import MemberReceived, State
 
 # Timeouts of a silent robot, and of a robot at work that does not move [s]; least motion [m].
 GONE_S, HANGING_S, STANDING_M = 5.0, 8.0, 0.05

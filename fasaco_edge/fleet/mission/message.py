@@ -11,7 +11,7 @@ from fasaco_edge.fleet.mission.ground import GroundQueue
 from fasaco_edge.fleet.mission.kind import fleet_of, giving_way_of
 from fasaco_edge.fleet.mission.tiles import SweptQueue
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.core.events import MemberReceived, State
+from fasaco_edge.mission.events import MemberReceived, State
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.core.mission import Mission

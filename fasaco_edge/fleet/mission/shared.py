@@ -33,9 +33,9 @@ from fasaco_edge.fleet.mission.tiles import (
     unpacked,
     window_of,
 )
-from fasaco_edge.mission.company import Inside, OthersCells
-from fasaco_edge.mission.core.events import SAME_LATTICE
 from fasaco_edge.mission.coverage.ledger import TILE, LedgerSnapshot
+from fasaco_edge.mission.coverage.others_cells import Inside, OthersCells
+from fasaco_edge.mission.events import SAME_LATTICE
 
 if TYPE_CHECKING:
     # For types only: a daemon announces itself to its fleet before the kernels are loaded.

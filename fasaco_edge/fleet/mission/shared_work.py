@@ -13,8 +13,8 @@ from fasaco_edge.fleet.mission.division import Division, Robot
 from fasaco_edge.fleet.mission.members import GONE, GONE_S, Members
 from fasaco_edge.grid.geometry import MOST_INDEX, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MemberReceived
-from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
+from fasaco_edge.mission.events import MemberReceived
 
 # Others make no progress once the number of swept cells has not grown for this long [s].
 STUCK_S = 30.0

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.core.events import MemberReceived
+from fasaco_edge.mission.events import MemberReceived
 
 # Length of the path that is published and checked, spacing of its points, and clearance [m].
 AHEAD_M, SPACING_M, CLEARANCE_M = 2.0, 0.1, 0.1

@@ -14,12 +14,12 @@ from statistics import median
 import numpy as np
 
 from fasaco_edge.mission.config import BatteryPolicy, MissionConfig
-from fasaco_edge.mission.core.events import BatteryReceived
-from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.time_limit import LINE_FACTOR, LOOK_EVERY_S, Lapse, seconds_back
+from fasaco_edge.mission.events import BatteryReceived
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.order_state import AT_HOME, NO_ORDER
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.work.order_state import AT_HOME, NO_ORDER
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 # A level that differs from the last accepted one by more than JUMP must be repeated for HOLD_S [s].
 JUMP, HOLD_S = 0.05, 5.0

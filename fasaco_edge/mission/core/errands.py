@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.events import Doing, PathUpdate, State
-from fasaco_edge.mission.core.route import NO_CELLS, Route
 from fasaco_edge.mission.core.standing import Standing
 from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.events import Doing, PathUpdate, State
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Errand
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import NO_CELLS, Route
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 # An errand ends this long after the robot enters the last cell [s]. Meanwhile the robot drives to
 # the centre of the cell and turns.

@@ -11,7 +11,12 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.core.charging import BatteryGauge
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.order_changes import OTHERS_FIRST, OrderChanges
+from fasaco_edge.mission.core.standing import BlockedFollower
+from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.coverage.drive_meter import DriveMeter, Driven
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.events import (
     Answer,
     BatteryReceived,
     CommandReceived,
@@ -29,18 +34,13 @@ from fasaco_edge.mission.core.events import (
     PriorityReceived,
     in_runs,
 )
-from fasaco_edge.mission.core.order_changes import OTHERS_FIRST, OrderChanges
-from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.standing import BlockedFollower
-from fasaco_edge.mission.core.trail_layer import TrailLayer
-from fasaco_edge.mission.core.way_out import WayOut
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter, Driven
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.room_watch import RoomWatch
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.path.trail_layer import TrailLayer
+from fasaco_edge.mission.rooms.room_watch import RoomWatch
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 
 @dataclass(slots=True, eq=False)

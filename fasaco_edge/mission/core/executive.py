@@ -9,21 +9,21 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.company import Company, Waiting
 from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.errands import Errands
-from fasaco_edge.mission.core.events import Decision, Doing, PathUpdate, State
 from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.order_work import OrderWork
 from fasaco_edge.mission.core.path_checks import PathChecks
-from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.standing import BlockedFollower, Standing
 from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
 from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.events import Decision, Doing, PathUpdate, State
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.order_state import Stage
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 # States in which the robot rests: by command, at the end of its order, or to charge.
 STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))

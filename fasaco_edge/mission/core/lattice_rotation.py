@@ -24,7 +24,8 @@ from fasaco_edge.grid.rotation import (
     rotated_pose,
 )
 from fasaco_edge.mission.config import MissionConfig, Place
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.coverage.loop_closure import Motion, moved_mask
+from fasaco_edge.mission.events import (
     Event,
     FollowerBlocked,
     MapReceived,
@@ -33,11 +34,10 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     PriorityReceived,
 )
-from fasaco_edge.mission.map.loop_closure import Motion, moved_mask
+from fasaco_edge.mission.map.placing import rotated_order
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.mission.orders.placing import rotated_order
-from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.reached_cells import ReachedCells
 
 _AnyPlace = TypeVar("_AnyPlace", bound=Place)
 

@@ -13,11 +13,26 @@ from fasaco_edge.errors import LedgerMismatchError, NotPublished
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.company_kind import ALONE, CompanyKind
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.charging import BatteryGauge, Charging
+from fasaco_edge.mission.core.company_kind import ALONE, CompanyKind
 from fasaco_edge.mission.core.event_handler import EventHandler
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.executive import Executive
+from fasaco_edge.mission.core.in_dock import InDock
+from fasaco_edge.mission.core.lattice_layout import LatticeLayout
+from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
+from fasaco_edge.mission.core.order_changes import OrderChanges
+from fasaco_edge.mission.core.standing import BlockedFollower
+from fasaco_edge.mission.core.time_limit import TimeLimit
+from fasaco_edge.mission.core.trouble import Trouble
+from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.coverage.counts import Coverage
+from fasaco_edge.mission.coverage.drive_meter import DriveMeter
+from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
+from fasaco_edge.mission.coverage.tool_sight import ToolSight
+from fasaco_edge.mission.events import (
     Decision,
     Event,
     MapReceived,
@@ -26,37 +41,20 @@ from fasaco_edge.mission.core.events import (
     PriorityReceived,
     State,
 )
-from fasaco_edge.mission.core.executive import Executive
-from fasaco_edge.mission.core.in_dock import InDock
-from fasaco_edge.mission.core.lattice_layout import LatticeLayout
-from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
-from fasaco_edge.mission.core.order_changes import OrderChanges
-from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.core.standing import BlockedFollower
-from fasaco_edge.mission.core.time_limit import TimeLimit
-from fasaco_edge.mission.core.trail_layer import TrailLayer
-from fasaco_edge.mission.core.trouble import Trouble
-from fasaco_edge.mission.core.way_out import WayOut
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter
-from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.progress import (
-    Coverage,
-)
-from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
-from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.line.layer import LineLayer
-from fasaco_edge.mission.map.idle_places import IdlePlaces
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.room_book import RoomBook
-from fasaco_edge.mission.map.room_cells import RoomCells
-from fasaco_edge.mission.map.room_watch import RoomWatch
-from fasaco_edge.mission.orders.by_room import RoomPrice
+from fasaco_edge.mission.map.placing import restored
 from fasaco_edge.mission.orders.mask import mask_frame
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
-from fasaco_edge.mission.orders.placing import restored
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.path.trail_layer import TrailLayer
+from fasaco_edge.mission.rooms.room_book import RoomBook
+from fasaco_edge.mission.rooms.room_cells import RoomCells
+from fasaco_edge.mission.rooms.room_watch import RoomWatch
+from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.work.idle_places import IdlePlaces
+from fasaco_edge.mission.work.order_state import OrderState, Stage
+from fasaco_edge.mission.work.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
 
 __all__ = ["Mission", "MissionConfig"]

@@ -8,20 +8,20 @@ from fasaco_edge.errors import CommandError, FasacoError, OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.events import Answer, CommandReceived, PathUpdate
-from fasaco_edge.mission.core.route import Route
-from fasaco_edge.mission.coverage.loss import loss_in
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.events import Answer, CommandReceived, PathUpdate
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.room_watch import RoomWatch
+from fasaco_edge.mission.map.placing import placed, rotated_order
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
-from fasaco_edge.mission.orders.placing import placed, rotated_order
-from fasaco_edge.mission.orders.room_commands import carry_out
-from fasaco_edge.mission.orders.sequencer import Sequencer
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.rooms.room_commands import carry_out
+from fasaco_edge.mission.rooms.room_watch import RoomWatch
+from fasaco_edge.mission.work.loss import loss_in
+from fasaco_edge.mission.work.order_state import OrderState, Stage
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 OTHERS_FIRST = "priorities have changed"
 

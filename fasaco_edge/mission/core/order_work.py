@@ -10,14 +10,14 @@ from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.core.errands import NO_WAY, Errands
-from fasaco_edge.mission.core.events import Doing, PathUpdate, State
-from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.events import Doing, PathUpdate, State
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.order_state import Stage
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 
 @dataclass(frozen=True, slots=True)

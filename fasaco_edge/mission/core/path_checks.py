@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.core.standing import PATIENCE_S, Standing
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 # Period of ``check_worth`` and ``check_time`` [s].
 WORTH_S = 1.0

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Bounds
 
 if TYPE_CHECKING:
-    from fasaco_edge.mission.core.events import PathUpdate
     from fasaco_edge.mission.core.mission import Mission
+    from fasaco_edge.mission.events import PathUpdate
     from fasaco_edge.planners.path import CoveragePath
 
 

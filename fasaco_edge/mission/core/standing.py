@@ -11,9 +11,9 @@ import math
 
 from fasaco_edge.errors import WrongFrame
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import FollowerBlocked
-from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.events import FollowerBlocked
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.path.route import Route
 
 # Minimum time between new plans for a robot that left its path or stands still at its end: a
 # flickering pose must not keep the planner busy.

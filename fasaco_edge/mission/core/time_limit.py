@@ -12,8 +12,8 @@ from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.line.way import way_s
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import Errand
-from fasaco_edge.mission.orders.order_state import Stage
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 # Period of estimates [s].
 LOOK_EVERY_S = 5.0

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 from fasaco_edge.mission.company import Waiting
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.events import State
 from fasaco_edge.mission.core.in_dock import DockCurrent, InDock
 from fasaco_edge.mission.core.path_checks import FAR_APART
 from fasaco_edge.mission.core.standing import BlockedFollower, Standing
 from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.events import State
 from fasaco_edge.mission.line.place_on_line import Offset
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState

@@ -19,12 +19,12 @@ from fasaco_edge.grid.fine_raster import map_to_raster
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import Doing, PathUpdate, State
-from fasaco_edge.mission.core.route import Route
+from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.mission.events import Doing, PathUpdate, State
 from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius, is_clear_between
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 # Length of the track that is kept, and spacing of its points [m].
 TRACK_M, SPACING_M = 40.0, 0.05

@@ -1,1 +1,1 @@
-"""Coverage: what has been covered, progress, and what stays uncovered."""
+"""Coverage: which cells and floor are covered, kept through loop closures and restarts."""

@@ -284,3 +284,9 @@ def swept_on(swept_in: Callable[[Window], Mask], place: Similarity, window: Wind
     i += j
     found: Mask = swept.ravel().take(i)
     return found
+
+
+def centres(window: Window, square_m: float) -> NDArray[np.float64]:
+    """Return the centres x, y [m] of a window's squares, float64 (n, 2), row by row."""
+    rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
+    return (np.stack((cols.ravel(), rows.ravel()), axis=1) + 0.5) * square_m

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import LedgerFullError, LedgerMismatchError
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
 from fasaco_edge.grid.lattice import Cell, CoverageLattice, mask_of
-from fasaco_edge.mission.company import OthersCells
 from fasaco_edge.mission.coverage.fit import Fit, Verdict
 from fasaco_edge.mission.coverage.floor_tiles import FLOOR_TILE, PIXEL_M
 from fasaco_edge.mission.coverage.ledger import (
@@ -34,12 +33,13 @@ from fasaco_edge.mission.coverage.ledger import (
     CoverageLedger,
     LedgerSnapshot,
 )
+from fasaco_edge.mission.coverage.loop_closure import Motion, certain_floor, uncertain_cells
+from fasaco_edge.mission.coverage.others_cells import OthersCells
 from fasaco_edge.mission.coverage.swept_floor import (
     DROPPED_FLOOR_TILES,
     MOST_FLOOR_TILES,
     SweptFloor,
 )
-from fasaco_edge.mission.map.loop_closure import Motion, certain_floor, uncertain_cells
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight

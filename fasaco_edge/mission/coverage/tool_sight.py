@@ -12,8 +12,7 @@ from fasaco_edge.grid.floor import tool_steps
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import beside
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
-from fasaco_edge.mission.map.room_raster import centres
+from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask, centres
 
 
 class ToolSight:

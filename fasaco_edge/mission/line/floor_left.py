@@ -17,6 +17,7 @@ from fasaco_edge.grid.fine_raster import raster_to_map, strips
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.possible_floor import possible_m2
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.coverage.floor_tiles import pixels_under
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -24,8 +25,7 @@ from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFlo
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.unswept import causes_of
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 # The robot does not drive to a cell with less unswept floor than this [m2].
 LEAST_LEFT_M2 = 0.04

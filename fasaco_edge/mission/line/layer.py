@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.mission.config import Sweeping
-from fasaco_edge.mission.core.events import PathUpdate
-from fasaco_edge.mission.core.route import Route
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.events import PathUpdate
 from fasaco_edge.mission.line.curver import Curver
 from fasaco_edge.mission.line.floor_left import FloorLeft
 from fasaco_edge.mission.line.line_ahead import LineAhead
@@ -26,7 +25,8 @@ from fasaco_edge.mission.line.polisher import Polisher
 from fasaco_edge.mission.line.polyline import CURVED
 from fasaco_edge.mission.line.published_line import Publication
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 
 class AheadFigures(NamedTuple):

@@ -16,10 +16,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.mission.core.events import PathUpdate
-from fasaco_edge.mission.core.route import Route
+from fasaco_edge.mission.events import PathUpdate
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED, Points
+from fasaco_edge.mission.path.route import Route
 
 # A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, as the robot
 # needs that much to stop; unless the robot can drive on along the published line.

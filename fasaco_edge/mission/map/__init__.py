@@ -1,1 +1,1 @@
-"""Map side of a mission: frames, the newest map, the reachable area."""
+"""Map side of a mission: frames, the newest map, configured places."""

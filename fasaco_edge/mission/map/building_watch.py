@@ -26,7 +26,7 @@ import numpy as np
 
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
-from fasaco_edge.mission.map.loop_closure import LEAST_CELLS, Motion
+from fasaco_edge.mission.coverage.loop_closure import LEAST_CELLS, Motion
 
 # Two maps are alike if less than this share of the cells known to both differs.
 LEAST_SHARE = 0.05

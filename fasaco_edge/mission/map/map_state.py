@@ -21,22 +21,22 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Polygon, StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
+from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.progress import Coverage, FreeArea
-from fasaco_edge.mission.map.building_watch import BuildingWatch
-from fasaco_edge.mission.map.ground import Ground
-from fasaco_edge.mission.map.inputs import FrameSelector
-from fasaco_edge.mission.map.loop_closure import (
+from fasaco_edge.mission.coverage.counts import Coverage, FreeArea
+from fasaco_edge.mission.coverage.loop_closure import (
     Motion,
     closes_cells,
     has_moved,
     shows_floor,
     small_shift,
 )
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.map.building_watch import BuildingWatch
+from fasaco_edge.mission.map.ground import Ground
+from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.obstacles import Obstacles
-from fasaco_edge.mission.map.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder
 

@@ -9,17 +9,37 @@ where they are on that map. After a command ``reset`` the places belong to the m
 from __future__ import annotations
 
 import zlib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import msgspec
 
 from fasaco_edge.errors import OrderError, PlacesElsewhere
 from fasaco_edge.mission.config import Dock, MissionPolicy, Place
-from fasaco_edge.mission.map.room_book import RoomBook
+from fasaco_edge.mission.map.placing import located
 from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.orders.order import Errand, MissionOrder
-from fasaco_edge.mission.orders.order_state import NO_PLACES, PlacesNote
-from fasaco_edge.mission.orders.placing import located
+from fasaco_edge.mission.rooms.room_book import RoomBook
+
+
+@dataclass(frozen=True, slots=True)
+class PlacesNote:
+    """Which map the places of the configuration belong to.
+
+    Attributes:
+        of: checksum of these places; "" while they belong to no map.
+        frame: frame of that map.
+        is_left: whether the map in that frame has shown another building since.
+        left_mask: checksum of a received keep-out mask, if the map in its frame has shown another
+            building since; else "".
+    """
+
+    of: str = ""
+    frame: str = ""
+    is_left: bool = False
+    left_mask: str = ""
+
+
+NO_PLACES = PlacesNote()
 
 
 class StandingPlaces:

@@ -1,1 +1,1 @@
-"""Orders: zones, passes, keep-out zones, and the sequence in which they are carried out."""
+"""Orders as people give them: zones, passes, keep-out zones, commands."""

@@ -24,7 +24,9 @@ from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor.turning import proportional_turning
 from fasaco_edge.mission.config import MissionConfig, Sweeping
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.events import (
     Event,
     MapReceived,
     MemberReceived,
@@ -33,9 +35,7 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     State,
 )
-from fasaco_edge.mission.core.mission import Mission
-from fasaco_edge.mission.core.plan_requests import most_s
-from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.path.plan_requests import most_s
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.line import LINES
 from fasaco_edge.planners.planner import WorkLimit

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.config import NO_PATIENCE, BatteryPolicy, MissionPolicy
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.mission.events import (
     Decision,
     Event,
     PlanReady,
@@ -29,7 +30,6 @@ from fasaco_edge.mission.core.events import (
     PoseReceived,
     State,
 )
-from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import WorkLimit, ignore

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import UNKNOWN, MapPatch, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, cast_rays, disc_is_free, reveal_disc
-from fasaco_edge.mission.core.events import MapReceived, PatchReceived
+from fasaco_edge.mission.events import MapReceived, PatchReceived
 from tests.benchmarks.online.buildings import Building
 
 # The published map grows by blocks of about this size [m].

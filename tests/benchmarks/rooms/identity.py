@@ -19,10 +19,10 @@ from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
-from fasaco_edge.mission.map.loop_closure import Motion
-from fasaco_edge.mission.map.room_book import RoomBook
-from fasaco_edge.mission.map.room_edits import move
-from fasaco_edge.mission.map.room_watch import update
+from fasaco_edge.mission.coverage.loop_closure import Motion
+from fasaco_edge.mission.rooms.room_book import RoomBook
+from fasaco_edge.mission.rooms.room_edits import move
+from fasaco_edge.mission.rooms.room_watch import update
 from tests.benchmarks.harness import add_floors
 from tests.benchmarks.rooms.homes import KINDS, RESOLUTION_M, Home, growing, home
 from tests.support.poses import composed

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fasaco_edge.config.config import PlannerConfig
-from fasaco_edge.mission.core.events import PlanReady, PlanRequest
-from fasaco_edge.mission.core.plan_requests import most_s
+from fasaco_edge.mission.events import PlanReady, PlanRequest
+from fasaco_edge.mission.path.plan_requests import most_s
 from fasaco_edge.planners.planner import CoveragePlanner, SearchProgress, StopRecorder, ignore
 from fasaco_edge.planners.registry import planner_of
 

@@ -29,10 +29,10 @@ from fasaco_edge.follow.sight import Mount, Sight
 from fasaco_edge.follow.standstill import Standstill
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import Event, MapReceived, PoseReceived
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.core.path_exit import PublishedPath
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.events import Event, MapReceived, PoseReceived
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.base import LaserScan, encode_scan
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid

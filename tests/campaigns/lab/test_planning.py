@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.config.config import PlannerConfig
-from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.cost import CoverageCost
 from tests.campaigns.lab.planning import PIECE_S, PLAN_S, LockStepPlanning
 from tests.campaigns.lab.settings import LabSettings

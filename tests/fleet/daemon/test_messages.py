@@ -20,7 +20,7 @@ from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
 from fasaco_edge.grid.lattice import Footprint
-from fasaco_edge.mission.core.events import MapReceived, Part
+from fasaco_edge.mission.events import MapReceived, Part
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.limits import (

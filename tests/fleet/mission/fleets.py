@@ -4,7 +4,7 @@ from random import Random
 
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.message import Messages
-from fasaco_edge.mission.core.events import MapReceived
+from fasaco_edge.mission.events import MapReceived
 from tests.mission.world import CONFIG, Drive, building, pose_at, reachable_cells
 
 MOST_TILES = 4

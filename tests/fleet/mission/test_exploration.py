@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived
-from fasaco_edge.mission.orders.order_state import OrderState
+from fasaco_edge.mission.events import MapReceived, MemberReceived
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CELL,
     CONFIG,

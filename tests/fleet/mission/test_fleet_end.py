@@ -13,7 +13,7 @@ from fasaco_edge.fleet.mission.message import waits_for
 from fasaco_edge.fleet.mission.shared_work import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.core.events import CommandReceived, MapReceived, Part, PriorityReceived
+from fasaco_edge.mission.events import CommandReceived, MapReceived, Part, PriorityReceived
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot
 from tests.fleet.mission.test_fleet import tiles_of

@@ -13,8 +13,8 @@ from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.layer import MANY_TAKEN
 from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.judge.floor import judge_floor
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part, State
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.events import MapReceived, MemberReceived, Part, State
 from tests.fleet.mission.test_fleet import tiles_of
 from tests.grid.test_floor import room
 from tests.mission.test_line import CELL_M, CONFIG, RADIUS_M, ROBOT, Robot, shifted

@@ -22,8 +22,8 @@ from fasaco_edge.fleet.mission.frames import (
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part, PoseReceived
 from fasaco_edge.mission.coverage.ledger import TILE
+from fasaco_edge.mission.events import MapReceived, MemberReceived, Part, PoseReceived
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
 from tests.mission.world import CELL, Drive, building

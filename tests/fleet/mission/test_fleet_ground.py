@@ -13,11 +13,11 @@ from fasaco_edge.fleet.mission.members import Members
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, MOST_TILES_OF_ONE, SharedProgress
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived, Part
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.events import MapReceived, MemberReceived, Part
 from fasaco_edge.mission.map.inputs import PATIENCE_S
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.world import CELL, building, pose_at, reachable_cells
 

@@ -10,8 +10,8 @@ from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.fleet.mission.traffic import PATIENCE_S
 from fasaco_edge.mission.config import Place
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived, State
-from fasaco_edge.mission.orders.order_state import OrderState, Stage
+from fasaco_edge.mission.events import MapReceived, MemberReceived, State
+from fasaco_edge.mission.work.order_state import OrderState, Stage
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
 

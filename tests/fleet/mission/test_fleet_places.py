@@ -17,9 +17,9 @@ from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.shared import MapPlace, SharedProgress
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
-from fasaco_edge.mission.company_kind import ALONE
-from fasaco_edge.mission.core.events import MapReceived
-from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.mission.core.company_kind import ALONE
+from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.documents.json_text import encode_json
 from tests.fleet.mission.test_fleet_frames import AT, bits_of

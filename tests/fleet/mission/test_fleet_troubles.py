@@ -9,7 +9,7 @@ import pytest
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
 from fasaco_edge.fleet.mission.traffic import OLD_S
-from fasaco_edge.mission.core.events import Part
+from fasaco_edge.mission.events import Part
 from tests.fleet.mission.fleets import FleetDrive
 from tests.mission.world import Drive as Alone
 from tests.mission.world import MapReceived, building, pose_at

@@ -4,7 +4,7 @@ import numpy as np
 
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.tiles import tile_bits
-from fasaco_edge.mission.core.events import MemberReceived
+from fasaco_edge.mission.events import MemberReceived
 from tests.mission.test_other_building import HERE, NEW, OLD, stand
 from tests.mission.world import Drive, pose_at
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.fleet.mission.kind import FleetKind
-from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
+from fasaco_edge.mission.events import MapReceived, State
 from tests.fleet.mission.test_fleet_floor import divided_by
 from tests.grid.test_floor import room
 from tests.mission.test_line import CELL_M, CONFIG, Robot

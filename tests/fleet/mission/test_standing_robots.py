@@ -14,9 +14,9 @@ from fasaco_edge.fleet.mission.shared import SharedProgress
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES
 from fasaco_edge.fleet.mission.traffic import OLD_S, PATIENCE_S, STANDS_S
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MapReceived, MemberReceived
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.mission.events import MapReceived, MemberReceived
 from tests.mission.world import CONFIG, Drive, building, pose_at, with_policy
 
 CELL_M, RADIUS_M = 0.25, 0.1

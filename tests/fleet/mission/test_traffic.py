@@ -8,8 +8,8 @@ import pytest
 from fasaco_edge.fleet.mission.refuge import refuge, without
 from fasaco_edge.fleet.mission.traffic import Neighbour, obstruction, spaced
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.mission.core.events import MemberReceived
-from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.mission.events import MemberReceived
 
 RADIUS_M, PACE_S_M = 0.2, 4.0
 

@@ -13,15 +13,15 @@ from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Polygon, Window, polygon_bounds
 from fasaco_edge.grid.lattice import BLOCKED, Cell, CoverageLattice
 from fasaco_edge.grid.polygons import area_m2
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.orders.exploration import Exploration, frontier, is_in_reach
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
-from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.work.exploration import Exploration, frontier, is_in_reach
+from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.map.room_raster import BLOCK, centres
+from fasaco_edge.mission.coverage.floor_tiles import centres
 from fasaco_edge.mission.orders.order import RoomArea, Zone
 from fasaco_edge.mission.orders.zones import cells_of
+from fasaco_edge.mission.rooms.room_raster import BLOCK
 
 MOST_PRIORITY = 100
 # Floor planned first may take this share of the time left, as lines are longer than estimated.

@@ -11,9 +11,9 @@ from dataclasses import replace
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
-from fasaco_edge.mission.map.room_book import LIKE_NUMBER, Room, RoomBook
 from fasaco_edge.mission.orders.order import MissionOrder, RoomArea, StandingZone, Zone
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
+from fasaco_edge.mission.rooms.room_book import LIKE_NUMBER, Room, RoomBook
 
 
 def is_named(order: MissionOrder) -> bool:

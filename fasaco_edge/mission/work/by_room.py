@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fasaco_edge.mission.config import ByRoom
-from fasaco_edge.mission.map.room_cells import RoomCells
+from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.planners.problem import CoverageProblem
 
 # Price of a step into another room, in units of a step with a quarter-turn. At this price robots

@@ -10,18 +10,18 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.lattice import UNKNOWN, Cell
+from fasaco_edge.grid.reachable_area import anchor_cell
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.coverage.unreached import OrderReach
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import anchor_cell
-from fasaco_edge.mission.orders.by_room import RoomPrice
-from fasaco_edge.mission.orders.cells_left import CellsLeft
-from fasaco_edge.mission.orders.exploration import Exploration
 from fasaco_edge.mission.orders.order import Errand
-from fasaco_edge.mission.orders.order_state import Stage
-from fasaco_edge.mission.orders.plan_scope import PlanScope
+from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.work.cells_left import CellsLeft
+from fasaco_edge.mission.work.exploration import Exploration
+from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.mission.work.plan_scope import PlanScope
+from fasaco_edge.mission.work.unreached import OrderReach
 from fasaco_edge.planners.problem import CoverageProblem
 
 # After this many paths in a row without a newly covered cell, the cells left wait for a retry. For

@@ -13,6 +13,8 @@ from msgspec import Meta
 
 from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.host.documents import misfits
+from fasaco_edge.mission.map.placing import are_same
+from fasaco_edge.mission.map.standing_places import NO_PLACES, PlacesNote
 from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     KeepOutDocument,
@@ -31,16 +33,10 @@ from fasaco_edge.mission.orders.order import (
     order_document,
     order_of,
 )
-from fasaco_edge.mission.orders.order_progress import (
-    NO_PLACES,
-    OrderProgress,
-    PlacesNote,
-    Stage,
-)
-from fasaco_edge.mission.orders.placing import are_same
-from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.mission.work.order_progress import OrderProgress, Stage
+from fasaco_edge.mission.work.reached_cells import ReachedCells
 
-__all__ = ["AT_HOME", "NO_ORDER", "NO_PLACES", "OrderState", "PlacesNote", "Stage"]
+__all__ = ["AT_HOME", "NO_ORDER", "OrderState", "Stage"]
 
 # Reason for being idle without autostart.
 NO_ORDER = "no order yet: start a mission"

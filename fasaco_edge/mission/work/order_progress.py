@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Self
 
-from fasaco_edge.mission.map.room_book import MOST_LISTED
+from fasaco_edge.mission.map.standing_places import NO_PLACES, PlacesNote
 from fasaco_edge.mission.orders.keep_outs import KeepOuts
 from fasaco_edge.mission.orders.order import Errand, MissionOrder, Zone
-from fasaco_edge.mission.orders.reached_cells import ReachedCells
+from fasaco_edge.mission.rooms.room_book import MOST_LISTED
+from fasaco_edge.mission.work.reached_cells import ReachedCells
 from fasaco_edge.planners.passes import Laid
 
 
@@ -20,27 +21,6 @@ class Stage(StrEnum):
     RETRYING = "retrying"
     RETURNING = "returning"
     OVER = "over"
-
-
-@dataclass(frozen=True, slots=True)
-class PlacesNote:
-    """Which map the places of the configuration belong to.
-
-    Attributes:
-        of: checksum of these places; "" while they belong to no map.
-        frame: frame of that map.
-        is_left: whether the map in that frame has shown another building since.
-        left_mask: checksum of a received keep-out mask, if the map in its frame has shown another
-            building since; else "".
-    """
-
-    of: str = ""
-    frame: str = ""
-    is_left: bool = False
-    left_mask: str = ""
-
-
-NO_PLACES = PlacesNote()
 
 
 @dataclass(frozen=True, slots=True)

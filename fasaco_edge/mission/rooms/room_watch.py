@@ -16,12 +16,12 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rooms import FoundRooms, find_rooms
 from fasaco_edge.grid.rotation import rotated_pose
-from fasaco_edge.mission.map.loop_closure import Motion
-from fasaco_edge.mission.map.room_book import MOST_NUMBER, RoomBook, RoomSheet
-from fasaco_edge.mission.map.room_edits import move
-from fasaco_edge.mission.map.room_matching import SETTLED, Matching, common_counts, slots_of
-from fasaco_edge.mission.map.room_outline import refresh, stale
-from fasaco_edge.mission.map.room_raster import (
+from fasaco_edge.mission.coverage.loop_closure import Motion
+from fasaco_edge.mission.rooms.room_book import MOST_NUMBER, RoomBook, RoomSheet
+from fasaco_edge.mission.rooms.room_edits import move
+from fasaco_edge.mission.rooms.room_matching import SETTLED, Matching, common_counts, slots_of
+from fasaco_edge.mission.rooms.room_outline import refresh, stale
+from fasaco_edge.mission.rooms.room_raster import (
     MOST_SQUARES,
     Cut,
     RoomRaster,

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.orders.by_room import RoomPrice
-from fasaco_edge.mission.orders.cells_left import CellsLeft, visits_due
-from fasaco_edge.mission.orders.order_state import OrderState
-from fasaco_edge.mission.orders.worth import WorthFirst
+from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.work.cells_left import CellsLeft, visits_due
+from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.worth import WorthFirst
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 

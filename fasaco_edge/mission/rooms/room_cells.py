@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.rotation import rotated_points
-from fasaco_edge.mission.map.room_raster import BLOCK, NOWHERE, RoomRaster, centres
-from fasaco_edge.mission.map.room_watch import RoomWatch
+from fasaco_edge.mission.coverage.floor_tiles import centres
+from fasaco_edge.mission.rooms.room_raster import BLOCK, NOWHERE, RoomRaster
+from fasaco_edge.mission.rooms.room_watch import RoomWatch
 
 
 class RoomCells:

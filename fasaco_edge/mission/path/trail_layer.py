@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.events import PathUpdate, PlanRequest
-from fasaco_edge.mission.core.route import NO_CELLS, Route
-from fasaco_edge.mission.map.loop_closure import Motion
+from fasaco_edge.mission.coverage.loop_closure import Motion
+from fasaco_edge.mission.events import PathUpdate, PlanRequest
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.path.route import NO_CELLS, Route
 from fasaco_edge.planners.living_trail import LivingTrail, TrailSnapshot
 from fasaco_edge.planners.path import CoveragePath
 

@@ -10,24 +10,24 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.events import (
+from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.mission.coverage.loop_closure import Motion, moved_cells
+from fasaco_edge.mission.events import (
     BETTER,
     PathUpdate,
     PlanBroken,
     PlanReady,
     PlanRequest,
 )
-from fasaco_edge.mission.core.plan_requests import (
+from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.path.plan_requests import (
     BROKEN_S,
     Attempt,
     PlanRequests,
     SpareTime,
 )
-from fasaco_edge.mission.coverage.progress import PathProgress
-from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
-from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.work.progress import PathProgress
+from fasaco_edge.mission.work.sequencer import Sequencer
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
 

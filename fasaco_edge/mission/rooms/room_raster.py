@@ -18,7 +18,8 @@ from fasaco_edge.grid.geometry import GridGeometry, Point, Window
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.rooms import FoundRooms
-    from fasaco_edge.mission.map.loop_closure import Motion
+    from fasaco_edge.mission.coverage.floor_tiles import centres
+from fasaco_edge.mission.coverage.loop_closure import Motion
 
 # Limit on the squares of a raster; a larger building gets wider squares.
 MOST_SQUARES = 1_000_000
@@ -108,12 +109,6 @@ class RoomRaster:
             found = self.at(np.stack(motion.back(1.0, *centres(part, side).T), axis=1))
             ids[part.slices_in(whole)] = found.reshape(part.rows, part.cols)
         return replace(self, window=whole, ids=ids).cropped()
-
-
-def centres(window: Window, square_m: float) -> NDArray[np.float64]:
-    """Return the centres x, y [m] of a window's squares, float64 (n, 2), row by row."""
-    rows, cols = np.mgrid[window.row0 : window.row1, window.col0 : window.col1]
-    return (np.stack((cols.ravel(), rows.ravel()), axis=1) + 0.5) * square_m
 
 
 def window_over(geometry: GridGeometry, square_m: float) -> Window:

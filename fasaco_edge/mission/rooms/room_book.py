@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Self
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
-from fasaco_edge.mission.map.room_raster import Cut, RoomRaster
 from fasaco_edge.mission.orders.keep_outs import name_faults
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
+from fasaco_edge.mission.rooms.room_raster import Cut, RoomRaster
 from fasaco_edge.planners.passes import Pass
 
 if TYPE_CHECKING:
-    from fasaco_edge.mission.map.loop_closure import Motion
+    from fasaco_edge.mission.coverage.loop_closure import Motion
 
 # Limits on the rooms and cuts of a sheet, and on the number of a room, which has 16 bits.
 MOST_ROOMS, MOST_CUTS, MOST_NUMBER = 250, 100, 65_000

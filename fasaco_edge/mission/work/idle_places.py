@@ -12,8 +12,8 @@ from fasaco_edge.grid.geometry import GridGeometry, Polygon, Window, polygon_bou
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.orders.mask import mask_frame, mask_polygons
-from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.zones import near_polygons
+from fasaco_edge.mission.work.order_state import OrderState
 
 # Least time between two checks of the same places [s], as a growing map changes often.
 PERIOD_S = 1.0

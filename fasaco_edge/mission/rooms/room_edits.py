@@ -12,13 +12,20 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.kernels.lattice.areas import find_areas
-from fasaco_edge.mission.map.room_book import LEAST_M2, MOST_CUTS, USUAL, Room, RoomBook, RoomSheet
-from fasaco_edge.mission.map.room_matching import spread
-from fasaco_edge.mission.map.room_outline import refresh
-from fasaco_edge.mission.map.room_raster import Cut, RoomRaster, cut_window, is_cut
+from fasaco_edge.mission.rooms.room_book import (
+    LEAST_M2,
+    MOST_CUTS,
+    USUAL,
+    Room,
+    RoomBook,
+    RoomSheet,
+)
+from fasaco_edge.mission.rooms.room_matching import spread
+from fasaco_edge.mission.rooms.room_outline import refresh
+from fasaco_edge.mission.rooms.room_raster import Cut, RoomRaster, cut_window, is_cut
 
 if TYPE_CHECKING:
-    from fasaco_edge.mission.map.loop_closure import Motion
+    from fasaco_edge.mission.coverage.loop_closure import Motion
 
 Mask = NDArray[np.bool_]
 

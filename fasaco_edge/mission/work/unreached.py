@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.changes import carried_copy
 from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Window
 from fasaco_edge.grid.lattice import BLOCKED, UNKNOWN, Cell, CoverageLattice
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
+from fasaco_edge.mission.coverage.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.map.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import MissionOrder
-from fasaco_edge.mission.orders.order_state import NO_ORDER, OrderState, Stage
-from fasaco_edge.mission.orders.reached_cells import ReachedCells
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState, Stage
+from fasaco_edge.mission.work.reached_cells import ReachedCells
 
 # Limit on the areas listed, the largest first; the rest are only counted.
 MOST_AREAS = 20

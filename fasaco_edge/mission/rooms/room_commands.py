@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fasaco_edge.errors import CommandError
-from fasaco_edge.mission.map.room_book import RoomBook, RoomSettings
 from fasaco_edge.mission.orders.passes import passes_of
 from fasaco_edge.mission.orders.room_requests import RoomRequest
+from fasaco_edge.mission.rooms.room_book import RoomBook, RoomSettings
 
 # Commands that need the map and the kernels.
 ON_MAP = frozenset(("room_split", "room_merge"))
@@ -42,7 +42,7 @@ def carry_out(book: RoomBook, command: str, asked: RoomRequest) -> None:
             book.set(asked.id, RoomSettings(passes, kinds, skip, priority))
         case _:
             # Imports kernels, which a daemon without a map has not loaded.
-            from fasaco_edge.mission.map.room_edits import merge, split  # noqa: PLC0415
+            from fasaco_edge.mission.rooms.room_edits import merge, split  # noqa: PLC0415
 
             if command == "room_split":
                 assert asked.cut is not None

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.mission.core.events import PlanBroken, PlanRequest
-from fasaco_edge.mission.coverage.progress import PathProgress
-from fasaco_edge.mission.orders.sequencer import Sequencer
+from fasaco_edge.mission.events import PlanBroken, PlanRequest
+from fasaco_edge.mission.work.progress import PathProgress
+from fasaco_edge.mission.work.sequencer import Sequencer
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.walk_before import HELD_CELLS
 

@@ -9,20 +9,20 @@ from functools import partial
 import numpy as np
 
 from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
+from fasaco_edge.mission.coverage.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.map.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.map.reachable_area import ReachableArea
-from fasaco_edge.mission.map.room_book import MOST_LISTED
-from fasaco_edge.mission.orders.by_room import RoomPrice
-from fasaco_edge.mission.orders.cells_left import LeftBehind, zones_beyond
+from fasaco_edge.mission.map.placing import left_out
 from fasaco_edge.mission.orders.order import Zone
-from fasaco_edge.mission.orders.order_state import AT_HOME, OrderState, Stage
-from fasaco_edge.mission.orders.placing import left_out
-from fasaco_edge.mission.orders.present_part import MAX_IN_VAIN, PresentPart
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.rooms.room_book import MOST_LISTED
+from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.work.cells_left import LeftBehind, zones_beyond
+from fasaco_edge.mission.work.order_state import AT_HOME, OrderState, Stage
+from fasaco_edge.mission.work.present_part import MAX_IN_VAIN, PresentPart
 
 # A robot is shut in if it can reach less than this share of the area that it could ever reach:
 # MOST_SHARE, or HOME_SHARE if home is in reach, as a door to another room may be closed.

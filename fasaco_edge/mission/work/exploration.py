@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Polygon, Window
 from fasaco_edge.grid.lattice import UNKNOWN, Cell, beside, mask_of
-from fasaco_edge.mission.map.reachable_area import ReachableArea
+from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.kernels.rooms.regions import grow
-from fasaco_edge.mission.map.room_book import (
+from fasaco_edge.mission.rooms.room_book import (
     LEAST_M2,
     MOST_NUMBER,
     MOST_ROOMS,
@@ -33,7 +33,7 @@ from fasaco_edge.mission.map.room_book import (
     RoomBook,
     RoomSheet,
 )
-from fasaco_edge.mission.map.room_raster import BLOCK, Ids, RoomRaster, cut_window, is_cut
+from fasaco_edge.mission.rooms.room_raster import BLOCK, Ids, RoomRaster, cut_window, is_cut
 
 Labels = NDArray[np.int32]
 

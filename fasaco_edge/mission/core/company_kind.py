@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fasaco_edge.mission.company import Company, OthersCells, Waiting
+from fasaco_edge.mission.company import Company, Waiting
+from fasaco_edge.mission.coverage.others_cells import OthersCells
 
 if TYPE_CHECKING:
     # For types only: an idle daemon loads no kernels.
     from fasaco_edge.mission.config import MissionConfig
-    from fasaco_edge.mission.core.route import Route
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
     from fasaco_edge.mission.map.map_state import MapState
-    from fasaco_edge.mission.orders.sequencer import Sequencer
+    from fasaco_edge.mission.path.route import Route
+    from fasaco_edge.mission.work.sequencer import Sequencer
 
 
 class CompanyKind:

@@ -1,0 +1,72 @@
+"""Cells of others: what other robots have swept, a part of the ledger; here for a single robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Window
+from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
+
+Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
+
+
+class OthersCells:
+    """The cells that other robots have swept, a part of the ledger; here none.
+
+    The ledger keeps cells from an earlier fleet until this robot forgets cells of its own: a fleet
+    that it joins again would count the forgotten cells as swept.
+
+    Attributes:
+        version: counter of changes.
+        epoch: changes whenever this robot forgets cells.
+    """
+
+    version = epoch = 0
+
+    def __init__(self) -> None:
+        self._kept = b""
+
+    def swept(self, window: Window) -> NDArray[np.bool_]:
+        """Return which cells of ``window`` others have swept, bool (rows, cols), read-only."""
+        return np.zeros((window.rows, window.cols), np.bool_)
+
+    def begin(self, epoch: int) -> None:
+        """Start an epoch with a number new to this robot's ledgers; a restored epoch stays."""
+
+    def note_forgotten(self) -> None:
+        """Note that this robot has forgotten some of its own cells."""
+        self._kept = b""
+
+    def disregard(self, inside: Inside) -> None:
+        """Disregard all earlier sweeps of the cells that a mask function selects."""
+
+    def clear(self) -> None:
+        """Forget all that others reported: it belongs to another frame or building."""
+        self._kept = b""
+
+    def enter(self, frame: str) -> None:
+        """Note the active frame."""
+
+    def leave_building(self, frame: str) -> None:
+        """Note that the map in a frame shows another building: cells of others lie elsewhere."""
+        self._kept = b""
+
+    def begin_anew(self) -> None:
+        """Accept the next map as one that others share."""
+        self._kept = b""
+
+    def snapshot(self, cell_m: float) -> LedgerSnapshot:
+        """Return the cells swept by others as one ledger."""
+        return LedgerSnapshot(cell_m, "", 0, MappingProxyType({}))
+
+    def encode(self) -> bytes:
+        """Return everything as bytes, to be stored with the ledger; b"" for nothing."""
+        return self._kept
+
+    def resume(self, kept: bytes) -> None:
+        """Restore the bytes of ``encode``."""
+        self._kept = kept

@@ -1,0 +1,1 @@
+"""Path in force: requests for plans, the published path, and the trail from which ants start."""
