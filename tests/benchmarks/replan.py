@@ -108,7 +108,7 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
     from fasaco_edge.mission.line.line_ahead import LineAhead
     from fasaco_edge.mission.line.polisher import Polisher
     from fasaco_edge.mission.line.tally import SweepTally
-    from fasaco_edge.mission.map.ground import Ground
+    from fasaco_edge.mission.map.ground import MissionGround
     from fasaco_edge.mission.map.map_state import MapState
     from fasaco_edge.mission.path.route import Route
     from fasaco_edge.mission.path.trail_layer import TrailLayer
@@ -116,7 +116,7 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
 
     return (
         ("ingest", MapState, "take_map"),
-        ("floor", Ground, "follow"),
+        ("floor", MissionGround, "follow"),
         ("reach", MapState, "update_area"),
         ("reach", ReachableArea, "change_since"),
         ("orders", Sequencer, "note_area"),

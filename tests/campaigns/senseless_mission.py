@@ -44,7 +44,7 @@ from fasaco_edge.mission.events import (
     PlanRequest,
     PoseReceived,
 )
-from fasaco_edge.mission.map.ground import Ground
+from fasaco_edge.mission.map.ground import MissionGround
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.planners.planner import ColonySnapshot, SearchProgress, StopRecorder
@@ -343,7 +343,7 @@ class MissionTrial:
         grid = mission.map.grid
         if grid is None or mission.lattice is None or keeps_out:
             return
-        fresh = Ground(mission.rotation.config(self._config))
+        fresh = MissionGround(mission.rotation.config(self._config))
         fresh.begin(grid)
         geometry = grid.geometry
         for name in ("window", "states", "steps"):

@@ -7,14 +7,14 @@ import math
 import pytest
 
 from fasaco_edge.mission.coverage.segments import SHORT_M, beside_m, corner_between
-from fasaco_edge.mission.coverage.steady_track import Place
+from fasaco_edge.mission.coverage.steady_track import Position
 
 FAR_M = 100.0
 
 
 def between(end, yaws, farthest_m=FAR_M):
     """The places at the origin and at ``end``, with its headings there."""
-    return Place(0.0, 0.0, 0.0, 0.0, yaws[0]), Place(*end, 0.0, farthest_m, yaws[1])
+    return Position(0.0, 0.0, 0.0, 0.0, yaws[0]), Position(*end, 0.0, farthest_m, yaws[1])
 
 
 @pytest.mark.parametrize("yaws", [(0.0, 0.0), (0.0, 1.0), (-0.5, 0.0)])

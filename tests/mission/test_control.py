@@ -128,7 +128,7 @@ def test_the_robot_never_drives_into_a_keep_out_zone():
     follow(drive)
     assert not set(drive.driven) & cells(1, 3, 4, 5)
     assert drive.visited == cells(0, 0, 6, 8) - cells(1, 3, 4, 5)
-    (area,) = drive.mission.orders.unreached().areas
+    (area,) = drive.mission.orders.uncovered.found().areas
     assert (area.cells, area.reason) == (6, "in a keep-out zone")
     assert area.cell in cells(1, 3, 4, 5)
 
@@ -137,7 +137,7 @@ def test_cells_behind_a_keep_out_are_not_blamed_on_obstacles():
     drive = idle("........", "...#....")
     drive.command("start", {"keep_out": [rectangle(0, 4, 2, 5)]})
     follow(drive)
-    found = {(area.reason, area.cells) for area in drive.mission.orders.unreached().areas}
+    found = {(area.reason, area.cells) for area in drive.mission.orders.uncovered.found().areas}
     assert found == {("in a keep-out zone", 2), ("closed off by a keep-out zone", 6)}
 
 
@@ -329,7 +329,7 @@ def test_cancel_stops_drops_the_order_and_keeps_the_coverage():
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "cancelled")
     assert len(drive.visited) == 6
     assert drive.tell(patch("#", at=(0, 0)), after=100.0).plan is None
-    assert drive.mission.orders.unreached().areas == ()
+    assert drive.mission.orders.uncovered.found().areas == ()
 
 
 def test_reset_forgets_what_is_covered_too():
@@ -391,7 +391,7 @@ def test_unknown_parts_of_a_zone_are_named():
     drive = idle("..??", "..??")
     drive.command("start", {"zones": [{"name": "all", "polygon": rectangle(0, 0, 2, 4)}]})
     follow(drive)
-    (area,) = drive.mission.orders.unreached().areas
+    (area,) = drive.mission.orders.uncovered.found().areas
     assert (area.cells, area.reason) == (4, "unknown to the map")
 
 
@@ -538,7 +538,7 @@ def test_an_unseen_zone_is_searched_for():
     assert drive.request.problem.cells == 1
     explore(drive, mapper)
     assert cells(0, 7, 3, 9) <= drive.visited
-    assert drive.mission.orders.unreached().areas == ()
+    assert drive.mission.orders.uncovered.found().areas == ()
     assert not drive.visited & {(3, 0), (4, 0), (4, 1)}, "the rest of the house was not asked for"
 
 
@@ -548,7 +548,7 @@ def test_a_zone_without_a_way_to_it_is_given_up_once_all_is_seen():
     drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 7, 2, 9)}]})
     mapper.rows = tuple(line[:6] + "######" for line in HOUSE)
     explore(drive, mapper)
-    assert [area.reason for area in drive.mission.orders.unreached().areas] in (
+    assert [area.reason for area in drive.mission.orders.uncovered.found().areas] in (
         [],
         ["unknown to the map"],
     )

@@ -18,7 +18,7 @@ from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
 from fasaco_edge.mission.core.path_exit import PublishedPath
 from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.line.curver import Curver
-from fasaco_edge.mission.line.polyline import CURVED, POLISHED, Line, edges_between
+from fasaco_edge.mission.line.polyline import CURVED, POLISHED, Polyline, edges_between
 from fasaco_edge.planners.curve_config import CurveConfig
 from fasaco_edge.planners.curves import STEP_M
 from tests.mission.curve_base import CONFIG, RADIUS_M, TOOL_M, TURN_M, CurvedMission, configured
@@ -122,7 +122,7 @@ def laid(line_xy):
     points = np.array([map_to_raster(floor.geometry, x, y) for x, y in line_xy])
     numbers, state = np.zeros(len(points), np.int64), np.full(len(points), POLISHED, np.uint8)
     ahead.tally.exchange(edges_between(ahead.line.points), edges_between(points))
-    ahead._whole = Line(points, numbers, state)
+    ahead._whole = Polyline(points, numbers, state)
     ahead._see(Pose2D(*line_xy[0]))
     return ahead, floor
 

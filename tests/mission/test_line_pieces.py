@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.mission.line.pieces import Joiner, Piece, kept_pieces
-from fasaco_edge.mission.line.polyline import POLISHED, RAW, Line
+from fasaco_edge.mission.line.polyline import POLISHED, RAW, Polyline
 
 
 def cells(*places):
@@ -33,11 +33,11 @@ def over(walk):
 def polished(walk):
     """Return a line a little beside the stands."""
     points, numbers = over(walk)
-    return Line(points + np.array((0.5, 0.0)), numbers, np.full(len(walk), POLISHED, np.uint8))
+    return Polyline(points + np.array((0.5, 0.0)), numbers, np.full(len(walk), POLISHED, np.uint8))
 
 
 def join(walk, pieces, is_clear=lambda a, b: True):
-    here = Line(stand(walk[0])[None], np.array([0]), np.array([POLISHED], np.uint8))
+    here = Polyline(stand(walk[0])[None], np.array([0]), np.array([POLISHED], np.uint8))
     joiner = Joiner(here, walk, 0, stand, over, is_clear, lambda cell: False, no_way)
     return joiner.joined(pieces)
 
@@ -165,7 +165,7 @@ def test_a_walk_of_one_cell_is_a_line_of_one_stand():
 
 def test_behind_a_pillar_the_line_begins_with_the_way_round_it():
     walk = cells(*lane(0, range(6)))
-    here = Line(np.array([[-9.0, 0.0]]), np.array([0]), np.array([POLISHED], np.uint8))
+    here = Polyline(np.array([[-9.0, 0.0]]), np.array([0]), np.array([POLISHED], np.uint8))
 
     def is_clear(a, b):  # the robot's place sees a corner alone
         return (a != here.points[0]).any()

@@ -9,7 +9,7 @@ from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.orders.keep_outs import KeepOut
-from fasaco_edge.mission.work.unreached import viewpoints
+from fasaco_edge.mission.work.uncovered import viewpoints_beside
 from tests.mission.world import (
     CELL,
     CONFIG,
@@ -35,7 +35,7 @@ def drives(*rows, cell=(0, 0), config=RETRIES):
 
 
 def reasons(drive):
-    return [(area.cells, area.reason) for area in drive.mission.orders.unreached().areas]
+    return [(area.cells, area.reason) for area in drive.mission.orders.uncovered.found().areas]
 
 
 def test_a_room_with_a_shut_door_is_tried_again_later():
@@ -99,7 +99,7 @@ def test_cells_that_were_never_reachable_are_not_waited_for():
     drive.run(State.DONE)
     assert drive.now < 5.0
     assert reasons(drive) == [(4, "closed off by obstacles")]
-    (area,) = drive.mission.orders.unreached().areas
+    (area,) = drive.mission.orders.uncovered.found().areas
     assert area.cell in {(row, col) for row in (0, 1) for col in (4, 5)}
 
 
@@ -201,12 +201,12 @@ def test_closed_areas_are_looked_at_from_beside_them():
     reachable[0:2] = True
     closed[2:4, 1:3] = True
     closed[2, 5] = True
-    assert viewpoints(closed, reachable) == [(1, 2)]
+    assert viewpoints_beside(closed, reachable) == [(1, 2)]
     closed[4:6, 4:6] = True  # out of sight
-    assert viewpoints(closed, reachable) == [(1, 2)]
-    assert viewpoints(~reachable, reachable) == [(1, 3)]
-    assert viewpoints(~reachable, np.zeros((6, 6), bool)) == []
-    assert viewpoints(np.zeros((0, 0), bool), np.zeros((0, 0), bool)) == []
+    assert viewpoints_beside(closed, reachable) == [(1, 2)]
+    assert viewpoints_beside(~reachable, reachable) == [(1, 3)]
+    assert viewpoints_beside(~reachable, np.zeros((6, 6), bool)) == []
+    assert viewpoints_beside(np.zeros((0, 0), bool), np.zeros((0, 0), bool)) == []
 
 
 def test_cells_beside_a_keep_out_are_not_blamed_on_an_obstacle():

@@ -221,10 +221,10 @@ def test_a_robot_that_stops_short_is_resent_a_few_times():
     assert drive.mission.state is State.DONE
     ending = "66 % of 0.2 m2 covered; 0.1 m2 not reached: left over after 4 tries (0.1 m2)"
     assert drive.mission.reason == ending
-    (area,) = drive.mission.orders.unreached().areas
+    (area,) = drive.mission.orders.uncovered.found().areas
     assert (area.cells, area.cell, area.reason) == (1, (0, 2), "left over after 4 tries")
     drive.tell(pose_at(0, 2))
-    assert drive.mission.orders.unreached().areas == ()
+    assert drive.mission.orders.uncovered.found().areas == ()
 
 
 def test_a_map_that_jumps_far_away_takes_no_memory_in_between():

@@ -17,7 +17,7 @@ from fasaco_edge.grid.polygons import polygon_flaw
 from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.mission.events import CommandReceived, MapReceived, PoseReceived
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
-from fasaco_edge.mission.work.unreached import MOST_AREAS, MOST_VIEWPOINTS, viewpoints
+from fasaco_edge.mission.work.uncovered import MOST_AREAS, MOST_VIEWPOINTS, viewpoints_beside
 
 FOOTPRINT = Footprint(0.3, 0.14)
 # Pixels of a chamber's side with one wall; it holds a few cells.
@@ -79,7 +79,7 @@ def test_viewpoints_are_found_at_once(side):
     for row in (0, 1):
         for col in (0, 1):
             closed[row::4, col::4] = True
-    found, count = calls_of(viewpoints, closed, ~closed)
+    found, count = calls_of(viewpoints_beside, closed, ~closed)
     assert len(found) == min(side**2, MOST_VIEWPOINTS)
     assert count < 50
 

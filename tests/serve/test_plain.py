@@ -8,7 +8,7 @@ import pytest
 
 from fasaco_edge.daemon.loop import mission_reports
 from fasaco_edge.mission.line import unswept
-from fasaco_edge.mission.work import unreached
+from fasaco_edge.mission.work import uncovered
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
 from fasaco_edge.wire.documents.replies import STATES, TROUBLES
@@ -56,13 +56,13 @@ def test_a_room_that_is_waited_for_is_named():
 def test_all_reasons_for_floor_left_have_an_owners_words():
     reasons = {
         *unswept.OUT_OF_REACH.values(),
-        *unreached.REASONS.values(),
+        *uncovered.REASONS.values(),
         mission_reports.PASSED,
         mission_reports.BESIDE,
     }
     assert reasons == set(plain.LEFT)
     assert {mission_reports.ON_PATH, *mission_reports.LATER} == set(plain.TO_COME)
-    assert unreached.LEFT_OVER.startswith(plain.TRIED)
+    assert uncovered.LEFT_OVER.startswith(plain.TRIED)
     assert not [text for text in (*plain.LEFT.values(), plain.ENDED) if TECHNICAL.search(text)]
     of_floor = {*unswept.OUT_OF_REACH.values(), mission_reports.PASSED, mission_reports.BESIDE}
     assert set(plain.MARKS) == of_floor | set(plain.TO_COME)

@@ -230,7 +230,7 @@ def _zones(mission: Mission | None, order_state: OrderState) -> Iterator[ZoneRep
 def _unreached(mission: Mission | None) -> UnreachedReport:
     if mission is None or mission.lattice is None:
         return UnreachedReport()
-    found, cell_m = mission.orders.unreached(), mission.lattice.cell_m
+    found, cell_m = mission.orders.uncovered.found(), mission.lattice.cell_m
     areas = tuple(
         UnreachedArea(
             area.cells,

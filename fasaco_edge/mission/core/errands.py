@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
-from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.standing import Standing
-from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.core.parts import Parts
 from fasaco_edge.mission.events import Doing, PathUpdate, State
-from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import Errand
-from fasaco_edge.mission.path.route import NO_CELLS, Route
-from fasaco_edge.mission.work.sequencer import Sequencer
+from fasaco_edge.mission.path.route import NO_CELLS
 
 # An errand ends this long after the robot enters the last cell [s]. Meanwhile the robot drives to
 # the centre of the cell and turns.
@@ -26,17 +21,13 @@ NO_WAY = "no way {}: waits for a map that shows one"
 PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 
-@dataclass(frozen=True, slots=True)
 class Errands:
     """Begins, drives and ends errands."""
 
-    map: MapState
-    monitor: InputMonitor
-    orders: Sequencer
-    route: Route
-    charging: Charging
-    standing: Standing
-    way_out: WayOut
+    def __init__(self, parts: Parts) -> None:
+        self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
+        self.route, self.charging, self.way_out = parts.route, parts.charging, parts.way_out
+        self.standing = parts.standing
 
     def consider_charging(self, state: State, now: float) -> None:
         """Begin to charge if due, and end charging if the battery suffices."""

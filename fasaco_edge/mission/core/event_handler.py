@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 from fasaco_edge.errors import FasacoError, LedgerMismatchError, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.company import Company
-from fasaco_edge.mission.core.charging import BatteryGauge
-from fasaco_edge.mission.core.order_changes import OTHERS_FIRST, OrderChanges
-from fasaco_edge.mission.core.standing import BlockedFollower
-from fasaco_edge.mission.core.way_out import WayOut
-from fasaco_edge.mission.coverage.drive_meter import DriveMeter, Driven
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.core.order_changes import OTHERS_FIRST
+from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.coverage.drive_meter import Driven
 from fasaco_edge.mission.events import (
     Answer,
     BatteryReceived,
@@ -34,39 +30,24 @@ from fasaco_edge.mission.events import (
     PriorityReceived,
     in_runs,
 )
-from fasaco_edge.mission.line.layer import LineLayer
-from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.path.route import Route
-from fasaco_edge.mission.path.trail_layer import TrailLayer
-from fasaco_edge.mission.rooms.room_watch import RoomWatch
-from fasaco_edge.mission.work.sequencer import Sequencer
 
 
-@dataclass(slots=True, eq=False)
 class EventHandler:
-    """Applies events, one after the other, to map, ledger, monitor, orders and route."""
+    """Applies events, one after the other, to the parts of a mission."""
 
-    map: MapState
-    ledger: MissionLedger
-    monitor: InputMonitor
-    orders: Sequencer
-    route: Route
-    line: LineLayer
-    trail: TrailLayer
-    drive: DriveMeter
-    company: Company
-    battery: BatteryGauge
-    way_out: WayOut
-    blocked: BlockedFollower
-    changes: OrderChanges
-    rooms: RoomWatch
-    _now: float = field(default=0.0, init=False)
-    # Results of the events of one step.
-    _path: PathUpdate | None = field(default=None, init=False)
-    _faults: list[FasacoError] = field(default_factory=list, init=False)
-    _answers: list[Answer] = field(default_factory=list, init=False)
-    _is_forgotten: bool = field(default=False, init=False)
+    def __init__(self, parts: Parts) -> None:
+        self.map, self.ledger, self.monitor = parts.map, parts.ledger, parts.monitor
+        self.orders, self.route, self.line = parts.orders, parts.route, parts.line
+        self.trail, self.company, self.changes = parts.trail, parts.company, parts.changes
+        self.way_out, self.blocked = parts.way_out, parts.blocked
+        self.drive, self.battery = parts.lasting.drive, parts.lasting.battery
+        self.rooms = parts.lasting.rooms
+        self._now = 0.0
+        # Results of the events of one step.
+        self._path: PathUpdate | None = None
+        self._faults: list[FasacoError] = []
+        self._answers: list[Answer] = []
+        self._is_forgotten = False
 
     def handle(self, events: Iterable[Event], now: float) -> Decision:
         """Apply events at ``now`` [s]; return their immediate results.
@@ -163,7 +144,7 @@ class EventHandler:
         before = self._compare_buildings()
         if before is not None and (self.map.has_moved or self.map.building.is_foreign):
             self.ledger.note_map_motion(before)
-            self.orders.note_map_motion()
+            self.orders.reach.note_map_motion()
             self.trail.note_map_motion()
             self.route.note_map_motion()
             self.way_out.begin_anew()

@@ -3,33 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.company import Company, Waiting
-from fasaco_edge.mission.core.charging import Charging
 from fasaco_edge.mission.core.errands import Errands
-from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.order_work import OrderWork
+from fasaco_edge.mission.core.parts import Parts
 from fasaco_edge.mission.core.path_checks import PathChecks
-from fasaco_edge.mission.core.standing import BlockedFollower, Standing
-from fasaco_edge.mission.core.time_limit import TimeLimit
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
-from fasaco_edge.mission.core.way_out import WayOut
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.events import Decision, Doing, PathUpdate, State
-from fasaco_edge.mission.line.layer import LineLayer
-from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.work.order_state import Stage
-from fasaco_edge.mission.work.sequencer import Sequencer
 
 # States in which the robot rests: by command, at the end of its order, or to charge.
 STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))
 
 
-@dataclass(slots=True, eq=False)
 class Executive:
     """Decides by ``RULES``; owns the mission's state.
 
@@ -38,51 +25,20 @@ class Executive:
         troubles: current troubles; read-only.
     """
 
-    map: MapState
-    ledger: MissionLedger
-    monitor: InputMonitor
-    orders: Sequencer
-    route: Route
-    line: LineLayer
-    company: Company
-    charging: Charging
-    time_limit: TimeLimit
-    giving_way: Waiting
-    dock: InDock
-    way_out: WayOut
-    blocked: BlockedFollower
-    mask_frame: str
-    troubles: Troubles = field(init=False)
-    _state: State = field(default=State.WAITING_FOR_MAP, init=False)
-    _reason: str = field(default="no map yet", init=False)
-    _standing: Standing = field(init=False)
-    _checks: PathChecks = field(init=False)
-    _errands: Errands = field(init=False)
-    _work: OrderWork = field(init=False)
-    # State of this step: the time [s], the robot's cell once known, the path made so far.
-    _now: float = field(default=0.0, init=False)
-    _cell: Cell = field(default=(0, 0), init=False)
-    _update: PathUpdate | None = field(default=None, init=False)
-
-    def __post_init__(self) -> None:
-        driven = self.map, self.monitor, self.orders, self.route
-        self._standing = standing = Standing(self.map, self.route)
-        self._checks = PathChecks(
-            self.ledger, self.monitor, self.orders, self.route, self.line, standing
-        )
-        self._errands = Errands(*driven, self.charging, standing, self.way_out)
-        self._work = OrderWork(*driven, self.line, self.company, self._errands, self.way_out)
-        self.troubles = Troubles(
-            self.map,
-            self.monitor,
-            self.charging,
-            self.giving_way,
-            self._standing,
-            self.dock,
-            self.way_out,
-            self.line.offset,
-            self.blocked,
-        )
+    def __init__(self, parts: Parts, mask_frame: str) -> None:
+        self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
+        self.route, self.company, self.charging = parts.route, parts.company, parts.charging
+        self.time_limit, self.giving_way, self.dock = parts.time_limit, parts.giving_way, parts.dock
+        self.way_out, self.blocked, self.mask_frame = parts.way_out, parts.blocked, mask_frame
+        self._standing, self._checks = parts.standing, PathChecks(parts)
+        self._errands = Errands(parts)
+        self._work = OrderWork(parts, self._errands)
+        self.troubles = Troubles(parts)
+        self._state, self._reason = State.WAITING_FOR_MAP, "no map yet"
+        # State of this step: the time [s], the robot's cell once known, the path made so far.
+        self._now = 0.0
+        self._cell: Cell = 0, 0
+        self._update: PathUpdate | None = None
 
     def succeed(self, before: Executive) -> None:
         """Continue where another mission ended; a docked robot stays docked."""

@@ -14,24 +14,18 @@ from fasaco_edge.grid.geometry import StampedPose
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
-from fasaco_edge.mission.core.charging import BatteryGauge, Charging
+from fasaco_edge.mission.core.charging import BatteryGauge
 from fasaco_edge.mission.core.company_kind import ALONE, CompanyKind
 from fasaco_edge.mission.core.event_handler import EventHandler
 from fasaco_edge.mission.core.executive import Executive
-from fasaco_edge.mission.core.in_dock import InDock
 from fasaco_edge.mission.core.lattice_layout import LatticeLayout
 from fasaco_edge.mission.core.lattice_rotation import LatticeRotation
-from fasaco_edge.mission.core.order_changes import OrderChanges
-from fasaco_edge.mission.core.standing import BlockedFollower
-from fasaco_edge.mission.core.time_limit import TimeLimit
+from fasaco_edge.mission.core.parts import Lasting, laid_parts
 from fasaco_edge.mission.core.trouble import Trouble
-from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.coverage.counts import Coverage
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
-from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.events import (
     Decision,
     Event,
@@ -41,20 +35,12 @@ from fasaco_edge.mission.events import (
     PriorityReceived,
     State,
 )
-from fasaco_edge.mission.line.layer import LineLayer
-from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.placing import restored
 from fasaco_edge.mission.orders.mask import mask_frame
-from fasaco_edge.mission.path.route import Route
-from fasaco_edge.mission.path.trail_layer import TrailLayer
 from fasaco_edge.mission.rooms.room_book import RoomBook
-from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.rooms.room_watch import RoomWatch
-from fasaco_edge.mission.work.by_room import RoomPrice
 from fasaco_edge.mission.work.idle_places import IdlePlaces
 from fasaco_edge.mission.work.order_state import OrderState, Stage
-from fasaco_edge.mission.work.sequencer import Sequencer
 from fasaco_edge.planners.living_trail import LivingTrail
 
 __all__ = ["Mission", "MissionConfig"]
@@ -79,10 +65,10 @@ class Mission:
     ) -> None:
         """Start with an order, by default for everything reachable, and a kind of company."""
         self._config, self._kind = config, kind
-        self.drive, self._gauge = DriveMeter(), BatteryGauge()
+        self.drive, self._rooms = DriveMeter(), RoomWatch()
+        self._lasting = Lasting(drive=self.drive, battery=BatteryGauge(), rooms=self._rooms)
         self._layout = LatticeLayout(config)
         self._idle = IdlePlaces(config)
-        self._rooms = RoomWatch()
         self._lay_cells()
         self._continue(order or OrderState.autostart())
 
@@ -93,39 +79,15 @@ class Mission:
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
         config = self._rotation.config(self._layout.sized(self._config))
-        self.map = MapState(config)
-        cell_m, tool_m, sweeping = config.footprint.cell_m, config.tool_m, config.sweeping
-        ahead_m = sweeping.ahead_m if sweeping else 0.0
-        footprint, sight, map_state = config.footprint, None, self.map
-        if sweeping and tool_m > 2.0 * (radius_m := footprint.robot_radius_m):
-            sight = ToolSight(tool_m, radius_m, footprint.free_at_most, lambda: map_state.grid)
-        self.covered = MissionLedger(cell_m, tool_m, ahead_m, self._kind.cells(), sight)
-        monitor = InputMonitor(config)
-        self.company = self._kind.company(config, self.map, self.covered)
-        self.room_cells = RoomCells(self._rooms, self._rotation.deg)
-        room_price = RoomPrice(config.policy.by_room, self.room_cells)
-        self.orders = Sequencer(config, self.map, self.covered, self.company, room_price)
-        self.route = Route(config.spare_share, self.map, self.orders)
-        owners = self.map, self.covered, monitor, self.orders, self.route
-        self.line = LineLayer(sweeping, self.map, self.covered, self.orders, self.route)
-        self._trail = TrailLayer(config, self.map, self.route)
-        self.charging = Charging(config, self.map, self.orders, self.route, self._gauge)
-        self.time_limit = TimeLimit(config, self.map, self.orders)
-        ordered = self.map, self.covered, self.orders, self.route, self.line
-        self._changes = OrderChanges(config, *ordered, self._rooms, self._kind is ALONE)
-        way_out = WayOut(self.map, self.orders, self.route)
-        blocked = BlockedFollower()
-        measured = self.drive, self.company, self._gauge, way_out, blocked
-        self._handler = EventHandler(
-            *owners, self.line, self._trail, *measured, self._changes, self._rooms
-        )
-        self.giving_way = self._kind.waiting(
-            config, self.map, self.orders, self.route, self.company
-        )
-        decided_by = self.line, self.company, self.charging, self.time_limit, self.giving_way
-        in_dock = InDock(self.map, self._gauge)
+        parts = laid_parts(config, self._kind, self._lasting, self._rotation.deg)
+        self.map, self.covered, self.orders = parts.map, parts.ledger, parts.orders
+        self.route, self.line, self.company = parts.route, parts.line, parts.company
+        self.charging, self.time_limit = parts.charging, parts.time_limit
+        self.giving_way, self.room_cells = parts.giving_way, parts.room_cells
+        self._trail, self._changes = parts.trail, parts.changes
+        self._handler = EventHandler(parts)
         mask = mask_frame(self._config.policy.keep_out_mask)
-        self._executive = Executive(*owners, *decided_by, in_dock, way_out, blocked, mask)
+        self._executive = Executive(parts, mask)
 
     def restore(
         self,
@@ -184,7 +146,8 @@ class Mission:
         self._executive.succeed(before._executive)
         if before.rotation != self.rotation or before._layout.cell_m != self._layout.cell_m:
             return
-        self.orders.succeed(before.orders)
+        self.orders.reach.succeed(before.orders.reach)
+        self.orders.uncovered.succeed(before.orders.uncovered)
         self._executive.way_out.succeed(before._executive.way_out)
         if before.is_in_doubt:
             self.map.watch_on(before.map.building)
@@ -304,10 +267,9 @@ class Mission:
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""
-        lattice = self.map.lattice
-        return (
-            None if lattice is None else self.map.coverage(self.covered, self.orders.known(lattice))
-        )
+        if (lattice := self.map.lattice) is None:
+            return None
+        return self.map.coverage(self.covered, self.orders.reach.known(lattice))
 
     def snapshot(self) -> LedgerSnapshot:
         """Return the state kept over a restart: coverage, and the order's progress."""

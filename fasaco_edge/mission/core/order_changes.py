@@ -76,7 +76,7 @@ class OrderChanges:
         area = self.map.area
         if area is None:
             return
-        self.orders.note_area()
+        self.orders.reach.note_area()
         if before is None:
             again = "robot is on coverable ground again"
             route.want(again if route.revision else self.ledger.first_plan_reason)
@@ -166,7 +166,7 @@ class OrderChanges:
         self._keep_out(order)
         self.route.forget_failure()
         self.update_area()
-        self.orders.note_keep_outs(before)
+        self.orders.reach.note_keep_outs(before)
         if not self.map.is_kept_out:
             return None
         # Near the zone's border the robot may go on, but along another path.

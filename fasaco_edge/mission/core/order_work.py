@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.core.errands import NO_WAY, Errands
-from fasaco_edge.mission.core.way_out import WayOut
+from fasaco_edge.mission.core.parts import Parts
 from fasaco_edge.mission.events import Doing, PathUpdate, State
-from fasaco_edge.mission.line.layer import LineLayer
-from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.work.order_state import Stage
-from fasaco_edge.mission.work.sequencer import Sequencer
 
 
-@dataclass(frozen=True, slots=True)
 class OrderWork:
     """Plans the rest of an order, and ends it."""
 
-    map: MapState
-    monitor: InputMonitor
-    orders: Sequencer
-    route: Route
-    line: LineLayer
-    company: Company
-    errands: Errands
-    way_out: WayOut
+    def __init__(self, parts: Parts, errands: Errands) -> None:
+        self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
+        self.route, self.line, self.company = parts.route, parts.line, parts.company
+        self.errands, self.way_out = errands, parts.way_out
 
     def plan(self, cell: Cell, update: PathUpdate | None, state: State, now: float) -> Doing:
         """Request the wanted plan; if nothing is left to cover, continue with the order.

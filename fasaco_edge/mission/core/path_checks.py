@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.standing import PATIENCE_S, Standing
-from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-from fasaco_edge.mission.line.layer import LineLayer
-from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.path.route import Route
-from fasaco_edge.mission.work.sequencer import Sequencer
+from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.standing import PATIENCE_S
 
 # Period of ``check_worth`` and ``check_time`` [s].
 WORTH_S = 1.0
@@ -23,18 +19,10 @@ class PathChecks:
     Nothing is checked while a plan is wanted or being made.
     """
 
-    def __init__(
-        self,
-        ledger: MissionLedger,
-        monitor: InputMonitor,
-        orders: Sequencer,
-        route: Route,
-        line: LineLayer,
-        standing: Standing,
-    ) -> None:
-        self._ledger, self._monitor, self._orders = ledger, monitor, orders
-        self._route, self._line, self._standing = route, line, standing
-        orders.ask_for_floor(self._sum_up)
+    def __init__(self, parts: Parts) -> None:
+        self._ledger, self._monitor, self._orders = parts.ledger, parts.monitor, parts.orders
+        self._route, self._line, self._standing = parts.route, parts.line, parts.standing
+        self._orders.ask_for_floor(self._sum_up)
         self._worth_at = self._timed_at = float("-inf")
         # Number of covered cells and its time [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None

@@ -8,19 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from fasaco_edge.mission.company import Waiting
 from fasaco_edge.mission.config import MissionPolicy
-from fasaco_edge.mission.core.charging import Charging
-from fasaco_edge.mission.core.in_dock import DockCurrent, InDock
+from fasaco_edge.mission.core.in_dock import DockCurrent
+from fasaco_edge.mission.core.parts import Parts
 from fasaco_edge.mission.core.path_checks import FAR_APART
-from fasaco_edge.mission.core.standing import BlockedFollower, Standing
-from fasaco_edge.mission.core.way_out import WayOut
 from fasaco_edge.mission.events import State
-from fasaco_edge.mission.line.place_on_line import Offset
-from fasaco_edge.mission.map.inputs import InputMonitor
-from fasaco_edge.mission.map.map_state import MapState
 
 # Least timeout of poses at rest [s]; timeout of the first map and of the first pose [s].
 REST_S = 30.0
@@ -64,7 +58,6 @@ class Rule:
     do: str
 
 
-@dataclass(slots=True, eq=False)
 class Troubles:
     """Finds the troubles of a mission.
 
@@ -72,22 +65,15 @@ class Troubles:
         found: by the last ``look``, in the order of ``RULES``.
     """
 
-    map: MapState
-    monitor: InputMonitor
-    charging: Charging
-    giving_way: Waiting
-    standing: Standing
-    dock: InDock
-    way_out: WayOut
-    offset: Offset
-    blocked: BlockedFollower
-    found: tuple[Trouble, ...] = field(default=(), init=False)
-    _current: DockCurrent = field(init=False)
-    # The last time that the robot was at a possible place, or at rest [s].
-    _possible_at: float = field(default=math.inf, init=False)
-
-    def __post_init__(self) -> None:
-        self._current = DockCurrent(self.charging.gauge)
+    def __init__(self, parts: Parts) -> None:
+        self.map, self.monitor, self.charging = parts.map, parts.monitor, parts.charging
+        self.giving_way, self.standing, self.dock = parts.giving_way, parts.standing, parts.dock
+        self.way_out, self.blocked = parts.way_out, parts.blocked
+        self.offset = parts.line.offset
+        self.found: tuple[Trouble, ...] = ()
+        self._current = DockCurrent(parts.lasting.battery)
+        # The last time that the robot was at a possible place, or at rest [s].
+        self._possible_at = math.inf
 
     @property
     def policy(self) -> MissionPolicy:

@@ -111,7 +111,7 @@ class WayOut:
         """Return what shuts the robot in; "" if it can reach most of its former area."""
         if not self._orders.is_shut_in(area):
             return ""
-        reached, once = self._orders.reached_m2(area)
+        reached, once = self._orders.uncovered.reached_m2(area)
         return f"shut in: {reached:.1f} of {once:.1f} m2 in reach"
 
     def _lead(

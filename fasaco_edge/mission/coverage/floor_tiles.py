@@ -34,16 +34,16 @@ SQUARES = (1, 8, 16, 32, 64, FLOOR_TILE)
 
 _BITS = np.array([bin(byte).count("1") for byte in range(256)], np.uint8)
 
-Place = tuple[int, int]
+TileKey = tuple[int, int]
 """Index of a tile: (i, j) begins at pixel (FLOOR_TILE * i, FLOOR_TILE * j)."""
 Bits = NDArray[np.uint8]
 """Eight pixels of a row per byte, most significant bit first; (FLOOR_TILE, ROW_BYTES)."""
-Tiles = Mapping[Place, Bits]
+Tiles = Mapping[TileKey, Bits]
 Mask = NDArray[np.bool_]
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-class SharedTiles(dict[Place, NDArray[Scalar]]):
+class SharedTiles(dict[TileKey, NDArray[Scalar]]):
     """Tiles by place (row, col), shared with snapshots until they change.
 
     Only tiles with content are stored, so distant parts of a map cost nothing in between.
@@ -60,43 +60,43 @@ class SharedTiles(dict[Place, NDArray[Scalar]]):
         most: int,
         dropped: int,
         blank: NDArray[Scalar],
-        tiles: Mapping[Place, NDArray[Scalar]] = MappingProxyType({}),
+        tiles: Mapping[TileKey, NDArray[Scalar]] = MappingProxyType({}),
     ) -> None:
         super().__init__(tiles)
         self._most, self._dropped, self._blank = most, dropped, blank
         # Tiles that no snapshot shares.
-        self._own: set[Place] = set()
+        self._own: set[TileKey] = set()
 
-    def snapshot(self) -> Mapping[Place, NDArray[Scalar]]:
+    def snapshot(self) -> Mapping[TileKey, NDArray[Scalar]]:
         """Return the present tiles; a tile is copied once it changes."""
         for place in self._own:
             self[place].flags.writeable = False
         self._own.clear()
         return MappingProxyType(dict(self))
 
-    def make_room(self, place: Place) -> list[NDArray[Scalar]]:
+    def make_room(self, place: TileKey) -> list[NDArray[Scalar]]:
         """Drop the tiles farthest from ``place`` if the limit allows no tile there; return them."""
         if place in self or len(self) < self._most:
             return []
 
-        def distance(other: Place) -> tuple[int, Place]:
+        def distance(other: TileKey) -> tuple[int, TileKey]:
             return max(abs(other[0] - place[0]), abs(other[1] - place[1])), other
 
         farthest = sorted(self, key=distance)[-self._dropped :]
         return [self.drop(far) for far in farthest]
 
-    def writable(self, place: Place) -> NDArray[Scalar]:
+    def writable(self, place: TileKey) -> NDArray[Scalar]:
         """Return the tile at a place, created if missing; no snapshot shares it."""
         if place not in self._own:
             self.put(place, self.get(place, self._blank).copy())
         return self[place]
 
-    def put(self, place: Place, tile: NDArray[Scalar]) -> None:
+    def put(self, place: TileKey, tile: NDArray[Scalar]) -> None:
         """Take ownership of a tile."""
         self[place] = tile
         self._own.add(place)
 
-    def drop(self, place: Place) -> NDArray[Scalar]:
+    def drop(self, place: TileKey) -> NDArray[Scalar]:
         """Remove a tile and return it."""
         self._own.discard(place)
         return self.pop(place)
@@ -195,7 +195,7 @@ class FloorSnapshot:
 NO_FLOOR = FloorSnapshot()
 
 
-def _percent(tiles: Tiles, side: int) -> Iterator[tuple[Place, NDArray[np.int8]]]:
+def _percent(tiles: Tiles, side: int) -> Iterator[tuple[TileKey, NDArray[np.int8]]]:
     """Yield the marked share of each square of each tile [%], int8 (n, n)."""
     edge = FLOOR_TILE // side
     for place, tile in tiles.items():
@@ -213,13 +213,13 @@ def count_bits(bits: Bits) -> int:
     return int.from_bytes(bits.tobytes()).bit_count()
 
 
-def window_of(place: Place, side: int = FLOOR_TILE) -> Window:
+def window_of(place: TileKey, side: int = FLOOR_TILE) -> Window:
     """Return the window of a tile, ``side`` squares wide."""
     row, col = side * place[0], side * place[1]
     return Window(row, col, row + side, col + side)
 
 
-def places_of(window: Window, side: int = FLOOR_TILE) -> Iterator[Place]:
+def places_of(window: Window, side: int = FLOOR_TILE) -> Iterator[TileKey]:
     """Yield the places of the tiles, ``side`` squares wide, that have squares in ``window``."""
     for row in range(window.row0 // side, -(-window.row1 // side)):
         for col in range(window.col0 // side, -(-window.col1 // side)):
@@ -227,7 +227,7 @@ def places_of(window: Window, side: int = FLOOR_TILE) -> Iterator[Place]:
 
 
 def assembled(
-    tiles: Mapping[Place, NDArray[Any]],
+    tiles: Mapping[TileKey, NDArray[Any]],
     window: Window,
     side: int,
     kind: type[Scalar],

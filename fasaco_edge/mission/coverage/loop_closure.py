@@ -38,8 +38,8 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     ROW_BYTES,
     Bits,
     FloorSnapshot,
-    Place,
     Similarity,
+    TileKey,
     Tiles,
 )
 from fasaco_edge.mission.coverage.ledger import Cells, LedgerSnapshot
@@ -183,11 +183,11 @@ def uncertain_cells(
 
 def certain_floor(
     before: FloorSnapshot, motion: Motion
-) -> Callable[[Tiles], list[tuple[Place, Bits]]]:
+) -> Callable[[Tiles], list[tuple[TileKey, Bits]]]:
     """Return a function that returns the tiles with uncertain pixels, without these pixels."""
     known = _stacked(before.tiles)
 
-    def left_of(tiles: Tiles) -> list[tuple[Place, Bits]]:
+    def left_of(tiles: Tiles) -> list[tuple[TileKey, Bits]]:
         if not tiles:
             return []
         asked = _stacked(tiles)

@@ -19,8 +19,8 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     PIXEL_M,
     FloorSnapshot,
     Mask,
-    Place,
     Similarity,
+    TileKey,
     swept_on,
     window_of,
 )
@@ -55,7 +55,7 @@ def relaid_ledger(before: LedgerSnapshot, lattice_deg: float, cell_m: float) -> 
 
 def _rotated(
     floor: FloorSnapshot, by_deg: float, side: int, edge_m: float
-) -> Iterator[tuple[Place, Mask]]:
+) -> Iterator[tuple[TileKey, Mask]]:
     """Yield tiles of the rotated raster with their swept squares; empty tiles are skipped.
 
     Args:
@@ -65,7 +65,7 @@ def _rotated(
         edge_m: edge of a square [m].
     """
     tile_m = FLOOR_TILE * PIXEL_M
-    places: set[Place] = set()
+    places: set[TileKey] = set()
     for row, col in floor.tiles:
         here = GridGeometry.of_cells(Window(row, col, row + 1, col + 1), tile_m)
         x0, y0, x1, y1 = rotated_geometry(here, by_deg).bounds()

@@ -14,7 +14,7 @@ import numpy as np
 
 from fasaco_edge.grid.geometry import Point, Window
 from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M, Mask
-from fasaco_edge.mission.coverage.steady_track import Place
+from fasaco_edge.mission.coverage.steady_track import Position
 
 # Error of a heading [rad].
 YAW_RAD = math.radians(1.0)
@@ -29,12 +29,12 @@ LEAST_RAD = 1e-3
 class Segment(NamedTuple):
     """A segment between places, and the radius certainly swept along it [m], 0 for none."""
 
-    start: Place
-    end: Place
+    start: Position
+    end: Position
     reach_m: float
 
 
-def segments_between(start: Place, end: Place, tool_m: float) -> list[Segment]:
+def segments_between(start: Position, end: Position, tool_m: float) -> list[Segment]:
     """Return the sweeps between two places: along the segment, around its corner, or at its end.
 
     ``tool_m``: width of the tool [m].
@@ -45,7 +45,7 @@ def segments_between(start: Place, end: Place, tool_m: float) -> list[Segment]:
         return [Segment(start, end, at_end)]
     turned = corner_between(start, end)
     if turned is not None:
-        corner = Place(*turned, end.error_m)
+        corner = Position(*turned, end.error_m)
         beside = max(math.dist(turned, start.point), math.dist(turned, end.point)) * YAW_RAD
         if at_end > beside:
             reach_m = at_end - beside
@@ -55,7 +55,7 @@ def segments_between(start: Place, end: Place, tool_m: float) -> list[Segment]:
     return [*way, Segment(end, end, at_end)]
 
 
-def beside_m(start: Place, end: Place) -> float:
+def beside_m(start: Position, end: Position) -> float:
     """Return how far beside the segment between two places the robot may have been [m].
 
     If its longest possible drive is unknown, it is taken to have driven straight.
@@ -74,7 +74,7 @@ def beside_m(start: Place, end: Place) -> float:
     )
 
 
-def corner_between(start: Place, end: Place) -> Point | None:
+def corner_between(start: Position, end: Position) -> Point | None:
     """Return where the robot turned between two places, x, y [m]; None if unknown."""
     one, other = _turns(start, end)
     if not one * other < 0.0 or abs(one) + abs(other) >= math.pi - LEAST_RAD:
@@ -87,7 +87,7 @@ def corner_between(start: Place, end: Place) -> Point | None:
     return start.x + first_m * math.cos(start.yaw), start.y + first_m * math.sin(start.yaw)
 
 
-def _turns(start: Place, end: Place) -> tuple[float, float]:
+def _turns(start: Position, end: Position) -> tuple[float, float]:
     """Return the angles of the headings at two places to the segment between them [rad]."""
     way = math.atan2(end.y - start.y, end.x - start.x)
     return math.remainder(start.yaw - way, math.tau), math.remainder(end.yaw - way, math.tau)

@@ -79,7 +79,7 @@ GOOD_ERROR_M = PIXEL_M / 4
 MOST_BESIDE = 15
 
 
-class Place(NamedTuple):
+class Position(NamedTuple):
     """A filtered position.
 
     Attributes:
@@ -114,7 +114,7 @@ class SteadyTrack:
         self._farthest_m: list[float] = []
         self._done = 0
 
-    def add(self, pose: Pose2D, farthest_m: float = 0.0) -> list[Place]:
+    def add(self, pose: Pose2D, farthest_m: float = 0.0) -> list[Position]:
         """Take in the next pose; return the places that are final now.
 
         ``farthest_m``: longest possible drive since the previous pose; 0 if unknown [m].
@@ -133,7 +133,7 @@ class SteadyTrack:
         """Whether some poses have no final place yet."""
         return self._done < len(self._poses)
 
-    def ahead(self) -> list[Place]:
+    def ahead(self) -> list[Position]:
         """Return the preliminary places of the newest poses."""
         return [self._place(index) for index in range(self._done, len(self._poses))]
 
@@ -146,7 +146,7 @@ class SteadyTrack:
         xs, ys = [pose.x for pose in around], [pose.y for pose in around]
         return min(xs), min(ys), max(xs), max(ys)
 
-    def end(self) -> list[Place]:
+    def end(self) -> list[Position]:
         """Return the last places, as the robot's track to its next pose is unknown."""
         places = self._places(len(self._poses))
         self._poses, self._farthest_m, self._done = [], [], 0
@@ -159,12 +159,12 @@ class SteadyTrack:
         needed = (self._scatter.sigma_m / GOOD_ERROR_M) ** 2
         return min(max(math.ceil((needed - 1) / 2), 0), MOST_BESIDE)
 
-    def _places(self, stop: int) -> list[Place]:
+    def _places(self, stop: int) -> list[Position]:
         places = [self._place(index) for index in range(self._done, stop)]
         self._done = max(self._done, stop)
         return places
 
-    def _place(self, index: int) -> Place:
+    def _place(self, index: int) -> Position:
         poses, sigma_m = self._poses, self._scatter.sigma_m
         here, reach_m = poses[index], self._reach_m + SURE_SIGMAS * sigma_m
         beside = min(self._beside, index, len(poses) - 1 - index)
@@ -180,4 +180,4 @@ class SteadyTrack:
         count = len(around)
         x, y = sum([pose.x for pose in around]) / count, sum([pose.y for pose in around]) / count
         error_m = SURE_SIGMAS * sigma_m / math.sqrt(count)
-        return Place(x, y, error_m, self._farthest_m[index], here.yaw)
+        return Position(x, y, error_m, self._farthest_m[index], here.yaw)

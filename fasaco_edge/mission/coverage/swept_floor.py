@@ -30,6 +30,7 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     Mask,
     SharedTiles,
     Similarity,
+    TileKey,
     Tiles,
     count_bits,
     places_of,
@@ -37,7 +38,6 @@ from fasaco_edge.mission.coverage.floor_tiles import (
     swept_on,
     window_of,
 )
-from fasaco_edge.mission.coverage.floor_tiles import Place as TilePlace
 from fasaco_edge.mission.coverage.segments import (
     TOUCH_M,
     Segment,
@@ -46,7 +46,7 @@ from fasaco_edge.mission.coverage.segments import (
     window_around,
     within,
 )
-from fasaco_edge.mission.coverage.steady_track import Place, SteadyTrack
+from fasaco_edge.mission.coverage.steady_track import Position, SteadyTrack
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.tool_sight import ToolSight
@@ -96,7 +96,7 @@ class SweptFloor:
         self._track = SteadyTrack(tool_m)
         # The newest pose, and the place up to which sweeps are stored.
         self._last: Pose2D | None = None
-        self._kept_to: Place | None = None
+        self._kept_to: Position | None = None
         # Preliminary sweeps after that place, None until computed; and a window around them.
         self._ahead: tuple[Window, Mask] | None = None
         self._around_ahead: Window | None = None
@@ -198,7 +198,7 @@ class SweptFloor:
             ]
         )
 
-    def leave(self, left_of: Callable[[Tiles], Iterable[tuple[TilePlace, Bits]]]) -> None:
+    def leave(self, left_of: Callable[[Tiles], Iterable[tuple[TileKey, Bits]]]) -> None:
         """Forget pixels of all tiles at once, except those under the tool now.
 
         Args:
@@ -233,7 +233,7 @@ class SweptFloor:
             self.changes += 1
             self._news.append((self.changes, window))
 
-    def _keep(self, places: list[Place]) -> None:
+    def _keep(self, places: list[Position]) -> None:
         for place in places:
             for segment in segments_between(self._kept_to or place, place, self._tool_m):
                 window = window_around(segment)
@@ -273,7 +273,7 @@ class SweptFloor:
             self._ahead = whole, ahead
         return self._ahead
 
-    def _segments_ahead(self, places: list[Place]) -> list[Segment]:
+    def _segments_ahead(self, places: list[Position]) -> list[Segment]:
         """Return the sweeps along places, from the last stored place on."""
         chain = [self._kept_to or places[0], *places] if places else []
         return [
@@ -309,7 +309,7 @@ class SweptFloor:
         if has_changed:
             self._note(window)
 
-    def _make_room(self, place: TilePlace) -> None:
+    def _make_room(self, place: TileKey) -> None:
         """Drop the tiles farthest from ``place`` if there is no room for another."""
         if dropped := self._tiles.make_room(place):
             self.pixels -= sum(map(count_bits, dropped))

@@ -134,7 +134,7 @@ class FloorLeft:
         if floor is None or grid is None or stamped is None or self._map.area is None:
             return ""
         asked, pose = self._orders.cells.asked_of_me(self._map.area), stamped.pose
-        lost = self._orders.lost(self._map.area)
+        lost = self._orders.reach.lost(self._map.area)
         if self._tally is not None:
             # For the whole order, not only for its last part.
             self.update()
@@ -288,6 +288,6 @@ class FloorLeft:
         if self._reach[0] is not area:
             reachable = area.reachable
             if self._orders.is_shut_in(area):
-                reachable = self._orders.known(area.lattice) & area.lattice.coverable
+                reachable = self._orders.reach.known(area.lattice) & area.lattice.coverable
             self._reach = area, reachable
         return self._reach[1]

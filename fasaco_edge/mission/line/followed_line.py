@@ -27,8 +27,8 @@ from fasaco_edge.mission.line.polyline import (
     CURVED,
     NO_EDGES,
     POLISHED,
-    Line,
     Points,
+    Polyline,
     Walk,
     edges_between,
     is_outside,
@@ -62,11 +62,11 @@ class FollowedLine:
         # The walk and its line, with the part that a map has cut off, as the next walk mostly leads
         # there again; and the number of cells before the cut.
         self._walk: Walk = np.empty((0, 2), np.int32)
-        self._whole, self._until = Line(), 0
+        self._whole, self._until = Polyline(), 0
         self._place = PlaceOnLine()
 
     @property
-    def line(self) -> Line:
+    def line(self) -> Polyline:
         """The rest of the line, up to a cut."""
         return self._whole.part(0, self._whole.before(self._until))
 
@@ -97,7 +97,7 @@ class FollowedLine:
         if floor.geometry.origin.yaw == before.origin.yaw:
             self._carry(before)
             return False
-        dropped, self._whole = bool(len(self._whole)), Line()
+        dropped, self._whole = bool(len(self._whole)), Polyline()
         return dropped
 
     def _carry(self, before: GridGeometry) -> None:
@@ -204,7 +204,7 @@ class FollowedLine:
         begin, last = int(line.cells[first]), int(line.cells[end - 1])
         cells = begin + aligned(points, self._stands(begin, last + 1))
         state = line.state[first:end].min(initial=POLISHED)
-        part = Line(points, cells, np.full(len(points), state, np.uint8))
+        part = Polyline(points, cells, np.full(len(points), state, np.uint8))
         self._whole = line.part(0, first).joined(part, line.part(end))
 
     def put_curve(self, first: int, end: int, xy: Points) -> None:
@@ -218,7 +218,7 @@ class FollowedLine:
         cells = np.full(len(points), begin)
         if len(points) > 1:
             cells = begin + aligned(points, self._stands(begin, last + 1))
-        part = Line(points, cells, np.full(len(points), CURVED, np.uint8))
+        part = Polyline(points, cells, np.full(len(points), CURVED, np.uint8))
         while end < len(line) and np.abs(points[-1] - line.points[end]).sum() < LEAST_EDGE:
             end += 1
         new = line.part(0, first).joined(part, line.part(end))

@@ -18,8 +18,8 @@ from fasaco_edge.mission.line.followed_line import FollowedLine
 from fasaco_edge.mission.line.pieces import Joiner, Piece, exchanged, kept_pieces
 from fasaco_edge.mission.line.polyline import (
     POLISHED,
-    Line,
     Points,
+    Polyline,
     edges_near,
 )
 from fasaco_edge.mission.line.way import (
@@ -67,7 +67,7 @@ class LineAhead(FollowedLine):
         if not is_on.all():
             walk = walk[: int(np.argmin(is_on))]
         ahead, line = self._walk[self.cell :], self._whole.renumbered(-self.cell)
-        beyond = Piece(Line(), 0)
+        beyond = Piece(Polyline(), 0)
         is_beginning = keeps and len(walk) > 0 and common_beginning(walk, ahead) == len(walk)
         if is_beginning and (is_cut or len(walk) == len(ahead)):
             count = line.before(len(walk))
@@ -86,7 +86,7 @@ class LineAhead(FollowedLine):
             way = self._past(discs_on(self._floor, beside))
             self._take([Piece(way.only(shortened(way.points, self._floor, beside)), -1)])
 
-    def _past(self, discs: Points) -> Line:
+    def _past(self, discs: Points) -> Polyline:
         """Return the line with a corner that keeps the robot off discs, if possible."""
         line = self.line
         if not len(discs) or len(line) < 2:
@@ -96,7 +96,7 @@ class LineAhead(FollowedLine):
         if corner is None or not (self._is_clear(here, corner) and self._is_clear(corner, to)):
             return line
         state = np.full(1, POLISHED, np.uint8)
-        return line.part(0, 1).joined(Line(corner[None], line.cells[:1], state), line.part(1))
+        return line.part(0, 1).joined(Polyline(corner[None], line.cells[:1], state), line.part(1))
 
     def _join(self, pieces: list[Piece], beyond: Piece, *, skips: bool = True) -> None:
         """Replace the line by one joined from pieces.
@@ -112,7 +112,7 @@ class LineAhead(FollowedLine):
         robot = self._place.here
         points = np.concatenate([robot[None], lead_out(self._floor, robot)])
         state = np.full(len(points), POLISHED, np.uint8)
-        here = Line(points, np.full(len(points), self.cell), state)
+        here = Polyline(points, np.full(len(points), self.cell), state)
         stands, tally = self._floor.stands, self.tally
         joiner = Joiner(
             here,

@@ -13,7 +13,15 @@ import numpy as np
 
 from fasaco_edge.kernels.floor.line import LEAST_EDGE
 from fasaco_edge.kernels.floor.runs import AFTER, BACKWARD, BEFORE, STEPS, common_runs
-from fasaco_edge.mission.line.polyline import RAW, Edges, Line, Numbers, Points, Walk, edges_between
+from fasaco_edge.mission.line.polyline import (
+    RAW,
+    Edges,
+    Numbers,
+    Points,
+    Polyline,
+    Walk,
+    edges_between,
+)
 from fasaco_edge.planners.path import common_beginning
 
 # Least steps of a reused piece: shorter ones would consist mostly of joints. The piece at the robot
@@ -31,7 +39,7 @@ class Piece:
         backward: whether the direction is reversed.
     """
 
-    line: Line
+    line: Polyline
     begin: int
     backward: bool = False
 
@@ -40,7 +48,7 @@ class Piece:
         return Piece(self.line.part(1), self.begin + (not self.backward), self.backward)
 
 
-def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
+def kept_pieces(line: Polyline, before: Walk, after: Walk) -> list[Piece]:
     """Return the pieces of a line along one walk that lead along the cells of another walk.
 
     Args:
@@ -58,7 +66,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
             first, last = line.before(origin - steps + 1), line.before(origin)
             part = line.part(first, last)
             cells = begin + origin - part.cells[::-1]
-            turned = Line(part.points[::-1], cells, part.state[::-1])
+            turned = Polyline(part.points[::-1], cells, part.state[::-1])
             pieces.append(Piece(turned, first, backward=True))
         else:
             # If both walks begin with this run, include the point behind the robot.
@@ -68,7 +76,7 @@ def kept_pieces(line: Line, before: Walk, after: Walk) -> list[Piece]:
     return [piece for piece in pieces if len(piece.line)]
 
 
-def exchanged(line: Line, pieces: list[Piece]) -> tuple[Line, Edges, Edges]:
+def exchanged(line: Polyline, pieces: list[Piece]) -> tuple[Polyline, Edges, Edges]:
     """Return the line that consists of pieces, with the edges removed and the edges added.
 
     Points of new pieces, and points at joints of old pieces, are RAW, to be polished again.
@@ -80,7 +88,7 @@ def exchanged(line: Line, pieces: list[Piece]) -> tuple[Line, Edges, Edges]:
     Returns:
         the new line, the removed edges of the previous line, the added edges: float64 (n, 4).
     """
-    new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Line()
+    new = pieces[0].line.joined(*(piece.line for piece in pieces[1:])) if pieces else Polyline()
     goes, comes = np.ones(max(len(line) - 1, 0), bool), np.ones(max(len(new) - 1, 0), bool)
     at = 0
     for piece in pieces:
@@ -111,7 +119,7 @@ class Joiner:
             if there is no way.
     """
 
-    here: Line
+    here: Polyline
     walk: Walk
     begin: int
     stand: Callable[[Walk], Points]
@@ -180,7 +188,7 @@ class Joiner:
         corners = self.way(self.here.points[-1], stand)
         if not len(corners):
             return False
-        self._done.append(Piece(Line.raw(corners, np.full(len(corners), at)), -1))
+        self._done.append(Piece(Polyline.raw(corners, np.full(len(corners), at)), -1))
         return True
 
     def _append(self, first: int, until: int) -> bool:
@@ -193,14 +201,14 @@ class Joiner:
             return True
         # Whether a stand is a corner depends on the next one.
         points, cells = self.raw(self.walk[first : until + 1])
-        line = Line.raw(points, cells + first)
+        line = Polyline.raw(points, cells + first)
         line = line.part(0, line.before(until))
         last = self._last()
         ends = line.points if last is None else np.concatenate([last[None], line.points])
         far = np.hypot(*np.diff(ends, axis=0).T) >= LEAST_EDGE
         kept = far if last is not None else np.concatenate([[True], far])
         if not kept.all():
-            line = Line(line.points[kept], line.cells[kept], line.state[kept])
+            line = Polyline(line.points[kept], line.cells[kept], line.state[kept])
         is_left_out = len(line) > 0 and not kept[0]
         if last is not None and is_left_out and not self.is_clear(last, line.points[0]):
             return False

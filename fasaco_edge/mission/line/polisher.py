@@ -13,7 +13,7 @@ from fasaco_edge.kernels.floor import line as kernel
 from fasaco_edge.kernels.floor.anneal import anneal
 from fasaco_edge.kernels.floor.polish import polish
 from fasaco_edge.mission.line.line_ahead import LineAhead
-from fasaco_edge.mission.line.polyline import MOVED, POLISHED, Line
+from fasaco_edge.mission.line.polyline import MOVED, POLISHED, Polyline
 from fasaco_edge.planners.line import (
     FARTHEST_M,
     SEED,
@@ -129,7 +129,9 @@ class Polisher:
         on = kernel.Floor(floor.blocked, floor.places, ahead.tally.sweeps, radius, tool, clear)
         return on, self._config.prices(unit, floor.discs.tool_m)
 
-    def _put(self, ahead: LineAhead, first: int, last: int, piece: Line, line: kernel.Line) -> int:
+    def _put(
+        self, ahead: LineAhead, first: int, last: int, piece: Polyline, line: kernel.Line
+    ) -> int:
         """Replace a piece by its polished version; return the new index of its last point."""
         points = line.points[numbers_along(line)]
         if np.array_equal(points, piece.points):

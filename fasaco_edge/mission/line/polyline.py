@@ -22,7 +22,7 @@ FIRST_POINTS = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class Polyline:
     """A polyline.
 
     Attributes:
@@ -39,44 +39,44 @@ class Line:
         return len(self.points)
 
     @classmethod
-    def raw(cls, points: Points, cells: Numbers) -> Line:
+    def raw(cls, points: Points, cells: Numbers) -> Polyline:
         """Return a line of points that have not been moved yet."""
         return cls(points, cells, np.full(len(points), RAW, np.uint8))
 
-    def part(self, begin: int, end: int | None = None) -> Line:
+    def part(self, begin: int, end: int | None = None) -> Polyline:
         """Return the points from ``begin`` to ``end``."""
-        return Line(self.points[begin:end], self.cells[begin:end], self.state[begin:end])
+        return Polyline(self.points[begin:end], self.cells[begin:end], self.state[begin:end])
 
-    def only(self, kept: NDArray[np.intp]) -> Line:
+    def only(self, kept: NDArray[np.intp]) -> Polyline:
         """Return the points of some indices."""
-        return Line(self.points[kept], self.cells[kept], self.state[kept])
+        return Polyline(self.points[kept], self.cells[kept], self.state[kept])
 
-    def joined(self, *others: Line) -> Line:
+    def joined(self, *others: Polyline) -> Polyline:
         """Return this line with others appended."""
         lines = self, *others
-        return Line(
+        return Polyline(
             np.concatenate([line.points for line in lines]),
             np.concatenate([line.cells for line in lines]),
             np.concatenate([line.state for line in lines]),
         )
 
-    def renumbered(self, by: int) -> Line:
+    def renumbered(self, by: int) -> Polyline:
         """Return this line with cell indices shifted."""
-        return Line(self.points, self.cells + by, self.state)
+        return Polyline(self.points, self.cells + by, self.state)
 
-    def moved(self, by: tuple[int, int]) -> Line:
+    def moved(self, by: tuple[int, int]) -> Polyline:
         """Return this line shifted by rows and columns of the raster."""
         return self.at(self.points + np.array(by))
 
-    def at(self, points: Points) -> Line:
+    def at(self, points: Points) -> Polyline:
         """Return this line with its points at other places, float64 (n, 2)."""
-        return Line(points, self.cells, self.state)
+        return Polyline(points, self.cells, self.state)
 
-    def marked(self, first: int, end: int, state: int) -> Line:
+    def marked(self, first: int, end: int, state: int) -> Polyline:
         """Return this line with points marked as MOVED or POLISHED."""
         states = self.state.copy()
         states[first:end] = np.maximum(states[first:end], state)
-        return Line(self.points, self.cells, states)
+        return Polyline(self.points, self.cells, states)
 
     def first_below(self, state: int) -> int:
         """Return the index of the first point with a lower state; the count if there is none."""

@@ -21,7 +21,7 @@ from fasaco_edge.mission.orders.zones import kept_out, without
 Maps = tuple[OccupancyGrid, OccupancyGrid]
 
 
-class Ground:
+class MissionGround:
     """Lattices and floor, updated with each map.
 
     Attributes:

@@ -34,7 +34,7 @@ from fasaco_edge.mission.coverage.loop_closure import (
 )
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.building_watch import BuildingWatch
-from fasaco_edge.mission.map.ground import Ground
+from fasaco_edge.mission.map.ground import MissionGround
 from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.obstacles import Obstacles
 from fasaco_edge.mission.map.standing_places import StandingPlaces
@@ -44,7 +44,7 @@ from fasaco_edge.mission.orders.order import MissionOrder
 IN_DOCK_M = 0.5
 
 
-class MapState(Ground):
+class MapState(MissionGround):
     """Takes in maps and poses; lattice and floor show the newest map.
 
     Attributes:

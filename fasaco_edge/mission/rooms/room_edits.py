@@ -7,11 +7,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.mission.coverage.floor_tiles import Mask
 from fasaco_edge.mission.rooms.room_book import (
     LEAST_M2,
     MOST_CUTS,
@@ -26,8 +26,6 @@ from fasaco_edge.mission.rooms.room_raster import Cut, RoomRaster, cut_window, i
 
 if TYPE_CHECKING:
     from fasaco_edge.mission.coverage.loop_closure import Motion
-
-Mask = NDArray[np.bool_]
 
 
 def split(book: RoomBook, called: str | int, cut: Cut) -> None:

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Point, Polygon, Window
 from fasaco_edge.grid.polygons import area_m2, is_near, polygon_flaw
 from fasaco_edge.kernels.lattice.areas import find_areas
+from fasaco_edge.mission.coverage.floor_tiles import Mask
 from fasaco_edge.mission.rooms.room_book import LEAST_M2, MOST_NUMBER, Room, RoomBook, RoomSheet
 from fasaco_edge.mission.rooms.room_raster import Ids
-
-Mask = NDArray[np.bool_]
 
 # Change of a room after which its outline is updated [m2]: pixels along walls flicker.
 STALE_M2 = 0.1

@@ -8,8 +8,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.changes import carried
-from fasaco_edge.grid.lattice import UNKNOWN, Cell
+from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import anchor_cell
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
@@ -19,9 +18,11 @@ from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.work.by_room import RoomPrice
 from fasaco_edge.mission.work.cells_left import CellsLeft
 from fasaco_edge.mission.work.exploration import Exploration
-from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.mission.work.order_reach import OrderReach
+from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState, Stage
 from fasaco_edge.mission.work.plan_scope import PlanScope
-from fasaco_edge.mission.work.unreached import OrderReach
+from fasaco_edge.mission.work.reached_cells import ReachedCells
+from fasaco_edge.mission.work.uncovered import UncoveredCells
 from fasaco_edge.planners.problem import CoverageProblem
 
 # After this many paths in a row without a newly covered cell, the cells left wait for a retry. For
@@ -31,10 +32,13 @@ OTHERS_SEE = "looks for its part, which others see"
 MAP_ENDS = "looks where the map ends: the floor there was covered before a restart"
 
 
-class PresentPart(OrderReach):
+class PresentPart:
     """Poses the problems of the part of an order that is due. Times are [s].
 
     Attributes:
+        order_state: the order and its progress.
+        reach: the cells that have been reachable since the order began.
+        uncovered: the cells that stay uncovered.
         cells: the cells left.
         scope: which of these cells are planned now, and how.
     """
@@ -47,8 +51,10 @@ class PresentPart(OrderReach):
         company: Company,
         room_price: RoomPrice,
     ) -> None:
-        super().__init__(map_state, ledger)
-        self._config, self._company = config, company
+        self.order_state = OrderState.idle(NO_ORDER)
+        self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
+        self.reach = OrderReach(map_state)
+        self.uncovered = UncoveredCells(map_state, ledger, self.reach, lambda: self.order_state)
         self._exploration = Exploration()
         # Number of cells done at the last path's end (-1 before the first path), and number of
         # paths in a row that did not increase it.
@@ -69,6 +75,11 @@ class PresentPart(OrderReach):
         self._exploration, self._has_new_lanes = Exploration(), False
         self._done, self._in_vain = -1, 0
         self.scope.worth.begin()
+
+    @property
+    def reached(self) -> ReachedCells | None:
+        """The cells that have been reachable since the order began; None without an open order."""
+        return self.reach.cells if self.order_state.is_open else None
 
     @property
     def can_plan(self) -> bool:
@@ -128,19 +139,10 @@ class PresentPart(OrderReach):
         if reason := exploration.seek(zone, area, free, cell):
             return reason
         of_others = self._company.viewpoints(self.cells.open_cells, cell)
-        ends = self.cells.ends_of_map(cell) if self._is_map_cut() else ()
+        ends = self.cells.ends_of_map(cell) if self.reach.is_map_cut else ()
         viewpoints = chain(((at, OTHERS_SEE) for at in of_others), ((at, MAP_ENDS) for at in ends))
         looks = (exploration.look_beyond(at, cell, why) for at, why in viewpoints)
         return next(filter(None, looks), "")
-
-    def _is_map_cut(self) -> bool:
-        """Return whether the map lacks cells that were reachable before a restart."""
-        lattice = self._map.lattice
-        if lattice is None or self._once is None:
-            return False
-        window, once = self._once
-        shown = carried(lattice.states != UNKNOWN, lattice.window, window)
-        return bool((once & ~shown).any())
 
     def why_standing(self, now: float) -> str:
         """Return why the robot stands although a plan is wanted, or ""."""
@@ -170,7 +172,7 @@ class PresentPart(OrderReach):
         """
         cells = self.cells.left_to_me()
         if cells > 0:
-            self._note_failure(why)
+            self.uncovered.note_failure(why)
         # Cells done are counted, not cells left, as a new map may add cells.
         done = self.done
         self._in_vain = self._in_vain + 1 if cells and done <= self._done else 1

@@ -80,7 +80,8 @@ class Sequencer(PresentPart):
         self._begin_part()
         # Floor behind temporary obstacles counts as reachable for the next order on the same map.
         is_crowded = state.home is not None and self._map.obstacles.closed > 0
-        self._begin_reach(self._reached_cells() if is_crowded else state.reached)
+        self.uncovered.begin()
+        self.reach.begin(self.reach.cells if is_crowded else state.reached)
         self._company.try_again()
 
     def set_state(self, state: OrderState) -> None:
@@ -96,13 +97,13 @@ class Sequencer(PresentPart):
 
     def move_reached(self, motion: Motion) -> None:
         """Move the reached cells with the map."""
-        super().move_reached(motion)
+        self.reach.move(motion)
         # The cells that were reachable have moved on the map.
         self._left_behind.set_out(None)
 
     def shift_reached(self, motion: Motion) -> None:
         """Move the reached cells with the newest map, whose area is not known yet."""
-        super().shift_reached(motion)
+        self.reach.shift(motion)
         self._left_behind.set_out(None)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
@@ -110,9 +111,9 @@ class Sequencer(PresentPart):
 
         False if all is covered, as the order can end then.
         """
-        (reached, once), home = self.reached_m2(area), self.goal()
+        (reached, once), home = self.uncovered.reached_m2(area), self.goal()
         share = HOME_SHARE if home is None or area.contains(home) else MOST_SHARE
-        return reached < share * once and self._is_any_left()
+        return reached < share * once and self.uncovered.is_any_left()
 
     def begin(self, cell: Cell, now: float) -> str:
         """Start the stage that is due, from ``cell``; return why a plan is wanted, or ""."""
@@ -219,7 +220,7 @@ class Sequencer(PresentPart):
 
     def waiting_reason(self) -> str:
         """Return the reason of a wait before a retry as text."""
-        cells, policy = self.unreached().cells, self._config.policy
+        cells, policy = self.uncovered.found().cells, self._config.policy
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
             f"{policy.retry_s:g} s ({self.order_state.tries + 1} of {policy.retries})"
@@ -227,7 +228,7 @@ class Sequencer(PresentPart):
 
     def _begin_retry(self, cell: Cell) -> str:
         self._retry_at = None
-        self._exploration.viewpoints = self._viewpoints() - {cell}
+        self._exploration.viewpoints = self.uncovered.viewpoints() - {cell}
         self._company.try_again()
         # In a retry, one path without progress is enough to give up.
         self._done, self._in_vain = self.done, MAX_IN_VAIN
@@ -238,7 +239,7 @@ class Sequencer(PresentPart):
         self._retry_at = None
         state = self.order_state = replace(self.order_state, stage=Stage.OVER)
         late = f"{state.late}: " if state.late else ""
-        self.ending = late + self._outcome() + self._sum_up()
+        self.ending = late + self.uncovered.outcome() + self._sum_up()
         area, free = self._map.area, self._map.free
         if order is not None and area is not None and free is not None:
             self.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
@@ -254,5 +255,8 @@ class Sequencer(PresentPart):
         closed = self._map.obstacles.closed
         key = (self._map.area, self._ledger.version, closed)
         if key != self._retry_check[0]:
-            self._retry_check = key, bool(self.cells.left() or closed or self._viewpoints())
+            self._retry_check = (
+                key,
+                bool(self.cells.left() or closed or self.uncovered.viewpoints()),
+            )
         return self._retry_check[1]
