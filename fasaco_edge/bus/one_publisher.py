@@ -51,12 +51,7 @@ class OnePublisher:
         self._other, self._refused_at, self._misses = "", float("-inf"), False
 
     def takes(self, sender: str, now: float) -> bool:
-        """Return whether a sample counts.
-
-        Args:
-            sender: id of its session; "" if unknown.
-            now: time by the monotonic clock [s].
-        """
+        """Return whether a sample of session ``sender``, "" if unknown, counts at ``now`` [s]."""
         if sender != self._first:
             if not sender or self._sessions.is_relay(sender):
                 return True

@@ -13,7 +13,7 @@ from functools import partial
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.publisher import RosPublisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.ros import RosConfig
@@ -92,12 +92,13 @@ class RosBridge:
         self._announce("SS", service)
         return key
 
-    def _publisher(self, topic: RosTopic, like: Topic) -> RosPublisher:
+    def _publisher(self, topic: RosTopic, like: Topic) -> Publisher:
         """Publish ``topic`` with the quality of service of the native key ``like``."""
         key = self._config.output_key(topic)
         publisher = self._bus.publisher(key, topic.schema, like.qos or VOLATILE)
-        token = self._announce("MP", topic)
-        return RosPublisher(publisher, gid_of(token) if token else b"")
+        if token := self._announce("MP", topic):
+            publisher.gid = gid_of(token)
+        return publisher
 
     def _announce(self, kind: Endpoint, topic: RosTopic) -> str:
         """Return the token of a new endpoint; "" with a bridge, which declares its own tokens."""
