@@ -23,8 +23,7 @@ from fasaco_edge.daemon.loop.inbox import (
     take_batch,
 )
 from fasaco_edge.daemon.loop.mission_runner import HeldEvents
-from fasaco_edge.errors import MalformedMessage, PatchWithoutBase
-from fasaco_edge.grid.lattice import Footprint
+from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.mission.core.events import (
     BatteryReceived,
     MapReceived,
@@ -32,7 +31,6 @@ from fasaco_edge.mission.core.events import (
     PatchReceived,
     PoseReceived,
 )
-from fasaco_edge.mission.core.mission import Mission, MissionConfig
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_PRIORITY_BYTES
 from fasaco_edge.wire.messages.battery import BatteryState, encode_battery
@@ -42,8 +40,6 @@ from fasaco_edge.wire.topics import QUEUE_LENGTHS
 from tests.support.outsider import TIMEOUT_S, open_client
 from tests.support.processes import free_endpoint
 from tests.support.rooms import (
-    RADIUS_M,
-    TOOL_M,
     map_bytes,
     pillared_room,
     pose_bytes,
@@ -190,32 +186,6 @@ def test_a_map_leaves_the_updates_of_another_frame_alone(arrivals):
     events, faults = arrivals.events()
     assert [type(event) for event in events] == [MapReceived, PatchReceived]
     assert (events[1].patch.frame, faults) == ("map", [])
-
-
-def test_an_update_without_its_base_requests_the_full_map(arrivals):
-    mission = Mission(MissionConfig(Footprint(TOOL_M, RADIUS_M)))
-
-    def asked_for_a_map():
-        """Step; return how many updates were refused for want of the full map."""
-        events, faults = arrivals.events()
-        faults += mission.step(events, arrivals.clock).faults
-        assert {type(fault) for fault in faults} <= {PatchWithoutBase}
-        assert all("publish the full map" in fault.hint for fault in faults)
-        return len(faults)
-
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (1, 0)
-    arrivals.post("map", MAP)
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (0, 2)
-    for _ in range(300):
-        arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (1 + 256, 2)
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (1, 2)
-    arrivals.post("map", MAP)
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (0, 4)
 
 
 def test_a_thread_that_failed_ends_the_daemon(arrivals):

@@ -181,14 +181,6 @@ def test_a_page_is_served_and_nothing_else():
             refused.value.close()
 
 
-def test_before_the_first_status_there_is_no_page():
-    with served(None) as url:
-        with pytest.raises(urllib.error.HTTPError) as refused:
-            OPENER.open(f"{url}/metrics", timeout=60)
-        assert refused.value.code == 503
-        refused.value.close()
-
-
 def test_silent_or_talkative_clients_block_no_other():
     with served() as url, ExitStack() as stack:
         address = "127.0.0.1", int(url.rpartition(":")[2])
@@ -215,20 +207,6 @@ def test_a_flood_of_silent_connections_blocks_no_client():
                 with OPENER.open(f"{url}/metrics", timeout=60) as answer:
                     assert answer.status == 200
                     assert answer.read()
-
-
-def test_all_who_ask_at_once_are_answered():
-    """Some of them take nothing of the answer."""
-    with served() as url, ExitStack() as stack:
-        address, asking = ("127.0.0.1", int(url.rpartition(":")[2])), []
-        for number in range(40):
-            asking.append(stack.enter_context(socket.socket()))
-            asking[-1].settimeout(60.0)
-            if number % 2:
-                asking[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
-            asking[-1].connect(address)
-            asking[-1].sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
-        assert all(each.recv(12) == b"HTTP/1.0 200" for each in asking[::2])
 
 
 def test_endless_requests_get_a_few_answers_a_second():

@@ -124,10 +124,6 @@ def test_a_payload_that_is_not_taken_is_an_error(covering, name):
     assert answer["message"] == f"{name} takes no payload, got one of 2 bytes"
 
 
-def test_parameters_of_zenoh_are_stepped_over(covering):
-    assert get(covering, "@rpc/version?_time=[now(-1h)..]")[0].ok is not None
-
-
 def test_the_living_trail_is_answered_without_subscribers(covering):
     def told() -> tuple[bytes, dict]:
         reply = covering.ask("@rpc/pheromone")
