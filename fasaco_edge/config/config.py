@@ -95,7 +95,7 @@ class PlannerConfig(Document, frozen=True):
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(self.colony, others=["ants", "velocities"])
+        yield from refused(self.colony, others=["velocities"])
 
     def colony(self) -> ColonyConfig:
         """Return the configuration of the colony.
@@ -251,7 +251,7 @@ class MetricsConfig(Document, frozen=True):
     open_to_everyone: bool = False
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(self.address, key="listen", others=["open_to_everyone"])
+        yield from refused(self.address, key="listen")
 
     def address(self) -> Address | None:
         """Return the address; None for none.
@@ -267,6 +267,7 @@ class MetricsConfig(Document, frozen=True):
             raise BadConfiguration(
                 f"{self.listen} lets other computers read the status",
                 key="metrics.listen",
+                others=["open_to_everyone"],
                 hint="listen on 127.0.0.1, or set metrics.open_to_everyone",
             )
         return address

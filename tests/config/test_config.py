@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.cli import main
 from fasaco_edge.config.config import DaemonConfig, MissionSettings
-from fasaco_edge.config.loading import decode_config, load_config
+from fasaco_edge.config.loading import decode_config, inspect_config, load_config
 from fasaco_edge.config.ros import RosConfig, RosFrames
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.registry import PLANNER_NAMES
@@ -243,6 +244,31 @@ def test_a_fault_is_named_with_its_file(load, tmp_path, text, said):
         load(text)
     assert said in str(caught.value)
     assert str(tmp_path / "config.yaml") in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("document", "keys"),
+    [
+        (
+            {"metrics": {"listen": "nonsense", "open_to_everyone": "perhaps"}},
+            {"metrics.listen", "metrics.open_to_everyone"},
+        ),
+        (
+            {"metrics": {"listen": "0.0.0.0:9465", "open_to_everyone": "perhaps"}},
+            {"metrics.open_to_everyone"},
+        ),
+        (
+            {"planner": {"ants": "many", "velocities": "fast"}},
+            {"planner.ants", "planner.velocities"},
+        ),
+        ({"planner": {"ants": 2, "velocities": "fast"}}, {"planner.velocities"}),
+        ({"planner": {"ants": 2, "velocities": 3}}, {"planner.velocities"}),
+    ],
+)
+def test_faults_that_do_not_depend_on_each_other_come_together(tmp_path, document, keys):
+    file = tmp_path / "robot.yaml"
+    file.write_text(json.dumps(document))
+    assert {fault.key for fault in inspect_config(file)[1]} == keys
 
 
 def test_unreadable_files_are_named(tmp_path):
