@@ -48,8 +48,8 @@ def waste(payload: bytes) -> None:
 @pytest.mark.parametrize(
     ("harm", "found"),
     [
-        (fail, "IndexError in decode"),
-        (warn, "RuntimeWarning in decode"),
+        (fail, "IndexError in fail"),
+        (warn, "RuntimeWarning in warn"),
         (waste, "AssertionError in peak_bytes"),
     ],
 )
