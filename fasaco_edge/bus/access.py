@@ -22,8 +22,9 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
-from fasaco_edge.wire.topic_types import Query, Topic
-from fasaco_edge.wire.topics import QUERIES, RPC_NAMES, TOPICS
+from fasaco_edge.wire.queries import QUERIES, RPC_NAMES, Query
+from fasaco_edge.wire.topic_types import Topic
+from fasaco_edge.wire.topics import TOPICS
 
 SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
 LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")

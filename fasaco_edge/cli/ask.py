@@ -31,8 +31,8 @@ from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
+from fasaco_edge.wire.queries import RPC_NAMES
 from fasaco_edge.wire.reasons import plain
-from fasaco_edge.wire.topics import RPC_NAMES
 
 if TYPE_CHECKING:
     from fasaco_edge.bus.queries import Reply

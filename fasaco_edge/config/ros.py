@@ -15,8 +15,9 @@ from fasaco_edge.host.documents import Document
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.messages.ros_node import TRIGGERED, Triggered
 from fasaco_edge.wire.ros_keys import TRIGGER, Release, RosTopic, graph_key
+from fasaco_edge.wire.ros_topics import ROS_TOPICS
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
-from fasaco_edge.wire.topics import ROS_TOPICS, TF_STATIC
+from fasaco_edge.wire.topics import TF_STATIC
 
 # ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")

@@ -23,7 +23,8 @@ from fasaco_edge.wire import documents
 from fasaco_edge.wire.documents.fleet import FleetMember
 from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.turns import TurnBatch
-from fasaco_edge.wire.topics import QUERIES, TOPICS
+from fasaco_edge.wire.queries import QUERIES
+from fasaco_edge.wire.topics import TOPICS
 
 HEAD = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -9,7 +9,7 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire import schemas
 from fasaco_edge.wire.ros_keys import (
     GID_BYTES,
     SERVICE_HASHES,
@@ -20,6 +20,7 @@ from fasaco_edge.wire.ros_keys import (
     attachment,
     gid_of,
 )
+from fasaco_edge.wire.ros_topics import ROS_TOPICS
 from tests.wire import oracle
 from tests.wire.contract_files import CONTRACT, load
 
@@ -122,7 +123,7 @@ def test_each_publisher_has_a_gid_of_its_own() -> None:
 def test_rows_are_those_of_the_table() -> None:
     rows = [
         (row.name, row.direction, list(row.schemas), row.latched, row.depth)
-        for row in topics.ROS_TOPICS.values()
+        for row in ROS_TOPICS.values()
     ]
     columns = ("name", "direction", "schema", "latched", "depth")
     assert rows == [tuple(entry[name] for name in columns) for entry in TABLE["topics"]]

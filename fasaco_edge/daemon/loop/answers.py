@@ -24,7 +24,6 @@ from fasaco_edge.errors import BadQuery, CommandError, FasacoError, UnknownQuery
 from fasaco_edge.mission.core.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.order import Command
-from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import Settings, decode_json, encode_json
 from fasaco_edge.wire.documents.replies import Version, encode_error
@@ -36,6 +35,7 @@ from fasaco_edge.wire.messages.ros_node import (
     encode_response,
     response_attachment,
 )
+from fasaco_edge.wire.queries import RPC_NAMES
 
 # Least period of requested replans, as a path that keeps changing is hard to follow [s].
 REPLAN_PERIOD_S = 1.0
@@ -121,11 +121,11 @@ def _document_reply(document: Callable[[], object], request: Request) -> Reply:
 
 def _unknown(keys: Keys, request: Request) -> Reply | None:
     """Reply to queries that no other queryable serves, as this one gets every query."""
-    if any(matches(request.key, keys.rpc(name)) for name in topics.RPC_NAMES):
+    if any(matches(request.key, keys.rpc(name)) for name in RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]
     return error_reply(
-        UnknownQuery(f"there is no query {name!r}; there are {', '.join(topics.RPC_NAMES)}")
+        UnknownQuery(f"there is no query {name!r}; there are {', '.join(RPC_NAMES)}")
     )
 
 

@@ -29,6 +29,7 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.queries import RPC_NAMES
 from fasaco_edge.wire.topic_types import Topic
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Outbox:
         self._ros_publishers = {} if ros is None else ros.publishers
         self._kept: dict[str, Callable[[], AnyReply]] = {}
         for topic in SENT_TOPICS:
-            if topic.name in topics.RPC_NAMES:
+            if topic.name in RPC_NAMES:
                 answer = answering(partial(self._answer, topic.name))
                 for key in (keys.rpc(topic.name), keys.of(topic)):
                     bus.serve(key, answer)
