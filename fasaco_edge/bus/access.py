@@ -126,7 +126,7 @@ class Grant:
         return f"{self.role} of {self.of}" if self.of else self.role
 
 
-class Limits(msgspec.Struct, frozen=True):
+class SenderLimits(msgspec.Struct, frozen=True):
     """Largest size [bytes] and rate [1/s] of the messages of each sender.
 
     Zenoh drops larger messages; above the rate it passes on the first message of each period and
@@ -165,7 +165,7 @@ def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
     }
 
 
-def limits(prefix: str, most: Limits) -> dict[str, Any]:
+def limits(prefix: str, most: SenderLimits) -> dict[str, Any]:
     """Return Zenoh's ``low_pass_filter`` and ``downsampling`` for incoming messages."""
     published = ["put", "reply"]
     classes: dict[str, list[str]] = {}

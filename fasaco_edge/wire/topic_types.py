@@ -123,7 +123,7 @@ class Topic:
 
     @property
     def size_class(self) -> SizeClass:
-        """Its size limit, see ``bus.access.Limits``."""
+        """Its size limit, see ``bus.access.SenderLimits``."""
         if self.qos is None:
             return "token"
         if not self.schemas:

@@ -14,7 +14,7 @@ from tests.wire.contract_files import CONTRACT, load
 PREFIX = "fasaco/@v1/robot"
 TABLE = load("keys.yaml")
 KEYS, QUERIES = TABLE["keys"], TABLE["queries"]
-MOST = access.Limits(64_001_024, 20.0, 200.0, 20.0)
+MOST = access.SenderLimits(64_001_024, 20.0, 200.0, 20.0)
 
 
 def granted(control, role, message, flow):

@@ -16,7 +16,7 @@ import zenoh.ext
 
 from fasaco_edge.bus import queries as roll_module
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
@@ -112,8 +112,8 @@ def test_answers_of_others_come_in_whole(bus, client):
 
     client.declare_queryable(KEY, answer)
     until(lambda: bus.get(KEY))
-    assert bus.get(KEY) == [Reply(b"yes", SCHEMA, b"attached")]
-    assert bus.get(f"{KEY}?bad") == [Reply(b"no", is_error=True)]
+    assert bus.get(KEY) == [QueryReply(b"yes", SCHEMA, b"attached")]
+    assert bus.get(f"{KEY}?bad") == [QueryReply(b"no", is_error=True)]
     assert bus.get("test/@v1/nobody", timeout_s=0.5) == []
 
 

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.cli import main
-from fasaco_edge.config.config import DaemonConfig, MissionSettings
+from fasaco_edge.config.config import DaemonConfig, MissionPolicyConfig
 from fasaco_edge.config.loading import decode_config, inspect_config, load_config
 from fasaco_edge.config.ros import RosConfig, RosFrames
 from fasaco_edge.errors import BadConfiguration
@@ -299,12 +299,12 @@ def test_the_state_folder_follows_settings_and_environment(
     monkeypatch, configured, environ, folder
 ):
     monkeypatch.setenv("HOME", "/home/pi")
-    assert MissionSettings(state_dir=configured).state_folder(environ) == Path(folder)
+    assert MissionPolicyConfig(state_dir=configured).state_folder(environ) == Path(folder)
 
 
 def test_without_a_home_the_state_folder_must_be_given():
     with pytest.raises(BadConfiguration, match=r"mission\.state_dir: ~nobody-of-that-name"):
-        MissionSettings(state_dir="~nobody-of-that-name/x").state_folder({})
+        MissionPolicyConfig(state_dir="~nobody-of-that-name/x").state_folder({})
 
 
 VALUES = st.one_of(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.queries import Question, Reply
+from fasaco_edge.bus.queries import QueryReply, Question
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.daemon.loop.answers import Commands
@@ -221,7 +221,7 @@ def test_a_command_that_others_push_out_is_answered(arrivals):
             assert json.loads(reply.err.payload.to_bytes())["code"] == "not_now"
             for _ in range(most):
                 (question,) = take_batch(arrivals.mailbox, 10.0).questions
-                question.answer(Reply(b"{}"))
+                question.answer(QueryReply(b"{}"))
             assert [one.ok is not None for replies in asked[1:] for one in replies] == [True] * most
         finally:
             session.close()

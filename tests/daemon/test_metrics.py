@@ -18,7 +18,7 @@ from fasaco_edge.config.config import DaemonConfig, MetricsConfig
 from fasaco_edge.config.loading import inspect_config
 from fasaco_edge.daemon.metrics import (
     CONTENT_TYPE,
-    FIGURES,
+    METRICS,
     PREFIX,
     MetricsServer,
     exposition,
@@ -68,7 +68,7 @@ def parsed(text):
     for line in text.splitlines():
         if line.startswith("# HELP "):
             name = line.split(" ")[2]
-            assert name not in kinds, "all samples of a figure stand together"
+            assert name not in kinds, "all samples of a metric stand together"
             continue
         if line.startswith("# TYPE "):
             _, _, of, kind = line.split(" ")
@@ -99,7 +99,7 @@ def test_the_board_shows_figures_and_labels_that_there_are():
     board = json.loads((MANUAL.parent / "grafana.json").read_text(encoding="utf-8"))
     status = structs.replace(STATUS, battery=BatteryReport(level=0.5))
     told = parsed(exposition(status, 0.5))
-    known = {name for name, _ in told} | {f"{PREFIX}_{figure.name}" for figure in FIGURES}
+    known = {name for name, _ in told} | {f"{PREFIX}_{metric.name}" for metric in METRICS}
     numbers = [panel["id"] for panel in board["panels"]]
     assert len(set(numbers)) == len(numbers) > 10
     shown = set()

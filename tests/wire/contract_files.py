@@ -198,7 +198,7 @@ def template_grants() -> dict[str, list[access.Grant]]:
 def with_keys(template: str, grants: Sequence[access.Grant]) -> str:
     """Return a session template with the key expressions that the table of topics gives it."""
     rules = access.access_control(grants, "usernames")["rules"]
-    limits = access.limits(grants[-1].prefix, access.Limits())
+    limits = access.limits(grants[-1].prefix, access.SenderLimits())
     found = {rule["id"]: rule["key_exprs"] for rule in (*rules, *limits["low_pass_filter"])}
     rates = {
         part["id"]: [rule["key_expr"] for rule in part["rules"]] for part in limits["downsampling"]

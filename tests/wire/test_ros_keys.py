@@ -58,10 +58,10 @@ def test_topics_are_those_of_the_table() -> None:
     by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
     inputs = list(by_pose.inputs.values())
     ours = [
-        *(*inputs[:4], config.keep_out_mask, config.scan, *inputs[4:]),
+        *(*inputs[:4], config.topic("keep_out_mask"), config.topic("scan"), *inputs[4:]),
         *(config.inputs["pose"], config.inputs["tf_static"]),
         *config.outputs.values(),
-        config.velocities(schemas.TWIST),
+        config.topic("cmd_vel", schemas.TWIST),
     ]
     shown = re.findall(r"^\| `(/\w+)` \| (in|out).* \| (.*) \| (.*) \|$", CONTRACT, re.MULTILINE)
     for topic, entry, row in zip(ours, TABLE["topics"], shown, strict=True):

@@ -19,7 +19,7 @@ from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import encode_ledger
 from fasaco_edge.daemon.loop.answers import config_document
-from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Received
+from fasaco_edge.daemon.loop.inbox import MAPS, CycleInput, Received
 from fasaco_edge.kernels.folder import sources_digest
 from fasaco_edge.mission.core.events import CommandReceived, Decision, PlanBroken, PlanReady
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
@@ -102,7 +102,7 @@ class TurnLog:
     def note(
         self,
         now: float,
-        batch: Batch,
+        batch: CycleInput,
         commands: Sequence[CommandReceived],
         decision: Decision,
         mission: Mission | None,
