@@ -210,12 +210,8 @@ def limits(prefix: str, most: SenderLimits) -> dict[str, Any]:
 
 
 def ros_rights(inputs: Sequence[str], outputs: Sequence[str], graph: Sequence[str]) -> Role:
-    """Return the rights of the other side in a ROS 2 graph.
-
-    Args:
-        inputs, outputs: keys the daemon subscribes to, and publishes on.
-        graph: keys of the liveliness tokens of nodes.
-    """
+    """Return the rights of the other side in a ROS 2 graph, with keys of the daemon's inputs and
+    outputs, and of the liveliness tokens of nodes."""
     return Role(ROLES["ros"].description, speaks=(*inputs, *graph), listens=(*outputs, *graph))
 
 
@@ -237,9 +233,7 @@ def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, An
 def user_password(user: str, password: str, dictionary_file: str) -> dict[str, Any]:
     """Return Zenoh's ``transport`` with authentication by user and password.
 
-    Args:
-        user, password: of this session.
-        dictionary_file: lines ``user:password`` of the users that may connect to it, or "".
+    ``dictionary_file``: lines ``user:password`` of the users that may connect to it, or "".
     """
     login: dict[str, str] = {"user": user, "password": password}
     if dictionary_file:

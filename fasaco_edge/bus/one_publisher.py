@@ -36,10 +36,8 @@ class Sessions(Protocol):
 class OnePublisher:
     """The publisher of one input that counts; used from one thread, or under the caller's lock.
 
-    Args:
-        name: name of the input, in the plural: "maps".
-        silent_s: silence after which another publisher takes over [s].
-        sessions: the sessions on the bus.
+    ``name`` is that of the input, in the plural: "maps". After ``silent_s`` [s] of silence another
+    publisher takes over.
     """
 
     def __init__(self, name: str, silent_s: float, sessions: Sessions) -> None:

@@ -22,14 +22,9 @@ def encoding_of(schema: str) -> zenoh.Encoding:
 
 
 class Publisher:
-    """Publishes samples on one key.
+    """Publishes samples of a CDR type on one key; ``schema`` "" is JSON.
 
-    Args:
-        session: Zenoh session.
-        key: key expression to publish on.
-        schema: CDR type; "" for JSON.
-        qos: quality of service. In Zenoh the sender decides whether a sample is dropped on
-            congestion.
+    In Zenoh the sender decides whether a sample is dropped on congestion.
 
     Attributes:
         gid: of a ROS 2 topic's publisher, for rmw_zenoh's attachment of each sample; b"" for none.

@@ -183,8 +183,7 @@ class RobotConfig(StrictDocument, frozen=True):
     def curves(self, price_s_m2: float) -> CurveConfig | None:
         """Return the configuration of curves; None for a robot that turns on the spot.
 
-        Args:
-            price_s_m2: value of sweeping a square metre [s/m2].
+        ``price_s_m2``: value of sweeping a square metre [s/m2].
         """
         if not self.turn_radius_m:
             return None

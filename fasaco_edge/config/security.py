@@ -108,8 +108,7 @@ class SecurityConfig(StrictDocument, frozen=True):
     def of_client(self, dictionary_file: str = "") -> dict[str, Any]:
         """Return the credentials of a session, as a part of Zenoh's configuration.
 
-        Args:
-            dictionary_file: passwords of the users who may connect to it; "" for none.
+        ``dictionary_file``: passwords of the users who may connect to it; "" for none.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -139,10 +138,8 @@ class SecurityConfig(StrictDocument, frozen=True):
     ) -> dict[str, Any]:
         """Return the credentials of a daemon's session, with access control for all others.
 
-        Args:
-            prefix: prefix of all keys of the robot.
-            ros, ros_driver: rights of the roles ``ros`` and ``driver`` under ROS 2; None without a
-                section ``ros2``.
+        ``prefix`` is that of all keys of the robot; ``ros`` and ``ros_driver`` are the rights of
+        the roles ``ros`` and ``driver`` under ROS 2, None without a section ``ros2``.
 
         Raises:
             BadConfiguration: a file cannot be read.

@@ -189,10 +189,7 @@ def _escaped(text: str) -> str:
 
 
 class MetricsServer:
-    """Serves the newest status.
-
-    Args:
-        address: the address to listen on.
+    """Serves the newest status at an address.
 
     Raises:
         OSError: it cannot listen there.

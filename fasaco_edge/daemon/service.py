@@ -72,7 +72,6 @@ def run_daemon(
     """Serve until SIGTERM or SIGINT.
 
     Args:
-        config: the configuration.
         record_to: folder for recordings; None for no recordings.
         state: folder of the coverage ledger; None for the configured one.
         fresh: set the ledger aside, and cover everything again.

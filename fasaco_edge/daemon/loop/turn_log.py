@@ -70,11 +70,7 @@ NO_SUBSCRIBER = "it has no subscriber"
 class TurnLog:
     """Publishes the log in batches.
 
-    Args:
-        publisher: publisher of the log's key.
-        config: the configuration in force.
-        restored: the ledger that the daemon began with, if any.
-        rooms: the file of rooms that it began with; b"" for none.
+    It begins with the ledger and the file of rooms that the daemon began with, if any.
     """
 
     def __init__(
