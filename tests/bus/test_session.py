@@ -14,7 +14,7 @@ import pytest
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.bus import queries as roll_module
+from fasaco_edge.bus import queries
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.bus.session import open_bus
@@ -302,12 +302,12 @@ def test_a_token_list_never_misses_who_is_there(bus, endpoint):
 def test_a_token_list_asks_again_where_no_answer_comes(bus, monkeypatch):
     bus.token(f"{KEY}/here")
     roll = bus.token_list(f"{KEY}/*")
-    ask = roll_module.ask_for_tokens
+    ask = queries.ask_for_tokens
     for is_asked in (False, True):
-        monkeypatch.setattr(roll_module, "ask_for_tokens", lambda *_, said=is_asked: said)
-        monkeypatch.setattr(roll_module, "LOST_S", 0.05)
+        monkeypatch.setattr(queries, "ask_for_tokens", lambda *_, said=is_asked: said)
+        monkeypatch.setattr(queries, "LOST_S", 0.05)
         roll.ask(0.0)
-        monkeypatch.setattr(roll_module, "ask_for_tokens", ask)
+        monkeypatch.setattr(queries, "ask_for_tokens", ask)
         version = roll.version
         until(lambda version=version: roll.ask(0.0) or roll.version > version)
     assert roll.there() == {f"{KEY}/here"}
@@ -319,7 +319,7 @@ def test_a_token_list_keeps_tokens_of_a_partial_answer(bus, monkeypatch):
     until(lambda: roll.ask(0.0) or roll.version)
     with monkeypatch.context() as patched:
         patched.setattr(
-            roll_module, "ask_for_tokens", lambda *asked: asked[3]([f"{KEY}/new"], False) or True
+            queries, "ask_for_tokens", lambda *asked: asked[3]([f"{KEY}/new"], False) or True
         )
         roll.ask(0.0)
         assert roll.there() == {f"{KEY}/here", f"{KEY}/new"}
@@ -328,7 +328,7 @@ def test_a_token_list_keeps_tokens_of_a_partial_answer(bus, monkeypatch):
 
 
 def test_a_token_list_has_a_bound(bus, endpoint, monkeypatch):
-    monkeypatch.setattr(roll_module, "MOST_TOKENS", 100)
+    monkeypatch.setattr(queries, "MOST_TOKENS", 100)
     roll = bus.token_list(f"{KEY}/*")
     with open_bus(BusSettings("client", (endpoint,))) as flood:
         for number in range(300):

@@ -200,23 +200,6 @@ def test_a_ledger_set_aside_is_complete(written):
     assert contents(load(written).ledger) == contents(lane(4))
 
 
-def test_a_failed_set_aside_is_repeated_before_the_next_write(written, monkeypatch):
-    file = LedgerFile(written, "robot")
-
-    def failing(*_):
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "rename", failing)
-        for attempt in (lambda: file.set_aside("fresh"), lambda: file.write(lane(1))):
-            with pytest.raises(OSError, match="Read-only"):
-                attempt()
-        assert names(written) == list(NAMES)
-    file.write(lane(1))
-    kept = {path.read_bytes() for path in written.iterdir() if "fresh" in path.name}
-    assert kept == {encode_ledger(lane(3)), encode_ledger(lane(4))}
-
-
 def test_an_impossible_folder_does_not_prevent_the_start(tmp_path):
     (tmp_path / "file").write_text("not a folder")
     file = LedgerFile(tmp_path / "file", "robot")
