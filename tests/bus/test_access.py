@@ -53,11 +53,7 @@ def test_the_readme_has_the_roles():
 
 @pytest.mark.parametrize(
     ("role", "name", "message"),
-    [
-        ("mapper", "map", "put"),
-        ("operator", "@rpc/mission", "query"),
-        ("driver", "cmd_vel", "put"),
-    ],
+    [("mapper", "map", "put"), ("operator", "@rpc/mission", "query"), ("driver", "cmd_vel", "put")],
 )
 def test_only_one_role_and_routers_may_send_each_input(role, name, message):
     everybody = {role: [role] for role in access.ROLES}

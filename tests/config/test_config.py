@@ -184,10 +184,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("mission: {state: /var}", "mission.state: unknown key"),
         ("mission: {state_dir: 3}", "mission.state_dir: expected str, in quotes, got 3"),
         (r'mission: {state_dir: "a\0b"}', "mission.state_dir: must be a path"),
-        (
-            "mission: {zones: [{name: hall}]}",
-            "mission.zones[0].polygon: missing",
-        ),
+        ("mission: {zones: [{name: hall}]}", "mission.zones[0].polygon: missing"),
         (
             "mission: {zones: [{name: hall, polygon: [[0, 0], [1, a], [1, 1]]}]}",
             "mission.zones[0].polygon[1][1]: expected float, got 'a'",

@@ -34,10 +34,7 @@ def waiting(daemon: Daemon) -> Daemon:
 
 def test_it_is_ready_when_its_token_stands(tmp_path):
     started = time.monotonic()
-    with (
-        daemon_process(tmp_path, executed=True) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with daemon_process(tmp_path, executed=True) as running, Outsider(running.endpoint) as outsider:
         print(f"ready {1e3 * (time.monotonic() - started):.0f} ms after its start")
         assert "ready after" in running.log_text()
         running.stop()

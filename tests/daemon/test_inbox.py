@@ -39,12 +39,7 @@ from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 from tests.support.outsider import TIMEOUT_S, open_client
 from tests.support.processes import free_endpoint
-from tests.support.rooms import (
-    map_bytes,
-    pillared_room,
-    pose_bytes,
-    update_bytes,
-)
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
 
 MAP = map_bytes(pillared_room())
 f32 = np.float32

@@ -18,16 +18,7 @@ from fasaco_edge.daemon.ledger.file import KEPT_ASIDE, LedgerFile
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
 from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
 from tests.daemon.test_ledger_codec import enveloped
-from tests.support.ledgers import (
-    CELL_M,
-    NAMES,
-    contents,
-    driven,
-    lane,
-    load,
-    names,
-    visits_of,
-)
+from tests.support.ledgers import CELL_M, NAMES, contents, driven, lane, load, names, visits_of
 
 
 def test_an_absent_folder_holds_no_ledger(tmp_path):

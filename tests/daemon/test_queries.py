@@ -45,10 +45,7 @@ def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[s
 def covering(tmp_path_factory):
     """A daemon that has planned for a room, without local search."""
     folder = tmp_path_factory.mktemp("covering")
-    with (
-        daemon_process(folder, planner=ANTS) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with daemon_process(folder, planner=ANTS) as running, Outsider(running.endpoint) as outsider:
         for name in ("coverage", "pheromone"):
             assert error(outsider, f"@rpc/{name}")["code"] == "not_yet"
         assert error(outsider, "@rpc/replan")["code"] == "not_now"

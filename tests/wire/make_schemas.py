@@ -77,10 +77,7 @@ def config_schema() -> dict[str, Any]:
         "stand in each section is the package's own business.",
         "type": "object",
         "properties": {
-            field.name: {
-                "description": _summary(next(_structs_of(field.type))),
-                "type": "object",
-            }
+            field.name: {"description": _summary(next(_structs_of(field.type))), "type": "object"}
             for field in fields
         },
         "required": [field.name for field in fields if field.default is not msgspec.UNSET],

@@ -140,9 +140,7 @@ def odometry(
         child_frame_id=child,
         pose=pose_with_covariance(where, covariance),
         twist=make(
-            "geometry_msgs/msg/TwistWithCovariance",
-            twist=twist(numbers),
-            covariance=spread,
+            "geometry_msgs/msg/TwistWithCovariance", twist=twist(numbers), covariance=spread
         ),
     )
 
@@ -150,9 +148,7 @@ def odometry(
 def path(frame: str, stamp_ns: int, poses: list[tuple[str, int, Any]]) -> Any:
     """Return a nav_msgs/Path of poses, each with its own frame and stamp."""
     return make(
-        schemas.PATH,
-        header=header(frame, stamp_ns),
-        poses=[pose_stamped(*each) for each in poses],
+        schemas.PATH, header=header(frame, stamp_ns), poses=[pose_stamped(*each) for each in poses]
     )
 
 
