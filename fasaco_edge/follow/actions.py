@@ -21,7 +21,8 @@ from fasaco_edge.wire.messages.nav2_goals import (
     ENDED_BEFORE,
     NO_SUCH_GOAL,
     TAKEN,
-    GoalEnding,
+    DockEnding,
+    Ending,
     decode_accepted,
     decode_cancel,
     encode_cancel,
@@ -142,7 +143,7 @@ class Cancellations:
         return due
 
 
-def goal_error(ending: GoalEnding, errors: Mapping[int, str], no_code: str) -> str:
+def goal_error(ending: Ending | DockEnding, errors: Mapping[int, str], no_code: str) -> str:
     """Return the error of a failed goal: its code, the code's name, and the server's text."""
     code = f"{ending.code} {errors.get(ending.code, 'no code')}" if ending.code else no_code
     return f"{code}: {ending.message}" if ending.message else code

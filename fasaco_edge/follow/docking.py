@@ -35,7 +35,7 @@ from fasaco_edge.wire.messages.nav2_goals import (
     DOCK_ERRORS,
     GOAL_ID_BYTES,
     UNKNOWN,
-    GoalEnding,
+    DockEnding,
     decode_dock_ending,
     decode_undock_ending,
     encode_dock,
@@ -147,7 +147,7 @@ class Docking:
             self._cancel(goal)
         self._fail(why or "refused: is the docking server active?", now)
 
-    def take_ending(self, goal_id: bytes, ending: GoalEnding | None, why: str, now: float) -> None:
+    def take_ending(self, goal_id: bytes, ending: DockEnding | None, why: str, now: float) -> None:
         """Take in how a goal ended; None if the reply is malformed."""
         goal = self._goal
         if goal is None or goal.id != goal_id:
@@ -155,7 +155,7 @@ class Docking:
         if ending is None:
             self._cancel(goal)
             self._fail(why, now)
-        elif ending.is_docked:
+        elif ending.is_done:
             self._goal, self.trouble = None, ""
             self._is_docked = goal.move is Move.DOCK
             self._retry_at, self._retry_s = now, RETRY_S

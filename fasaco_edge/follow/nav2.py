@@ -34,7 +34,7 @@ from fasaco_edge.wire.messages.nav2_goals import (
     CANCELED,
     ERRORS,
     SUCCEEDED,
-    GoalEnding,
+    Ending,
 )
 from fasaco_edge.wire.messages.path_points import PathPoints
 
@@ -165,7 +165,7 @@ class Nav2Follower(Supervision):
         state = State.REFUSED if accepted is False else State.NO_NAV2
         self._fail(state, why or "is its controller server active?", now)
 
-    def take_ending(self, goal_id: bytes, ending: GoalEnding | None, why: str, now: float) -> None:
+    def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
         """Take in how a goal ended; None if that is unknown: it is cancelled."""
         if self._active is None or self._active.id != goal_id:
             return

@@ -7,10 +7,10 @@ import pytest
 from fasaco_edge.follow.actions import AskResult, CancelGoal, SendGoal
 from fasaco_edge.follow.docking import GIVE_UP_S, RESULT_EVERY_S, RETRY_S, Docking, Move
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.wire.messages.nav2_goals import ABORTED, CANCELED, SUCCEEDED, UNKNOWN, GoalEnding
+from fasaco_edge.wire.messages.nav2_goals import ABORTED, CANCELED, SUCCEEDED, UNKNOWN, DockEnding
 
 DOCK, BEFORE, AWAY = Pose2D(2.0, 0.0), Pose2D(1.5, 0.0), Pose2D(-3.0, 0.0)
-DONE = GoalEnding(SUCCEEDED, success=True)
+DONE = DockEnding(SUCCEEDED, success=True)
 
 
 class Robot:
@@ -98,15 +98,15 @@ def test_only_a_robot_started_in_its_dock_undocks_first(robot):
         assert robot.docking.holds == ""
     # Whoever put it there: the server knows, and says so where it is.
     robot.arrive(Pose2D(DOCK.x + 0.05, DOCK.y, 1.5))
-    robot.ends(robot.started(), GoalEnding(ABORTED, success=True))
+    robot.ends(robot.started(), DockEnding(ABORTED, success=True))
     assert robot.step(600.0) == []
 
 
 @pytest.mark.parametrize(
     ("ending", "why"),
     [
-        (GoalEnding(ABORTED, success=False, code=904, message="none"), "904 failed to detect"),
-        (GoalEnding(UNKNOWN, success=True), "restarted"),
+        (DockEnding(ABORTED, success=False, code=904, message="none"), "904 failed to detect"),
+        (DockEnding(UNKNOWN, success=True), "restarted"),
         (None, ""),
     ],
 )
@@ -135,7 +135,7 @@ def test_a_goal_without_an_answer_is_cancelled_and_sent_again(robot):
 
 def test_undocking_that_fails_keeps_the_robot_in_its_dock():
     robot = Robot(here=DOCK)
-    robot.ends(robot.started(), GoalEnding(ABORTED, success=False, code=905))
+    robot.ends(robot.started(), DockEnding(ABORTED, success=False, code=905))
     assert robot.step() == []
     assert robot.docking.holds == "in its dock"
 
@@ -148,7 +148,7 @@ def test_docking_that_is_not_wanted_any_more_is_cancelled(robot, state):
     assert robot.step() == [cancel(goal)]
     # Until Nav2 says so, the robot is its.
     assert robot.docking.holds == "docking"
-    robot.ends(goal, GoalEnding(CANCELED, success=False))
+    robot.ends(goal, DockEnding(CANCELED, success=False))
     assert robot.step() == []
     assert (robot.docking.holds, robot.docking.trouble) == ("", "")
 

@@ -25,7 +25,7 @@ from fasaco_edge.wire.messages.nav2_goals import (
     ERRORS,
     SUCCEEDED,
     UNKNOWN,
-    GoalEnding,
+    Ending,
     encode_goal,
 )
 from fasaco_edge.wire.messages.paths import encode_path
@@ -70,7 +70,7 @@ class Drive:
         self.follower.take_accepted(request.id, accepted, "", self.now)
 
     def end(self, request, status, code=0):
-        self.follower.take_ending(request.id, GoalEnding(status, code), "", self.now)
+        self.follower.take_ending(request.id, Ending(status, code), "", self.now)
 
     def begun(self, x=0.0, y=0.0):
         """Return the first goal, which Nav2 has accepted."""
@@ -292,7 +292,7 @@ def test_a_goal_that_is_not_taken_is_another_goal_later(answer, state, said, can
     assert again.id != goal.id
 
 
-@pytest.mark.parametrize("ending", [GoalEnding(UNKNOWN), NO_ANSWER])
+@pytest.mark.parametrize("ending", [Ending(UNKNOWN), NO_ANSWER])
 def test_a_restarted_server_gets_the_goal_again(ending):
     drive = Drive(*LONG)
     goal = drive.begun()

@@ -10,7 +10,7 @@ from fasaco_edge.wire.messages.nav2_goals import (
     ABORTED,
     CANCELED,
     SUCCEEDED,
-    GoalEnding,
+    DockEnding,
     decode_dock_ending,
     decode_undock_ending,
     encode_dock,
@@ -96,7 +96,7 @@ def test_endings_of_others_are_read(move, with_message):
     message = store.types["look_alike/msg/Ended"](**members)
     payload = bytes(store.serialize_cdr(message, "look_alike/msg/Ended", little_endian=True))
     read = decode_dock_ending if move == "Dock" else decode_undock_ending
-    assert read(payload) == GoalEnding(ABORTED, success=False, code=904, message=said)
+    assert read(payload) == DockEnding(ABORTED, success=False, code=904, message=said)
     # Without a message it may end there.
     for cut in range(4, 10 if move == "Dock" else 8):
         with pytest.raises(MalformedMessage):
@@ -104,9 +104,9 @@ def test_endings_of_others_are_read(move, with_message):
 
 
 def test_an_aborted_goal_with_success_is_done():
-    assert GoalEnding(SUCCEEDED, success=True).is_docked
+    assert DockEnding(SUCCEEDED, success=True).is_done
     # docking_server.cpp returns without a word, and its action server aborts the goal.
-    assert GoalEnding(ABORTED, success=True).is_docked
-    assert not GoalEnding(ABORTED, success=False).is_docked
-    assert not GoalEnding(ABORTED, success=False, code=905).is_docked
-    assert not GoalEnding(CANCELED, success=False).is_docked
+    assert DockEnding(ABORTED, success=True).is_done
+    assert not DockEnding(ABORTED, success=False).is_done
+    assert not DockEnding(ABORTED, success=False, code=905).is_done
+    assert not DockEnding(CANCELED, success=False).is_done

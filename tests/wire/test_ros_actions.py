@@ -13,7 +13,7 @@ from fasaco_edge.wire.messages.nav2_goals import (
     ABORTED,
     SUCCEEDED,
     TAKEN,
-    GoalEnding,
+    Ending,
     decode_accepted,
     decode_cancel,
     decode_ending,
@@ -164,7 +164,7 @@ def test_endings_of_others_are_read(release, padding):
     if padding and not members:
         payload = payload[:3] + b"\2" + payload[4:] + padding
     code, said = (105, "stuck") if members else (0, "")
-    assert decode_ending(payload) == GoalEnding(ABORTED, code, said)
+    assert decode_ending(payload) == Ending(ABORTED, code, said)
 
 
 def test_answers_of_others_are_read():
@@ -202,5 +202,5 @@ def test_an_invalid_answer_is_refused(decode, payload):
 
 
 def test_a_result_of_iron_ends_with_its_code():
-    assert decode_ending(b"\0\1\0\0\x04\0\0\0") == GoalEnding(SUCCEEDED)
-    assert decode_ending(b"\0\1\0\0\x06\0\x69\0") == GoalEnding(ABORTED, 105)
+    assert decode_ending(b"\0\1\0\0\x04\0\0\0") == Ending(SUCCEEDED)
+    assert decode_ending(b"\0\1\0\0\x06\0\x69\0") == Ending(ABORTED, 105)

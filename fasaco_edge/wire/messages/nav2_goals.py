@@ -49,33 +49,24 @@ ERRORS: Final = {
 """Codes of FollowPath."""
 
 _STAMP = struct.Struct("<iI")
-_STAMP_NAMES = ("stamp.sec", "stamp.nanosec")
-_CODE = struct.Struct("<H")
+_ERROR = struct.Struct("<H")
 # An empty string has its length and a NUL, and is longer than padding.
 LEAST_STRING_BYTES = 4
 
 
 @dataclass(frozen=True, slots=True)
-class GoalEnding:
+class Ending:
     """How a goal ended.
 
     Attributes:
         status: ``UNKNOWN``, ``SUCCEEDED``, ``CANCELED`` or ``ABORTED``.
-        code: one of ``ERRORS`` or ``DOCK_ERRORS``, or 0; FollowPath of Humble has none.
-        message: of the server, "" for none.
-        success: the docking server's value; False of other servers.
+        code: one of ``ERRORS``, or 0; Humble has none.
+        message: of the server, "" for none; only from Jazzy on.
     """
 
     status: int
     code: int = 0
     message: str = ""
-    success: bool = False
-
-    @property
-    def is_docked(self) -> bool:
-        """Whether the robot is where a docking goal asks it to be, even if it was there before."""
-        is_there = self.status == ABORTED and self.success and not self.code
-        return self.status == SUCCEEDED or is_there
 
 
 def encode_goal(
@@ -123,8 +114,8 @@ def encode_goal(
 def decode_accepted(payload: bytes) -> bool:
     """Return whether a goal was accepted, by the response of ``send_goal``."""
     reader = CdrReader(payload, SEND_GOAL)
-    accepted = _truth(reader, "accepted")
-    reader.words(_STAMP, _STAMP_NAMES)
+    accepted = _truth(reader.octets(1, "accepted")[0])
+    reader.words(_STAMP, ("stamp.sec", "stamp.nanosec"))
     reader.end()
     return accepted
 
@@ -136,21 +127,29 @@ def encode_goal_id(goal_id: bytes) -> bytes:
     return writer.payload()
 
 
-def decode_ending(payload: bytes) -> GoalEnding:
+def decode_ending(payload: bytes) -> Ending:
     """Return how a goal ended, by the response of ``get_result`` of any release."""
-    reader, status = _result(payload, GET_RESULT)
+    reader = CdrReader(payload, GET_RESULT)
+    status = reader.octets(1, "status")[0]
     reader.octets(1, "result")
-    # Humble's result ends here.
-    has_code = reader.remaining - payload[HEADER_SIZE - 1] >= _CODE.size
-    code = _code(reader, payload) if has_code else 0
-    return GoalEnding(status, code, _message(reader, payload))
+    code, message = 0, ""
+    # Humble's result ends here; the header's last byte counts its padding.
+    padding = payload[HEADER_SIZE - 1]
+    if reader.remaining - padding >= _ERROR.size:
+        code = _ERROR.unpack_from(payload, reader.take(2, _ERROR.size, "error_code"))[0]
+    if reader.remaining - padding > LEAST_STRING_BYTES:
+        message = reader.string("error_msg")
+    reader.end()
+    if status not in (UNKNOWN, SUCCEEDED, CANCELED, ABORTED):
+        refuse(GET_RESULT, "status", "the status of an ended goal: 0, 4, 5 or 6", status)
+    return Ending(status, code, message)
 
 
 def encode_cancel(goal_id: bytes) -> bytes:
     """Return the request of ``cancel_goal`` for one goal."""
     writer = CdrWriter(CANCEL_GOAL)
     writer.octets(goal_id)
-    writer.words(_STAMP, _STAMP_NAMES, 0, 0)
+    writer.words(_STAMP, ("stamp.sec", "stamp.nanosec"), 0, 0)
     return writer.payload()
 
 
@@ -160,38 +159,15 @@ def decode_cancel(payload: bytes) -> int:
     code = reader.octets(1, "return_code")[0]
     for index in range(reader.length("goals_canceling", GOAL_ID_BYTES + _STAMP.size)):
         reader.octets(GOAL_ID_BYTES, f"goals_canceling[{index}].goal_id")
-        reader.words(_STAMP, _STAMP_NAMES)
+        reader.words(_STAMP, ("stamp.sec", "stamp.nanosec"))
     reader.end()
     return code
 
 
-def _truth(reader: CdrReader, field: str) -> bool:
-    if (value := reader.octets(1, field)[0]) > 1:
-        refuse(reader.message, field, "0 or 1", value)
+def _truth(value: int) -> bool:
+    if value > 1:
+        refuse(SEND_GOAL, "accepted", "0 or 1", value)
     return value == 1
-
-
-def _result(payload: bytes, schema: str) -> tuple[CdrReader, int]:
-    """Return a reader behind the status of a result, and the status."""
-    reader = CdrReader(payload, schema)
-    status = reader.octets(1, "status")[0]
-    if status not in (UNKNOWN, SUCCEEDED, CANCELED, ABORTED):
-        refuse(schema, "status", "the status of an ended goal: 0, 4, 5 or 6", status)
-    return reader, status
-
-
-def _code(reader: CdrReader, payload: bytes) -> int:
-    code: int = _CODE.unpack_from(payload, reader.take(2, _CODE.size, "error_code"))[0]
-    return code
-
-
-def _message(reader: CdrReader, payload: bytes) -> str:
-    """Return the message at the end of a result; "" if it ends before."""
-    # The header's last byte counts the padding.
-    is_said = reader.remaining - payload[HEADER_SIZE - 1] > LEAST_STRING_BYTES
-    message = reader.string("error_msg") if is_said else ""
-    reader.end()
-    return message
 
 
 DOCK: Final = "nav2_msgs/action/DockRobot_SendGoal"
@@ -215,6 +191,30 @@ DOCK_ERRORS: Final = {
 STAGING_S, UNDOCKING_S = 1000.0, 30.0
 
 _TIME = struct.Struct("<f")
+_CODE = struct.Struct("<H")
+
+
+@dataclass(frozen=True, slots=True)
+class DockEnding:
+    """How a goal of the docking server ended.
+
+    Attributes:
+        status: as in ``Ending``.
+        success: the server's value.
+        code: one of ``DOCK_ERRORS``, or 0.
+        message: of the server, "" for none.
+    """
+
+    status: int
+    success: bool
+    code: int = 0
+    message: str = ""
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the robot is where the goal asks it to be, even if it was there before."""
+        is_there = self.status == ABORTED and self.success and not self.code
+        return self.status == SUCCEEDED or is_there
 
 
 def encode_dock(
@@ -251,20 +251,29 @@ def encode_undock(goal_id: bytes, dock_type: str) -> bytes:
     return writer.payload()
 
 
-def decode_dock_ending(payload: bytes) -> GoalEnding:
+def decode_dock_ending(payload: bytes) -> DockEnding:
     """Return how a goal of DockRobot ended."""
-    return _docking_ending(payload, DOCK_RESULT, has_retries=True)
+    return _ending(payload, DOCK_RESULT, has_retries=True)
 
 
-def decode_undock_ending(payload: bytes) -> GoalEnding:
+def decode_undock_ending(payload: bytes) -> DockEnding:
     """Return how a goal of UndockRobot ended."""
-    return _docking_ending(payload, UNDOCK_RESULT, has_retries=False)
+    return _ending(payload, UNDOCK_RESULT, has_retries=False)
 
 
-def _docking_ending(payload: bytes, schema: str, *, has_retries: bool) -> GoalEnding:
-    reader, status = _result(payload, schema)
-    success = _truth(reader, "success")
-    code = _code(reader, payload)
+def _ending(payload: bytes, schema: str, *, has_retries: bool) -> DockEnding:
+    reader = CdrReader(payload, schema)
+    status = reader.octets(1, "status")[0]
+    success = reader.octets(1, "success")[0]
+    if success > 1:
+        refuse(schema, "success", "0 or 1", success)
+    code: int = _CODE.unpack_from(payload, reader.take(2, _CODE.size, "error_code"))[0]
     if has_retries:
         reader.take(2, _CODE.size, "num_retries")
-    return GoalEnding(status, code, _message(reader, payload), success)
+    # The header's last byte counts the padding.
+    is_said = reader.remaining - payload[HEADER_SIZE - 1] > LEAST_STRING_BYTES
+    message = reader.string("error_msg") if is_said else ""
+    reader.end()
+    if status not in (UNKNOWN, SUCCEEDED, CANCELED, ABORTED):
+        refuse(schema, "status", "the status of an ended goal: 0, 4, 5 or 6", status)
+    return DockEnding(status, success == 1, code, message)
