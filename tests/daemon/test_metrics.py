@@ -181,6 +181,14 @@ def test_a_page_is_served_and_nothing_else():
             refused.value.close()
 
 
+def test_before_the_first_status_there_is_no_page():
+    with served(None) as url:
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            OPENER.open(f"{url}/metrics", timeout=60)
+        assert refused.value.code == 503
+        refused.value.close()
+
+
 def test_silent_or_talkative_clients_block_no_other():
     with served() as url, ExitStack() as stack:
         address = "127.0.0.1", int(url.rpartition(":")[2])
