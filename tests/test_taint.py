@@ -40,7 +40,7 @@ from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
-from fasaco_edge.wire.queries import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.serve.serving import looking, served
 from tests.support.forked import run_forked
 from tests.support.outsider import Outsider

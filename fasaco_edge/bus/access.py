@@ -22,7 +22,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
-from fasaco_edge.wire.queries import QUERIES, RPC_NAMES, Query
+from fasaco_edge.wire.query_table import QUERIES, RPC_NAMES, Query
 from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import TOPICS
 

@@ -31,7 +31,7 @@ from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
-from fasaco_edge.wire.queries import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:

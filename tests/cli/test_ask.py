@@ -14,7 +14,7 @@ from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import TroubleReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.queries import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room

@@ -16,7 +16,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon.loop.answers import LEFT_OUT, config_document
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
-from fasaco_edge.wire.queries import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.daemon.test_mission import about, covers, planned
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process

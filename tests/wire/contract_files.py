@@ -16,7 +16,7 @@ import yaml
 
 from fasaco_edge.bus import access
 from fasaco_edge.host.resources import folder
-from fasaco_edge.wire.queries import QUERIES, Query
+from fasaco_edge.wire.query_table import QUERIES, Query
 from fasaco_edge.wire.topic_types import Topic
 from fasaco_edge.wire.topics import QOS, TOPICS
 from tests.wire import make_schemas, page_rows

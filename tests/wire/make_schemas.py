@@ -23,7 +23,7 @@ from fasaco_edge.wire import documents
 from fasaco_edge.wire.documents.fleet import FleetMember
 from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.turns import TurnBatch
-from fasaco_edge.wire.queries import QUERIES
+from fasaco_edge.wire.query_table import QUERIES
 from fasaco_edge.wire.topics import TOPICS
 
 HEAD = {

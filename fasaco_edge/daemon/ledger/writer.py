@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from fasaco_edge.daemon.figures import fault_text, log_fault
+from fasaco_edge.daemon.counters import fault_text, log_fault
 from fasaco_edge.daemon.ledger.disk_writer import MOST_WAIT_S, DiskWriter
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
 from fasaco_edge.errors import (

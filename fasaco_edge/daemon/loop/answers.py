@@ -35,7 +35,7 @@ from fasaco_edge.wire.messages.ros_node import (
     encode_response,
     response_attachment,
 )
-from fasaco_edge.wire.queries import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 
 # Least period of requested replans, as a path that keeps changing is hard to follow [s].
 REPLAN_PERIOD_S = 1.0

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.claim import NameClaim
-from fasaco_edge.daemon.figures import MapLatency
+from fasaco_edge.daemon.counters import MapLatency
 from fasaco_edge.daemon.ledger.rooms_file import RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
@@ -24,6 +23,7 @@ from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.periodic import OF_MISSION, RoomsPublisher
 from fasaco_edge.daemon.loop.status import StatusBoard
 from fasaco_edge.daemon.loop.turn_log import TurnLog
+from fasaco_edge.daemon.name_claim import NameClaim
 from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.supervisor import RecorderSupervisor

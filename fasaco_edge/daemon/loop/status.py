@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.figures import CycleTimes, FaultCounter
+from fasaco_edge.daemon.counters import CycleTimes, FaultCounter
 from fasaco_edge.daemon.fleet_wing import report_of
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.daemon.loop.mission_reports import (
