@@ -90,10 +90,10 @@ class Claim:
     def decide(
         self, others: Mapping[str, ClaimState], now: float, *, in_touch: bool = True
     ) -> None:
-        """Update the state by those of the other daemons, by id.
+        """Update the state from ``others``, the states of the other daemons by id.
 
-        ``now``: time of any monotonic clock [s]. The state does not change while others are not
-        visible, not ``in_touch``.
+        ``now``: time of any monotonic clock [s]. Without ``in_touch`` no other daemon is visible,
+        and the state does not change.
         """
         self.rival_yielded = False
         self._notice_absence(now, in_touch=in_touch)

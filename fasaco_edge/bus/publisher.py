@@ -22,7 +22,7 @@ def encoding_of(schema: str) -> zenoh.Encoding:
 
 
 class Publisher:
-    """Publishes samples of a CDR type on one key; ``schema`` "" is JSON.
+    """Publishes samples on one key, of the CDR type ``schema`` or, for "", JSON.
 
     In Zenoh the sender decides whether a sample is dropped on congestion.
 

@@ -30,9 +30,10 @@ def load_config(path: Path | None) -> DaemonConfig:
 
 
 def with_mask(config: DaemonConfig, file: Path | None, most_bytes: int | None) -> DaemonConfig:
-    """Return a configuration that contains its keep-out mask, named relative to its own ``file``.
+    """Return a configuration that contains its keep-out mask.
 
-    ``most_bytes``: limit on the memory for reading the mask [bytes]; None for no limit.
+    It names the mask relative to its own ``file``. ``most_bytes``: limit on the memory for reading
+    the mask [bytes]; None for no limit.
 
     Raises:
         BadConfiguration: the mask cannot be read, or takes more memory.

@@ -159,7 +159,7 @@ class RosConfig(StrictDocument, frozen=True):
         }
 
     def topic(self, name: str, schema: str = "") -> RosTopic:
-        """Return the topic of a key under ``topics``; ``schema``: its type, if not the first."""
+        """Return the topic of a key under ``topics``; ``schema``: its type, "" for the usual."""
         row = ROS_TOPICS[name]
         schema = schema or (self.pose if name == "pose" else row.schemas[0])
         return RosTopic(self.full_name(getattr(self.topics, name)), schema, row.latched, row.depth)

@@ -151,7 +151,7 @@ def gid_of(token: str) -> bytes:
 
 
 def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
-    """Return the attachment that rmw_zenoh requires with each sample; they count from 1 on."""
+    """Return the attachment that rmw_zenoh requires with each sample; ``sequence`` begins at 1."""
     return _ATTACHMENT.pack(sequence, time_ns, GID_BYTES, gid)
 
 

@@ -86,7 +86,7 @@ class LedgerFile:
             self._take_lock()
 
     def load(self, cell_m: float) -> LoadedLedger:
-        """Return the newest complete ledger, with its fault; finish an interrupted write."""
+        """Return the newest complete ledger and any fault; finish an interrupted write."""
         broken: dict[Path, str] = {}
         for path in self._generations:
             try:

@@ -70,7 +70,7 @@ NO_SUBSCRIBER = "it has no subscriber"
 class TurnLog:
     """Publishes the log in batches.
 
-    It begins with the ledger and the file of rooms that the daemon began with, if any.
+    The first batch contains the ledger and the file of rooms that the daemon began with, if any.
     """
 
     def __init__(
