@@ -27,7 +27,6 @@ import zenoh.ext
 pytest.importorskip("rerun")
 
 from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.client.robot_state import Token
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities
@@ -36,14 +35,12 @@ from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.part import Part
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.serve.recorded import Playback
-from fasaco_edge.serve.served_view import ServedView
 from fasaco_edge.text import json_line
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
-from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.pheromone import encode_pheromone
-from fasaco_edge.wire.topics import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.serve.serving import looking, served
 from tests.support.forked import run_forked
 from tests.support.outsider import Outsider
@@ -241,23 +238,6 @@ def test_a_page_gets_text_that_does_nothing(spoof, tmp_path):
         assert "INJECTED" not in page.get()[2]
         assert "innerHTML" not in page.get()[2]
     judge(page.log.read_text())
-
-
-def test_a_page_shows_a_status_that_does_nothing():
-    status = tainted("status.json")
-    status["claim"]["stand"] = "plans"
-    corners = [[0, 0], [1, 0], [1, 1]]
-    zone = {"name": TAINT, "polygon": corners}
-    status["config"] = {"mission": {"zones": [zone]}}
-    status["mission"]["zones"] = [zone]
-    view = ServedView(Keys())
-    view.take("token", Token(TOKEN, True), 1.0)
-    view.take("status", Sample("", json.dumps(status).encode()), 1.0)
-    said = {kind: json.loads(message) for kind, message in view.news(2.0).items()}
-    assert SCRIPT in said["state"]["reason"]
-    assert len(said["areas"]["zones"]) == 2
-    for text in _texts_in(said):
-        judge(text)
 
 
 def _texts_in(part: Any) -> Iterator[str]:

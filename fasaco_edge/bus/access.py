@@ -22,8 +22,9 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.wire.limits import MAX_GRID_CELLS, MAX_JSON_BYTES
-from fasaco_edge.wire.topic_types import Query, Topic
-from fasaco_edge.wire.topics import QUERIES, RPC_NAMES, TOPICS
+from fasaco_edge.wire.query_table import QUERIES, RPC_NAMES, Query
+from fasaco_edge.wire.topic_types import Topic
+from fasaco_edge.wire.topics import TOPICS
 
 SPEAK = ("put", "reply", "declare_queryable", "liveliness_token")
 LISTEN = ("declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query")
@@ -125,7 +126,7 @@ class Grant:
         return f"{self.role} of {self.of}" if self.of else self.role
 
 
-class Limits(msgspec.Struct, frozen=True):
+class SenderLimits(msgspec.Struct, frozen=True):
     """Largest size [bytes] and rate [1/s] of the messages of each sender.
 
     Zenoh drops larger messages; above the rate it passes on the first message of each period and
@@ -164,7 +165,7 @@ def access_control(grants: Sequence[Grant], attribute: str) -> dict[str, Any]:
     }
 
 
-def limits(prefix: str, most: Limits) -> dict[str, Any]:
+def limits(prefix: str, most: SenderLimits) -> dict[str, Any]:
     """Return Zenoh's ``low_pass_filter`` and ``downsampling`` for incoming messages."""
     published = ["put", "reply"]
     classes: dict[str, list[str]] = {}
@@ -209,12 +210,8 @@ def limits(prefix: str, most: Limits) -> dict[str, Any]:
 
 
 def ros_rights(inputs: Sequence[str], outputs: Sequence[str], graph: Sequence[str]) -> Role:
-    """Return the rights of the other side in a ROS 2 graph.
-
-    Args:
-        inputs, outputs: keys the daemon subscribes to, and publishes on.
-        graph: keys of the liveliness tokens of nodes.
-    """
+    """Return the rights of the other side in a ROS 2 graph, with keys of the daemon's inputs and
+    outputs, and of the liveliness tokens of nodes."""
     return Role(ROLES["ros"].description, speaks=(*inputs, *graph), listens=(*outputs, *graph))
 
 
@@ -236,9 +233,7 @@ def mutual_tls(root_ca: str, certificate: str, private_key: str) -> dict[str, An
 def user_password(user: str, password: str, dictionary_file: str) -> dict[str, Any]:
     """Return Zenoh's ``transport`` with authentication by user and password.
 
-    Args:
-        user, password: of this session.
-        dictionary_file: lines ``user:password`` of the users that may connect to it, or "".
+    ``dictionary_file``: lines ``user:password`` of the users that may connect to it, or "".
     """
     login: dict[str, str] = {"user": user, "password": password}
     if dictionary_file:

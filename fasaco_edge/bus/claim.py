@@ -90,12 +90,10 @@ class Claim:
     def decide(
         self, others: Mapping[str, ClaimState], now: float, *, in_touch: bool = True
     ) -> None:
-        """Update the state.
+        """Update the state from ``others``, the states of the other daemons by id.
 
-        Args:
-            others: the other daemons by id.
-            now: time of any monotonic clock [s].
-            in_touch: whether others are visible; if not, the state does not change.
+        ``now``: time of any monotonic clock [s]. Without ``in_touch`` no other daemon is visible,
+        and the state does not change.
         """
         self.rival_yielded = False
         self._notice_absence(now, in_touch=in_touch)
@@ -142,9 +140,8 @@ class BusClaim(Claim):
     """A claim and its token on the bus.
 
     Args:
-        bus: the session, whose id is that of the claim.
-        keys: keys of the robot.
-        topic: topic of the tokens, whose key has a chunk for the id and one for the state.
+        topic: topic of the tokens, whose key has a chunk for the session's id and one for the
+            state.
         active: last chunk of the token of a daemon that "plans".
 
     Attributes:

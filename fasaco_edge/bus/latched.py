@@ -21,12 +21,7 @@ from typing import Any
 import zenoh
 
 from fasaco_edge.bus.queries import ask_for_tokens
-from fasaco_edge.bus.sample_order import (
-    ASK_PERIOD_S,
-    AskedPublisher,
-    AskedPublishers,
-    SampleOrder,
-)
+from fasaco_edge.bus.sample_order import ASK_PERIOD_S, AskedPublisher, AskedPublishers, SampleOrder
 
 # Timeout of a reply [s], long enough for a large map on a slow link. Until then the query is not
 # repeated.

@@ -36,10 +36,8 @@ class Sessions(Protocol):
 class OnePublisher:
     """The publisher of one input that counts; used from one thread, or under the caller's lock.
 
-    Args:
-        name: name of the input, in the plural: "maps".
-        silent_s: silence after which another publisher takes over [s].
-        sessions: the sessions on the bus.
+    ``name`` is that of the input, in the plural: "maps". After ``silent_s`` [s] of silence another
+    publisher takes over.
     """
 
     def __init__(self, name: str, silent_s: float, sessions: Sessions) -> None:
@@ -51,12 +49,7 @@ class OnePublisher:
         self._other, self._refused_at, self._misses = "", float("-inf"), False
 
     def takes(self, sender: str, now: float) -> bool:
-        """Return whether a sample counts.
-
-        Args:
-            sender: id of its session; "" if unknown.
-            now: time by the monotonic clock [s].
-        """
+        """Return whether a sample of session ``sender``, "" if unknown, counts at ``now`` [s]."""
         if sender != self._first:
             if not sender or self._sessions.is_relay(sender):
                 return True

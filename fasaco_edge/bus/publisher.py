@@ -1,4 +1,4 @@
-"""Publishers of native keys, with encoding and QoS, and of ROS 2 topics."""
+"""Publishers of native keys and ROS 2 topics, with encoding and QoS."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.wire.ros_keys import attachment
+from fasaco_edge.wire.ros_keys import attachment as rmw_attachment
 from fasaco_edge.wire.topic_types import Qos
 
 CDR = zenoh.Encoding.APPLICATION_CDR
@@ -22,14 +22,12 @@ def encoding_of(schema: str) -> zenoh.Encoding:
 
 
 class Publisher:
-    """Publishes samples on one key.
+    """Publishes samples on one key, of the CDR type ``schema`` or, for "", JSON.
 
-    Args:
-        session: Zenoh session.
-        key: key expression to publish on.
-        schema: CDR type; "" for JSON.
-        qos: quality of service. In Zenoh the sender decides whether a sample is dropped on
-            congestion.
+    In Zenoh the sender decides whether a sample is dropped on congestion.
+
+    Attributes:
+        gid: of a ROS 2 topic's publisher, for rmw_zenoh's attachment of each sample; b"" for none.
     """
 
     def __init__(self, session: zenoh.Session, key: str, schema: str, qos: Qos) -> None:
@@ -40,6 +38,8 @@ class Publisher:
             "priority": getattr(zenoh.Priority, qos.priority.upper()),
             "express": qos.express,
         }
+        self.gid = b""
+        self._count = 0
         # Only a plain publisher reports whether its key has subscribers, an advanced one does not.
         self._plain = session.declare_publisher(key, **options)
         self._latched = partial(_latched, session, key, options, qos.cache) if qos.latched else None
@@ -56,6 +56,9 @@ class Publisher:
 
     def put(self, payload: bytes | zenoh.ZBytes, attachment: bytes = b"") -> None:
         """Send a sample."""
+        if self.gid:
+            self._count += 1
+            attachment = rmw_attachment(self._count, time.time_ns(), self.gid)
         self._publisher.put(payload, attachment=attachment or None)
 
     def release(self) -> None:
@@ -81,22 +84,3 @@ def _latched(session: zenoh.Session, key: str, options: dict[str, Any], samples:
         ),
         publisher_detection=True,
     )
-
-
-class RosPublisher:
-    """Publishes one ROS 2 topic; with ``gid``, each sample has rmw_zenoh's attachment."""
-
-    def __init__(self, publisher: Publisher, gid: bytes = b"") -> None:
-        self._publisher = publisher
-        self._gid = gid
-        self._count = 0
-
-    def forget(self) -> None:
-        """Drop the sample cached for late joiners."""
-        self._publisher.forget()
-
-    def put(self, payload: bytes | zenoh.ZBytes) -> None:
-        """Send a message."""
-        self._count += 1
-        beside = attachment(self._count, time.time_ns(), self._gid) if self._gid else b""
-        self._publisher.put(payload, beside)

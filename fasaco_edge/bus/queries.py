@@ -99,7 +99,7 @@ class TokenList:
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class QueryReply:
     """A reply to a query: a payload with its schema ("" for JSON), or an error."""
 
     payload: bytes
@@ -156,7 +156,7 @@ class Question:
         self.request = request_of(query)
         self._query = query
 
-    def answer(self, reply: Reply, key: str = "") -> None:
+    def answer(self, reply: QueryReply, key: str = "") -> None:
         """Reply on the queryable's key, or on ``key``; ignored if the other side is gone."""
         with contextlib.suppress(zenoh.ZError):
             send(self._query, key or self.key, reply)
@@ -184,21 +184,21 @@ def size_of(query: zenoh.Query) -> int:
     return len(str(query.selector)) + beside
 
 
-def send(query: zenoh.Query, key: str, reply: Reply | Shared) -> None:
+def send(query: zenoh.Query, key: str, reply: QueryReply | Shared) -> None:
     """Reply to a query on ``key``; Zenoh gives the reply the QoS of the query."""
     encoding = encoding_of(reply.schema)
-    if isinstance(reply, Reply) and reply.is_error:
+    if isinstance(reply, QueryReply) and reply.is_error:
         query.reply_err(reply.payload, encoding=encoding)
         return
     attachment = reply.attachment or None
     query.reply(key, reply.payload, encoding=encoding, attachment=attachment)
 
 
-def reply_of(reply: zenoh.Reply) -> Reply:
+def reply_of(reply: zenoh.Reply) -> QueryReply:
     """Return a reply received by Zenoh."""
     if reply.ok is not None:
         sample = reply.ok
         attachment = sample.attachment.to_bytes() if sample.attachment is not None else b""
-        return Reply(sample.payload.to_bytes(), schema_of(sample.encoding), attachment)
+        return QueryReply(sample.payload.to_bytes(), schema_of(sample.encoding), attachment)
     assert reply.err is not None
-    return Reply(reply.err.payload.to_bytes(), schema_of(reply.err.encoding), is_error=True)
+    return QueryReply(reply.err.payload.to_bytes(), schema_of(reply.err.encoding), is_error=True)

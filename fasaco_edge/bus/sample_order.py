@@ -112,11 +112,9 @@ class AskedPublishers:
         return gone
 
     def add(self, keys: Mapping[str, str], now: float) -> list[str]:
-        """Add new publishers while there is room; return their names.
+        """Add new publishers by name, each with the key of its cache, while there is room.
 
-        Args:
-            keys: for each name the key of its cache.
-            now: time by the monotonic clock [s].
+        Returns their names; ``now`` is monotonic [s].
         """
         came = [name for name in keys if name not in self._publishers]
         # Publishers reply to a pending query to all, and are not queried again at once.
@@ -129,10 +127,7 @@ class AskedPublishers:
 class SampleOrder:
     """Puts the last ``depth`` samples of each publisher in order; the caller holds the lock.
 
-    Args:
-        depth: number of last samples of a publisher that count.
-        publishers: the publishers that are queried.
-        receive: called with each sample, in order.
+    ``publishers`` are queried; ``receive`` is called with each sample, in order.
     """
 
     def __init__(

@@ -21,8 +21,8 @@ from fasaco_edge.bus.latched import Asker, LatchedSubscription, Subscription
 from fasaco_edge.bus.publisher import JSON, Publisher
 from fasaco_edge.bus.queries import (
     TIMEOUT,
+    QueryReply,
     Question,
-    Reply,
     Request,
     Shared,
     TokenList,
@@ -39,6 +39,7 @@ from fasaco_edge.wire.topic_types import VOLATILE, Qos, Topic
 from fasaco_edge.wire.topics import IN_ORDER
 
 LOG = logging.getLogger(__name__)
+Answerer = Callable[[Request], QueryReply | Shared | None]
 
 # Timeout for closing a session [s]: if a peer no longer reads, Zenoh would wait ten seconds.
 CLOSE_S = 1.2
@@ -145,9 +146,7 @@ class Bus:
         subscription.end()
         subscription.release()
 
-    def serve(
-        self, key: str, answer: Callable[[Request], Reply | Shared | None], complete: bool = True
-    ) -> None:
+    def serve(self, key: str, answer: Answerer, complete: bool = True) -> None:
         """Reply to queries on ``key``, on a Zenoh thread; no reply if ``answer`` returns None.
 
         ``complete``: whether this queryable's reply is enough, without others.
@@ -161,7 +160,7 @@ class Bus:
         self._serve(key, receive, complete=complete)
 
     def take_questions(
-        self, key: str, receive: Callable[[Question], None], most_bytes: int, too_long: Reply
+        self, key: str, receive: Callable[[Question], None], most_bytes: int, too_long: QueryReply
     ) -> None:
         """Call ``receive`` with each query on ``key``, on a Zenoh thread, to be answered later.
 
@@ -190,7 +189,7 @@ class Bus:
                     served.key, served.receive, complete=not yes
                 )
 
-    def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[Reply]:
+    def get(self, selector: str, timeout_s: float = 2.0, payload: bytes = b"") -> list[QueryReply]:
         """Query ``selector``, a key, with JSON or b"" as its payload.
 
         Returns all replies that arrive within ``timeout_s`` [s].
@@ -208,14 +207,14 @@ class Bus:
         payload: bytes,
         beside: bytes,
         timeout_s: float,
-        end: Callable[[list[Reply]], None],
+        end: Callable[[list[QueryReply]], None],
     ) -> None:
         """Query all queryables on ``key``, as clients of ROS 2 services do.
 
         ``end`` is called with the replies, on a Zenoh thread, when all have arrived, or there is no
         queryable, or after ``timeout_s`` [s]; in the last case an error is among them.
         """
-        replies = list[Reply]()
+        replies = list[QueryReply]()
         answered: Any = zenoh.handlers.Callback
         handler = answered(
             lambda reply: replies.append(reply_of(reply)), lambda: end(replies), indirect=False
@@ -284,9 +283,8 @@ class Bus:
         def receive(sample: zenoh.Sample) -> None:
             callback(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-        self._declared.append(
-            self._session.liveliness().declare_subscriber(key, receive, history=True)
-        )
+        watched = self._session.liveliness().declare_subscriber(key, receive, history=True)
+        self._declared.append(watched)
 
     def close(self) -> None:
         """End the session within ``CLOSE_S``; without this call, a process may hang at exit."""

@@ -20,10 +20,7 @@ class StandIn:
 
     A session that finds its port taken connects as a client to the process that listens there. Once
     that process has ended, other sessions could no longer reach this one. So this process opens a
-    second session that listens there; the first one reconnects to it.
-
-    Args:
-        config: configuration of a session that listens on the port.
+    second session, by ``config``, that listens there; the first one reconnects to it.
     """
 
     def __init__(self, config: zenoh.Config) -> None:

@@ -31,11 +31,11 @@ from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
+from fasaco_edge.wire.query_table import RPC_NAMES
 from fasaco_edge.wire.reasons import plain
-from fasaco_edge.wire.topics import RPC_NAMES
 
 if TYPE_CHECKING:
-    from fasaco_edge.bus.queries import Reply
+    from fasaco_edge.bus.queries import QueryReply
 
 EPILOG = """\
 examples:
@@ -108,7 +108,7 @@ def add_question(parser: argparse.ArgumentParser) -> None:
     add_robot_on_bus(parser)
 
 
-def ask(args: argparse.Namespace, name: str, payload: bytes = b"") -> Reply:
+def ask(args: argparse.Namespace, name: str, payload: bytes = b"") -> QueryReply:
     """Return the answer to a query.
 
     Raises:
@@ -132,7 +132,7 @@ def ask(args: argparse.Namespace, name: str, payload: bytes = b"") -> Reply:
     return reply
 
 
-def show_mission(reply: Reply) -> None:
+def show_mission(reply: QueryReply) -> None:
     """Print state, mission and troubles of a status, or of the answer to a command."""
     answer = decode_tolerant(reply.payload, replies.Reply)
     mission, console = answer.mission, out()
@@ -184,12 +184,12 @@ def _unreached(unreached: replies.UnreachedReport) -> Table:
     return table
 
 
-def print_answer(reply: Reply) -> None:
+def print_answer(reply: QueryReply) -> None:
     """Print a JSON payload, or the figures of a ROS message as JSON."""
     print_json(_figures(reply) if reply.schema else decode_json(reply.payload))
 
 
-def show(name: str, reply: Reply) -> None:
+def show(name: str, reply: QueryReply) -> None:
     """Print the answer to query ``name``."""
     if reply.schema:
         # ``known`` leaves out null: a path without a plan has no figures of a plan.
@@ -202,7 +202,7 @@ def show(name: str, reply: Reply) -> None:
         print(dump(decode_json(reply.payload)), end="")
 
 
-def _figures(reply: Reply) -> dict[str, object]:
+def _figures(reply: QueryReply) -> dict[str, object]:
     match reply.schema:
         case schemas.PATH:
             return _path_figures(reply)
@@ -212,7 +212,7 @@ def _figures(reply: Reply) -> dict[str, object]:
             return _trail_figures(reply)
 
 
-def _path_figures(reply: Reply) -> dict[str, object]:
+def _path_figures(reply: QueryReply) -> dict[str, object]:
     path = decode_path(reply.payload)
     length_m = float(np.hypot(*np.diff(path.xy, axis=0).T).sum())
     return {
@@ -223,7 +223,7 @@ def _path_figures(reply: Reply) -> dict[str, object]:
     }
 
 
-def _coverage_figures(reply: Reply) -> dict[str, object]:
+def _coverage_figures(reply: QueryReply) -> dict[str, object]:
     grid = decode_occupancy_grid(reply.payload)
     return {
         "frame": grid.frame,
@@ -234,7 +234,7 @@ def _coverage_figures(reply: Reply) -> dict[str, object]:
     }
 
 
-def _trail_figures(reply: Reply) -> dict[str, object]:
+def _trail_figures(reply: QueryReply) -> dict[str, object]:
     trail = decode_pheromone(reply.payload)
     about = decode_json(reply.attachment) if reply.attachment else {}
     return {

@@ -186,7 +186,9 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         frames=(ros.frames.map, ros.frames.robot) if ros and ros.pose == "tf" else None,
         schema=schema,
         frame=ros.frames.robot if ros else "base_link",
-        cmd_key=ros.output_key(ros.velocities(schema)) if ros else here.keys.of(topics.CMD_VEL),
+        cmd_key=ros.output_key(ros.topic("cmd_vel", schema))
+        if ros
+        else here.keys.of(topics.CMD_VEL),
         ros=_ros_node(ros, schema) if ros else {},
         nav2=_nav2(config) if ros and ros.follow == "nav2" else {},
         dock=_dock(config) if ros and ros.dock == "nav2" else {},
@@ -227,7 +229,7 @@ def _ros_poses(ros: RosConfig) -> tuple[PoseSource, ...]:
 def _scan(config: DaemonConfig) -> dict[str, object]:
     scan, ros = config.scan, config.ros2
     assert scan
-    sources = {"scan": ros.scan, **ros.inputs} if ros else {}
+    sources = {"scan": ros.topic("scan"), **ros.inputs} if ros else {}
     return {
         "mount": {
             "x": scan.x_m,
@@ -252,7 +254,7 @@ def _ros_node(ros: RosConfig, schema: str) -> dict[str, object]:
         "domain": ros.domain,
         "namespace": ros.namespace,
         "node": f"{ros.node}_follow",
-        "topic": ros.velocities(schema).name,
+        "topic": ros.topic("cmd_vel", schema).name,
     }
 
 
@@ -261,7 +263,12 @@ def _nav2(config: DaemonConfig) -> dict[str, object]:
     ros, nav2 = config.ros2, config.ros2.nav2
     names = (nav2.controller, nav2.goal_checker, nav2.progress_checker, nav2.path_handler)
     near_m = nav2.near_m if nav2.near_m is not None else NEAR_SHARE * config.robot.tool_width_m
-    return {"action": ros.action, "release": nav2.release, "plugins": names, "near_m": near_m}
+    return {
+        "action": ros.full_name(nav2.action),
+        "release": nav2.release,
+        "plugins": names,
+        "near_m": near_m,
+    }
 
 
 def _dock(config: DaemonConfig) -> dict[str, object]:
@@ -269,8 +276,8 @@ def _dock(config: DaemonConfig) -> dict[str, object]:
     assert config.mission.dock is not None  # checked when the configuration was read
     ros, nav2, dock = config.ros2, config.ros2.nav2, config.mission.dock
     return {
-        "dock_action": ros.dock_action,
-        "undock_action": ros.undock_action,
+        "dock_action": ros.full_name(nav2.dock_action),
+        "undock_action": ros.full_name(nav2.undock_action),
         "id": nav2.dock_id,
         "type": nav2.dock_type,
         "frame": ros.frames.map,

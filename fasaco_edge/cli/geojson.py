@@ -14,7 +14,7 @@ from msgspec import UNSET, Meta, structs
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
-from fasaco_edge.host.documents import Document, inspected
+from fasaco_edge.host.documents import StrictDocument, inspected
 from fasaco_edge.mission.orders.order import OrderDocument
 from fasaco_edge.wire.documents.rooms import Rooms
 
@@ -70,7 +70,7 @@ def is_geojson(document: object) -> TypeGuard[dict[str, object]]:
     return isinstance(document, dict) and "type" in document
 
 
-class _Drawn(Document, frozen=True):
+class _Drawn(StrictDocument, frozen=True):
     """An object of GeoJSON, which may have members of other programs."""
 
     is_open: ClassVar[bool] = True

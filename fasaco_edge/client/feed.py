@@ -10,7 +10,7 @@ from typing import Self
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox, Queue
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client.robot_state import Token
@@ -123,7 +123,7 @@ class Feed(Joining):
             if self._bus is not None:
                 self._request(self._bus)
 
-    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[QueryReply]:
         """Query the robot's daemon; return all replies.
 
         Args:

@@ -44,11 +44,7 @@ class Certificate:
 
 
 def read_certificate(files: TlsFiles, *, listens: bool = True) -> Certificate:
-    """Check a certificate, and return its content.
-
-    Args:
-        files: certificate, key and CA.
-        listens: whether its owner accepts connections, too.
+    """Check a certificate, and return its content; ``listens``: its owner accepts connections.
 
     Raises:
         BadConfiguration: a file cannot be read, has expired, or does not match the others.

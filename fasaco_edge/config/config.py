@@ -17,7 +17,7 @@ from fasaco_edge.config.security import BusConfig
 from fasaco_edge.errors import BadConfiguration, DocumentError
 from fasaco_edge.grid.geometry import FARTHEST_M
 from fasaco_edge.host.addresses import Address, read_address
-from fasaco_edge.host.documents import Document
+from fasaco_edge.host.documents import StrictDocument
 from fasaco_edge.mission.config import BatteryPolicy, MissionPolicy
 from fasaco_edge.mission.orders.mask import INLINE, mask_polygons
 from fasaco_edge.mission.orders.order import place_faults
@@ -36,7 +36,7 @@ else:
 Percent = Annotated[int, Meta(ge=0, le=100)]
 
 
-class MapConfig(Document, frozen=True):
+class MapConfig(StrictDocument, frozen=True):
     """Thresholds of free and occupied [percent]; largest map and lattice (``daemon.memory``)."""
 
     free_at_most: Percent = 25
@@ -51,7 +51,7 @@ class MapConfig(Document, frozen=True):
             yield BadConfiguration(text, key="free_at_most", others=["occupied_at_least"])
 
 
-class PoseConfig(Document, frozen=True):
+class PoseConfig(StrictDocument, frozen=True):
     """The type of poses in samples that name none, as under ROS 2."""
 
     schema: Literal[
@@ -61,7 +61,7 @@ class PoseConfig(Document, frozen=True):
     ] = schemas.POSE_STAMPED
 
 
-class PlannerConfig(Document, frozen=True):
+class PlannerConfig(StrictDocument, frozen=True):
     """The colony, see ``planners.paper.colony.ColonyConfig``; and the time one plan may take [s].
 
     While the robot drives, ``spare_share`` of a processor core is used to improve the rest of its
@@ -95,7 +95,7 @@ class PlannerConfig(Document, frozen=True):
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(self.colony, others=["ants", "velocities"])
+        yield from refused(self.colony, others=["velocities"])
 
     def colony(self) -> ColonyConfig:
         """Return the configuration of the colony.
@@ -116,7 +116,7 @@ class PlannerConfig(Document, frozen=True):
         )
 
 
-class MissionSettings(Document, MissionPolicy, frozen=True, kw_only=True):
+class MissionPolicyConfig(StrictDocument, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and the folder of its progress.
 
     ``state_dir`` "" is the state folder of the service, else of the user.
@@ -159,7 +159,7 @@ def _home(path: Path) -> Path:
         raise BadConfiguration(text, hint=hint, key="mission.state_dir") from error
 
 
-class FleetConfig(Document, frozen=True):
+class FleetConfig(StrictDocument, frozen=True):
     """A fleet: robots with the same ``bus.base``, name and map frame share the work in an area.
 
     Only names of frames are compared, so the frame must have the same origin for all. Robots with
@@ -194,7 +194,7 @@ class FleetConfig(Document, frozen=True):
             )
 
 
-class BatteryConfig(Document, BatteryPolicy, frozen=True, kw_only=True):
+class BatteryConfig(StrictDocument, BatteryPolicy, frozen=True, kw_only=True):
     """When to charge; without the block ``battery`` the robot never charges by itself."""
 
     def faults(self) -> Iterator[BadConfiguration]:
@@ -207,7 +207,7 @@ class BatteryConfig(Document, BatteryPolicy, frozen=True, kw_only=True):
             )
 
 
-class ScanConfig(Document, frozen=True):
+class ScanConfig(StrictDocument, frozen=True):
     """The robot's lidar: ``fasaco-edge follow`` stops before obstacles that only its scans show.
 
     It is mounted ``x_m`` ahead of the robot's centre, ``y_m`` to its left [m]; its angle 0 points
@@ -222,7 +222,7 @@ class ScanConfig(Document, frozen=True):
     lost_s: Annotated[float, Meta(ge=0.2, le=10)] = 1.0
 
 
-class RecordingConfig(Document, frozen=True):
+class RecordingConfig(StrictDocument, frozen=True):
     """Limits on the size and age of a file, and on the size of all files.
 
     The next file begins after ``part_mb`` [MB] or ``part_min`` [min], 0 for never. Above
@@ -241,7 +241,7 @@ class RecordingConfig(Document, frozen=True):
             yield BadConfiguration(text, key="quota_mb", others=["part_mb"])
 
 
-class MetricsConfig(Document, frozen=True):
+class MetricsConfig(StrictDocument, frozen=True):
     """The address of metrics over HTTP, as ``127.0.0.1:9465``; "" for none.
 
     Other computers may read them only if ``open_to_everyone`` is set, as HTTP asks for no password.
@@ -251,7 +251,7 @@ class MetricsConfig(Document, frozen=True):
     open_to_everyone: bool = False
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(self.address, key="listen", others=["open_to_everyone"])
+        yield from refused(self.address, key="listen")
 
     def address(self) -> Address | None:
         """Return the address; None for none.
@@ -267,12 +267,13 @@ class MetricsConfig(Document, frozen=True):
             raise BadConfiguration(
                 f"{self.listen} lets other computers read the status",
                 key="metrics.listen",
+                others=["open_to_everyone"],
                 hint="listen on 127.0.0.1, or set metrics.open_to_everyone",
             )
         return address
 
 
-class DaemonConfig(Document, frozen=True):
+class DaemonConfig(StrictDocument, frozen=True):
     """The whole configuration.
 
     Without ``fleet`` the robot is alone, without ``scan`` it uses only the map, and without
@@ -284,7 +285,7 @@ class DaemonConfig(Document, frozen=True):
     map: MapConfig = MapConfig()
     pose: PoseConfig = PoseConfig()
     planner: PlannerConfig = PlannerConfig()
-    mission: MissionSettings = MissionSettings()
+    mission: MissionPolicyConfig = MissionPolicyConfig()
     battery: BatteryConfig | msgspec.UnsetType = msgspec.UNSET
     scan: ScanConfig | msgspec.UnsetType = msgspec.UNSET
     recording: RecordingConfig = RecordingConfig()

@@ -68,12 +68,7 @@ MOST_BYTES = 255
 
 
 def endpoint_faults(name: str, endpoints: Sequence[str]) -> Iterator[BadConfiguration]:
-    """Yield the faults of endpoints; Zenoh would only report that none of them answers.
-
-    Args:
-        name: the key or option that contains them.
-        endpoints: the endpoints as given.
-    """
+    """Yield the faults of a key's endpoints; Zenoh would only report that none of them answers."""
     for index, endpoint in enumerate(endpoints):
         if why := _why_none(endpoint):
             yield BadConfiguration(

@@ -32,10 +32,8 @@ def load_config(path: Path | None) -> DaemonConfig:
 def with_mask(config: DaemonConfig, file: Path | None, most_bytes: int | None) -> DaemonConfig:
     """Return a configuration that contains its keep-out mask.
 
-    Args:
-        config: configuration that names a mask file, relative to its own folder.
-        file: the file of the configuration.
-        most_bytes: limit on the memory for reading the mask [bytes]; None for no limit.
+    It names the mask relative to its own ``file``. ``most_bytes``: limit on the memory for reading
+    the mask [bytes]; None for no limit.
 
     Raises:
         BadConfiguration: the mask cannot be read, or takes more memory.
@@ -63,12 +61,10 @@ def decode_config(document: bytes) -> DaemonConfig:
 def inspect_config(
     path: Path | None, check: Callable[[DaemonConfig], object] = lambda _: None
 ) -> tuple[DaemonConfig | None, list[BadConfiguration]]:
-    """Read a YAML file; return the configuration, or None and all faults.
+    """Read a YAML file, None for the defaults; return the configuration, or None and all faults.
 
-    Args:
-        path: the file; None for the defaults.
-        check: a further check of the configuration, with defaults in place of faulty values; raises
-            BadConfiguration.
+    ``check`` is a further check of the configuration, with defaults in place of faulty values; it
+    raises BadConfiguration.
     """
     if path is None:
         return DaemonConfig(), []

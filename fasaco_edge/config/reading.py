@@ -31,7 +31,7 @@ def refused(
     try:
         check()
     except BadConfiguration as error:
-        error.key, error.others = key or error.key, tuple(others)
+        error.key, error.others = key or error.key, (*error.others, *others)
         yield error
 
 

@@ -10,7 +10,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.documents import Document
+from fasaco_edge.host.documents import StrictDocument
 from fasaco_edge.kernels.floor.turning import (
     Turning,
     limited_turning,
@@ -27,7 +27,7 @@ Length = Annotated[float, Meta(gt=0, le=7)]
 Coordinate = Annotated[float, Meta(ge=-7, le=7)]
 
 
-class FootprintConfig(Document, frozen=True):
+class FootprintConfig(StrictDocument, frozen=True):
     """The robot's outline relative to its turning point [m]; x points ahead.
 
     Either ``width_m`` and ``length_m``, of which ``ahead_m`` lie ahead of that point (by default
@@ -64,7 +64,7 @@ class FootprintConfig(Document, frozen=True):
             yield BadConfiguration(text, key="ahead_m", others=["length_m"])
 
 
-class RobotConfig(Document, frozen=True):
+class RobotConfig(StrictDocument, frozen=True):
     """The robot: its name on the bus, its size [m], and its driving.
 
     ``quarter_turn_s`` is the duration of a turn by 90 degrees on the spot, with braking and
@@ -183,8 +183,7 @@ class RobotConfig(Document, frozen=True):
     def curves(self, price_s_m2: float) -> CurveConfig | None:
         """Return the configuration of curves; None for a robot that turns on the spot.
 
-        Args:
-            price_s_m2: value of sweeping a square metre [s/m2].
+        ``price_s_m2``: value of sweeping a square metre [s/m2].
         """
         if not self.turn_radius_m:
             return None

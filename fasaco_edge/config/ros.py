@@ -11,12 +11,13 @@ from msgspec import Meta
 
 from fasaco_edge.bus.access import Role, ros_rights
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.host.documents import Document
+from fasaco_edge.host.documents import StrictDocument
 from fasaco_edge.wire.limits import MAX_STRING_BYTES
 from fasaco_edge.wire.messages.ros_node import TRIGGERED, Triggered
 from fasaco_edge.wire.ros_keys import TRIGGER, Release, RosTopic, graph_key
+from fasaco_edge.wire.ros_topics import ROS_TOPICS
 from fasaco_edge.wire.schemas import TWIST_SCHEMAS
-from fasaco_edge.wire.topics import ROS_TOPICS, TF_STATIC
+from fasaco_edge.wire.topics import TF_STATIC
 
 # ROS 2 design, "Topic and Service name mapping": letters, digits, _; no digit first.
 _TOPIC = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
@@ -36,7 +37,7 @@ def _misfit(key: str, expected: str, name: str) -> BadConfiguration:
     return BadConfiguration(f"must be {expected}, got {name!r}", key=key)
 
 
-class RosTopicNames(Document, frozen=True):
+class RosTopicNames(StrictDocument, frozen=True):
     """Names of topics below the namespace; either ``pose`` or ``tf`` is used."""
 
     map: str = "/map"
@@ -54,7 +55,7 @@ class RosTopicNames(Document, frozen=True):
     cmd_vel: str = "/cmd_vel"
 
 
-class RosFrames(Document, frozen=True):
+class RosFrames(StrictDocument, frozen=True):
     """First and last frame of the chain of transforms; frames in between are found."""
 
     map: str = "map"
@@ -71,7 +72,7 @@ class RosFrames(Document, frozen=True):
             yield BadConfiguration(text, key="robot", others=["map"])
 
 
-class Nav2Config(Document, frozen=True):
+class Nav2Config(StrictDocument, frozen=True):
     """Nav2's controller server, used if ``follow`` is ``nav2``.
 
     ``controller``, ``goal_checker``, ``progress_checker`` and ``path_handler`` name its plugins, ""
@@ -108,7 +109,7 @@ class Nav2Config(Document, frozen=True):
                 yield _misfit(key, f"the name of a {of}", name)
 
 
-class RosConfig(Document, frozen=True):
+class RosConfig(StrictDocument, frozen=True):
     """ROS 2 topics, in addition to the native keys.
 
     ``kind`` is the connection of ROS to Zenoh: the middleware rmw_zenoh, or a bridge,
@@ -141,55 +142,27 @@ class RosConfig(Document, frozen=True):
         """The topics that daemon and recorder subscribe to, by their names in the daemon."""
         poses = ("tf_static", "tf") if self.pose == "tf" else ("pose",)
         names = ("map", "map_updates", "battery", "priority", *poses)
-        return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
-
-    @property
-    def keep_out_mask(self) -> RosTopic:
-        """The topic of keep-out masks."""
-        return self._topic("keep_out_mask")
-
-    @property
-    def scan(self) -> RosTopic:
-        """The topic of the follower's scans."""
-        return self._topic("scan")
+        return {ROS_TOPICS[name].topic: self.topic(name) for name in names}
 
     @property
     def outputs(self) -> dict[str, RosTopic]:
         """The topics that the daemon publishes, by the names of the native topics."""
         names = ("coverage_path", "coverage_grid", "diagnostics")
-        return {ROS_TOPICS[name].topic: self._topic(name) for name in names}
+        return {ROS_TOPICS[name].topic: self.topic(name) for name in names}
 
     @property
     def commands(self) -> dict[Triggered, RosTopic]:
         """The services that command the mission, by command."""
         return {
-            name: RosTopic(self._name(f"{self.services}/{name}"), TRIGGER, depth=SERVICE_DEPTH)
+            name: RosTopic(self.full_name(f"{self.services}/{name}"), TRIGGER, depth=SERVICE_DEPTH)
             for name in TRIGGERED
         }
 
-    @property
-    def action(self) -> str:
-        """Name of the action of Nav2's controller."""
-        return self._name(self.nav2.action)
-
-    @property
-    def dock_action(self) -> str:
-        """Name of the action of Nav2's docking server that docks."""
-        return self._name(self.nav2.dock_action)
-
-    @property
-    def undock_action(self) -> str:
-        """Name of the action of Nav2's docking server that undocks."""
-        return self._name(self.nav2.undock_action)
-
-    def velocities(self, schema: str) -> RosTopic:
-        """Return the follower's topic of velocities, of type ``schema``."""
-        return self._topic("cmd_vel", schema)
-
-    def _topic(self, name: str, schema: str = "") -> RosTopic:
+    def topic(self, name: str, schema: str = "") -> RosTopic:
+        """Return the topic of a key under ``topics``; ``schema``: its type, "" for the usual."""
         row = ROS_TOPICS[name]
         schema = schema or (self.pose if name == "pose" else row.schemas[0])
-        return RosTopic(self._name(getattr(self.topics, name)), schema, row.latched, row.depth)
+        return RosTopic(self.full_name(getattr(self.topics, name)), schema, row.latched, row.depth)
 
     def input_key(self, topic: RosTopic) -> str:
         """Return the key to subscribe to for a topic, with any type hash of rmw_zenoh."""
@@ -205,18 +178,18 @@ class RosConfig(Document, frozen=True):
         """Return the rights of the role ``ros``."""
         outputs = [*map(self.output_key, self.outputs.values()), *self._driven_by]
         outputs += map(self.input_key, self.commands.values())
-        inputs = [*self.inputs.values(), self.keep_out_mask, self.scan]
+        inputs = [*self.inputs.values(), self.topic("keep_out_mask"), self.topic("scan")]
         return ros_rights([*map(self.input_key, inputs)], outputs, self._graph)
 
     def driver_rights(self) -> Role:
         """Return the rights of the role ``driver``."""
         inputs = [topic for name, topic in self.inputs.items() if name in DRIVER_INPUTS]
-        outputs = [*map(self.input_key, (*inputs, self.scan))]
+        outputs = [*map(self.input_key, (*inputs, self.topic("scan")))]
         return ros_rights(self._driven_by, outputs, self._graph)
 
     @property
     def _driven_by(self) -> list[str]:
-        return [self.output_key(self.velocities(schema)) for schema in TWIST_SCHEMAS]
+        return [self.output_key(self.topic("cmd_vel", schema)) for schema in TWIST_SCHEMAS]
 
     @property
     def _graph(self) -> list[str]:
@@ -225,7 +198,7 @@ class RosConfig(Document, frozen=True):
     def faults(self) -> Iterator[BadConfiguration]:
         if self.namespace != "/" and not _TOPIC.fullmatch(self.namespace):
             yield _misfit("namespace", "/ or like /robot1", self.namespace)
-        prefix = self._name(self.services)
+        prefix = self.full_name(self.services)
         if not _TOPIC.fullmatch(self.services) or len(prefix) > _MAX_PREFIX_LENGTH:
             yield _misfit("services", "like /coverage", self.services)
         if not _NODE.fullmatch(self.node):
@@ -239,7 +212,7 @@ class RosConfig(Document, frozen=True):
         keys: dict[str, str] = {}
         for key in RosTopicNames.__struct_fields__:
             name: str = getattr(self.topics, key)
-            if not _TOPIC.fullmatch(name) or len(self._name(name)) > _MAX_TOPIC_LENGTH:
+            if not _TOPIC.fullmatch(name) or len(self.full_name(name)) > _MAX_TOPIC_LENGTH:
                 yield _misfit(f"topics.{key}", "like /robot1/map", name)
             if name in keys:
                 yield BadConfiguration(
@@ -249,5 +222,6 @@ class RosConfig(Document, frozen=True):
                 )
             keys[name] = key
 
-    def _name(self, topic: str) -> str:
+    def full_name(self, topic: str) -> str:
+        """Return the name of a topic, service or action in the namespace."""
         return self.namespace.rstrip("/") + topic

@@ -13,16 +13,10 @@ from msgspec import Meta, structs
 
 from fasaco_edge.bus import DEFAULT_ENDPOINT, access
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.config.endpoints import (
-    UNIX,
-    endpoint_faults,
-    from_here,
-    is_local,
-    protocol_of,
-)
+from fasaco_edge.config.endpoints import UNIX, endpoint_faults, from_here, is_local, protocol_of
 from fasaco_edge.config.reading import refused
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
-from fasaco_edge.host.documents import Document, inspected
+from fasaco_edge.host.documents import StrictDocument, inspected
 from fasaco_edge.host.plain_yaml import read_bounded, read_written
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import FLEET
@@ -42,7 +36,7 @@ CARRIERS = {
 Name = Annotated[str, Meta(min_length=1)]
 
 
-class TlsConfig(Document, frozen=True):
+class TlsConfig(StrictDocument, frozen=True):
     """PEM files: the CA of all participants, this daemon's certificate and its key."""
 
     root_ca: str = ""
@@ -50,7 +44,7 @@ class TlsConfig(Document, frozen=True):
     private_key: str = ""
 
 
-class UserConfig(Document, frozen=True):
+class UserConfig(StrictDocument, frozen=True):
     """This daemon's user name, and a file with its password and nothing else.
 
     ``dictionary_file`` has a line ``name:password`` for each user who may connect.
@@ -61,7 +55,7 @@ class UserConfig(Document, frozen=True):
     dictionary_file: str = ""
 
 
-class RolesConfig(Document, frozen=True):
+class RolesConfig(StrictDocument, frozen=True):
     """Names with each role: common names of certificates, or user names (``bus.access.ROLES``)."""
 
     mapper: tuple[Name, ...] = ()
@@ -73,11 +67,11 @@ class RolesConfig(Document, frozen=True):
     router: tuple[Name, ...] = ()
 
 
-class LimitsConfig(Document, access.Limits, frozen=True):
+class LimitsConfig(StrictDocument, access.SenderLimits, frozen=True):
     """Limits on each sender."""
 
 
-class SecurityConfig(Document, frozen=True):
+class SecurityConfig(StrictDocument, frozen=True):
     """Authentication of participants, and their permissions."""
 
     kind: Literal["none", "tls", "user"] = "none"
@@ -114,8 +108,7 @@ class SecurityConfig(Document, frozen=True):
     def of_client(self, dictionary_file: str = "") -> dict[str, Any]:
         """Return the credentials of a session, as a part of Zenoh's configuration.
 
-        Args:
-            dictionary_file: passwords of the users who may connect to it; "" for none.
+        ``dictionary_file``: passwords of the users who may connect to it; "" for none.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -141,17 +134,12 @@ class SecurityConfig(Document, frozen=True):
         return {"transport": transport, "scouting": {"gossip": {"enabled": False}}}
 
     def of_daemon(
-        self,
-        prefix: str,
-        ros: access.Role | None = None,
-        ros_driver: access.Role | None = None,
+        self, prefix: str, ros: access.Role | None = None, ros_driver: access.Role | None = None
     ) -> dict[str, Any]:
         """Return the credentials of a daemon's session, with access control for all others.
 
-        Args:
-            prefix: prefix of all keys of the robot.
-            ros, ros_driver: rights of the roles ``ros`` and ``driver`` under ROS 2; None without a
-                section ``ros2``.
+        ``prefix`` is that of all keys of the robot; ``ros`` and ``ros_driver`` are the rights of
+        the roles ``ros`` and ``driver`` under ROS 2, None without a section ``ros2``.
 
         Raises:
             BadConfiguration: a file cannot be read.
@@ -177,14 +165,10 @@ class SecurityConfig(Document, frozen=True):
             driver = self.roles.driver
             grants.append(access.Grant("ros", driver, "", of="driver", rights=ros_driver))
         part["access_control"] = access.access_control(grants, ATTRIBUTES[self.kind])
-        return part | self.thinned(prefix)
-
-    def thinned(self, prefix: str) -> dict[str, Any]:
-        """Return the limits, as a part of Zenoh's configuration."""
-        return access.limits(prefix, self.limits)
+        return part | access.limits(prefix, self.limits)
 
 
-class BusConfig(Document, frozen=True):
+class BusConfig(StrictDocument, frozen=True):
     """How the daemon joins the bus, and who else may join it.
 
     Remote access requires authentication (``security``), unless ``open_to_everyone`` is set.
@@ -219,7 +203,7 @@ class BusConfig(Document, frozen=True):
         rights = (ros.rights(), ros.driver_rights()) if ros else ()
         part = self.security.of_daemon(prefix, *rights)
         if self.open_to_everyone:
-            part |= self.security.thinned(prefix)
+            part |= access.limits(prefix, self.security.limits)
         return BusSettings(self.mode, self.connect, self.listen, part)
 
     def of_client(self) -> BusSettings:

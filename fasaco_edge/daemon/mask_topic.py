@@ -34,11 +34,7 @@ MOST_WAITING = 2
 class MaskTopic:
     """Subscribes to masks, and puts the mask in the map's frame into a configuration.
 
-    Args:
-        bus: the session.
-        config: the daemon's configuration.
-        ros: the bridge to ROS 2; None without one.
-        arrived: called for each mask, on a Zenoh thread.
+    ``arrived`` is called for each mask, on a Zenoh thread.
 
     Attributes:
         map_frame: frame of the map; "" while it is unknown, and masks wait.

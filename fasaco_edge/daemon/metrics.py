@@ -37,10 +37,10 @@ PREFIX = "fasaco_edge"
 MEGABYTE = 1_000_000
 
 Labels = Mapping[str, str]
-Sample = tuple[Labels, float | UnsetType | None]
+LabelledValue = tuple[Labels, float | UnsetType | None]
 
 
-class Figure(NamedTuple):
+class Metric(NamedTuple):
     """A metric: name, help text, and its samples from a status.
 
     Samples without value, None or unset, are left out.
@@ -48,7 +48,7 @@ class Figure(NamedTuple):
 
     name: str
     about: str
-    samples: Callable[[Status], Iterable[Sample]]
+    samples: Callable[[Status], Iterable[LabelledValue]]
     is_summary: bool = False
 
     @property
@@ -58,22 +58,22 @@ class Figure(NamedTuple):
         return "summary" if self.is_summary else plain
 
 
-def _one(value: Callable[[Status], float | None]) -> Callable[[Status], list[Sample]]:
+def _one(value: Callable[[Status], float | None]) -> Callable[[Status], list[LabelledValue]]:
     return lambda status: [({}, value(status))]
 
 
-def _member(part: str, name: str) -> Callable[[Status], list[Sample]]:
+def _member(part: str, name: str) -> Callable[[Status], list[LabelledValue]]:
     """Return the sampler of a member of a section of the status; None without that section."""
     return lambda status: [({}, getattr(getattr(status, part), name, None))]
 
 
-def _times(status: Status) -> list[Sample]:
+def _times(status: Status) -> list[LabelledValue]:
     loop = status.loop_ms
     shares = (("0.5", loop.p50), ("0.99", loop.p99), ("0.999", loop.p99_9), ("1", loop.max))
     return [({"quantile": share}, _seconds(value)) for share, value in shares]
 
 
-def _latencies(status: Status) -> list[Sample]:
+def _latencies(status: Status) -> list[LabelledValue]:
     last = status.latency_ms
     stages = (("ingest", last.ingest), ("plan", last.plan), ("map_to_path", last.map_to_path))
     return [({"stage": stage}, _seconds(value)) for stage, value in stages]
@@ -83,100 +83,100 @@ def _seconds(milliseconds: float | None) -> float | None:
     return None if milliseconds is None else milliseconds / 1000.0
 
 
-def _troubles(status: Status) -> list[Sample]:
+def _troubles(status: Status) -> list[LabelledValue]:
     present = {trouble.code for trouble in status.troubles}
     return [({"code": code}, code in present) for code in TROUBLES]
 
 
-def _errors(status: Status) -> list[Sample]:
+def _errors(status: Status) -> list[LabelledValue]:
     return [({"code": code}, count) for code, count in sorted(status.errors.by_code.items())]
 
 
-FIGURES = (
-    Figure(
+METRICS = (
+    Metric(
         "info",
         "version of the package, and the robot's name",
         lambda status: [({"robot": status.robot, "version": status.version}, 1)],
     ),
-    Figure(
+    Metric(
         "state",
         "1 for the state of the mission, 0 for the others",
         lambda status: [({"state": name}, name == status.state) for name in STATES],
     ),
-    Figure("trouble", "1 for what is wrong in that state, 0 for the others", _troubles),
-    Figure("uptime_seconds", "since the daemon began", _one(lambda s: s.uptime_s)),
-    Figure("covered_ratio", "covered share of cells", _member("coverage", "fraction")),
-    Figure("covered_cells", "cells covered", _member("coverage", "covered")),
-    Figure("coverable_cells", "cells within reach", _member("coverage", "coverable")),
-    Figure("recovered_cells", "cells covered again", _member("coverage", "recovered")),
-    Figure(
+    Metric("trouble", "1 for what is wrong in that state, 0 for the others", _troubles),
+    Metric("uptime_seconds", "since the daemon began", _one(lambda s: s.uptime_s)),
+    Metric("covered_ratio", "covered share of cells", _member("coverage", "fraction")),
+    Metric("covered_cells", "cells covered", _member("coverage", "covered")),
+    Metric("coverable_cells", "cells within reach", _member("coverage", "coverable")),
+    Metric("recovered_cells", "cells covered again", _member("coverage", "recovered")),
+    Metric(
         "unreachable_cells",
         "cells where the robot would fit, but that it cannot get to",
         _member("coverage", "unreachable"),
     ),
-    Figure("swept_square_metres", "floor swept", _member("floor", "swept_m2")),
-    Figure(
+    Metric("swept_square_metres", "floor swept", _member("floor", "swept_m2")),
+    Metric(
         "reachable_square_metres",
         "floor that the tool can reach and is asked to sweep",
         _member("floor", "reachable_m2"),
     ),
-    Figure("battery_ratio", "charge of the battery", _member("battery", "level")),
-    Figure("path_revision", "counts published paths", _member("path", "revision")),
-    Figure("path_remaining_steps", "still to drive", _member("path", "remaining_steps")),
-    Figure("path_gap_ratio", "cost above the lower bound", _member("path", "gap")),
-    Figure("plans_total", "plans made", _member("plan", "plans")),
-    Figure(
+    Metric("battery_ratio", "charge of the battery", _member("battery", "level")),
+    Metric("path_revision", "counts published paths", _member("path", "revision")),
+    Metric("path_remaining_steps", "still to drive", _member("path", "remaining_steps")),
+    Metric("path_gap_ratio", "cost above the lower bound", _member("path", "gap")),
+    Metric("plans_total", "plans made", _member("plan", "plans")),
+    Metric(
         "plans_outdated_total",
         "plans that were outdated when they arrived",
         _member("plan", "outdated"),
     ),
-    Figure("latency_seconds", "last duration of each stage", _latencies),
-    Figure("cycles_total", "cycles of the loop", _member("loop_ms", "turns")),
-    Figure("cycles_late_total", "cycles longer than 100 ms", _member("loop_ms", "late")),
-    Figure(
+    Metric("latency_seconds", "last duration of each stage", _latencies),
+    Metric("cycles_total", "cycles of the loop", _member("loop_ms", "turns")),
+    Metric("cycles_late_total", "cycles longer than 100 ms", _member("loop_ms", "late")),
+    Metric(
         "cycle_seconds", "cycles of the loop since the start, by quantile", _times, is_summary=True
     ),
-    Figure("errors_total", "refused, not published or failed", _errors),
-    Figure("ledger_age_seconds", "since progress was written", _member("ledger", "age_s")),
-    Figure(
+    Metric("errors_total", "refused, not published or failed", _errors),
+    Metric("ledger_age_seconds", "since progress was written", _member("ledger", "age_s")),
+    Metric(
         "ledger_faulty",
         "1 where something is or was wrong with the progress on disk",
         _one(lambda status: status.ledger.fault is not None),
     ),
-    Figure(
+    Metric(
         "recorder_up",
         "1 while the supervised recorder records",
         lambda s: [({}, s.recorder.state == "recording")] if s.recorder else [],
     ),
-    Figure("recorder_lost_total", "samples not written", _member("recorder", "lost")),
-    Figure("recorder_restarts_total", "its restarts", _member("recorder", "restarts")),
-    Figure("memory_bytes", "of the process", _one(lambda s: s.rss_mb * MEGABYTE)),
-    Figure("processor_seconds_total", "of the process", _one(lambda s: s.cpu_s)),
-    Figure("threads", "of the process", _one(lambda s: s.threads)),
+    Metric("recorder_lost_total", "samples not written", _member("recorder", "lost")),
+    Metric("recorder_restarts_total", "its restarts", _member("recorder", "restarts")),
+    Metric("memory_bytes", "of the process", _one(lambda s: s.rss_mb * MEGABYTE)),
+    Metric("processor_seconds_total", "of the process", _one(lambda s: s.cpu_s)),
+    Metric("threads", "of the process", _one(lambda s: s.threads)),
 )
 
 
 def exposition(status: Status, age_s: float) -> str:
     """Return all metrics of a status, whose age is ``age_s`` [s]."""
-    age = Figure(
+    age = Metric(
         "status_age_seconds",
         "since the daemon's loop made these figures; after some seconds it counts as hung",
         lambda _: [({}, round(age_s, 3))],
     )
-    return "".join(line + "\n" for figure in (*FIGURES, age) for line in _lines(figure, status))
+    return "".join(line + "\n" for metric in (*METRICS, age) for line in _lines(metric, status))
 
 
-def _lines(figure: Figure, status: Status) -> Iterator[str]:
+def _lines(metric: Metric, status: Status) -> Iterator[str]:
     known = [
         (labels, value)
-        for labels, value in figure.samples(status)
+        for labels, value in metric.samples(status)
         if not isinstance(value, UnsetType | None)
     ]
     if not known:
         return
-    name = f"{PREFIX}_{figure.name}"
-    yield f"# HELP {name} {figure.about}"
-    yield f"# TYPE {name} {figure.kind}"
+    name = f"{PREFIX}_{metric.name}"
+    yield f"# HELP {name} {metric.about}"
+    yield f"# TYPE {name} {metric.kind}"
     for labels, value in known:
         within = ",".join(f'{label}="{_escaped(text)}"' for label, text in labels.items())
         number = value if isinstance(value, float) else int(value)
@@ -189,10 +189,7 @@ def _escaped(text: str) -> str:
 
 
 class MetricsServer:
-    """Serves the newest status.
-
-    Args:
-        address: the address to listen on.
+    """Serves the newest status at an address.
 
     Raises:
         OSError: it cannot listen there.

@@ -13,8 +13,8 @@ from functools import partial
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.latched import Subscription
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.publisher import RosPublisher
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.publisher import Publisher
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.daemon.loop.inbox import poster
@@ -65,7 +65,7 @@ class RosBridge:
 
     def subscribe_mask(self, take: Callable[[Sample], None]) -> Subscription:
         """Subscribe to the keep-out mask; ``take`` is called on a Zenoh thread."""
-        return self._listen(self._config.keep_out_mask, take)
+        return self._listen(self._config.topic("keep_out_mask"), take)
 
     def _listen(
         self, topic: RosTopic, take: Callable[[Sample], None], *, in_order: bool = False
@@ -87,17 +87,18 @@ class RosBridge:
         """Take the requests of a service; return its key expression, which allows any type hash."""
         key = self._config.input_key(service)
         post = partial(self._mailbox.post, "command")
-        too_long = Reply(b"the request is too long", is_error=True)
+        too_long = QueryReply(b"the request is too long", is_error=True)
         self._bus.take_questions(key, post, MOST_REQUEST_BYTES, too_long)
         self._announce("SS", service)
         return key
 
-    def _publisher(self, topic: RosTopic, like: Topic) -> RosPublisher:
+    def _publisher(self, topic: RosTopic, like: Topic) -> Publisher:
         """Publish ``topic`` with the quality of service of the native key ``like``."""
         key = self._config.output_key(topic)
         publisher = self._bus.publisher(key, topic.schema, like.qos or VOLATILE)
-        token = self._announce("MP", topic)
-        return RosPublisher(publisher, gid_of(token) if token else b"")
+        if token := self._announce("MP", topic):
+            publisher.gid = gid_of(token)
+        return publisher
 
     def _announce(self, kind: Endpoint, topic: RosTopic) -> str:
         """Return the token of a new endpoint; "" with a bridge, which declares its own tokens."""

@@ -15,7 +15,6 @@ from fasaco_edge.bus.session import Bus, join, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.cautions import log_cautions
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.claim import NameClaim
 from fasaco_edge.daemon.fleet_wing import receiver_of, sender_of
 from fasaco_edge.daemon.ledger.rooms_file import RoomsFile, RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, LedgerWriter, open_ledger
@@ -26,6 +25,7 @@ from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.mask_topic import MaskTopic
 from fasaco_edge.daemon.memory import afforded, has_default_sizes, needed_bytes
+from fasaco_edge.daemon.name_claim import NameClaim
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.ros_bridge import RosBridge
@@ -72,7 +72,6 @@ def run_daemon(
     """Serve until SIGTERM or SIGINT.
 
     Args:
-        config: the configuration.
         record_to: folder for recordings; None for no recordings.
         state: folder of the coverage ledger; None for the configured one.
         fresh: set the ledger aside, and cover everything again.

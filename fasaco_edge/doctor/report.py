@@ -66,12 +66,8 @@ def findings(
 ) -> Iterator[tuple[str, Finding]]:
     """Yield the name and finding of each check.
 
-    The configuration is checked first; if it is refused, only the computer is checked, too.
-
-    Args:
-        path: file of the configuration; None for the defaults.
-        checks: the further checks.
-        recordings: folder for recordings.
+    The configuration in the file ``path``, None for the defaults, is checked first; if it is
+    refused, only the computer is checked, too. ``recordings``: folder for recordings.
     """
     deadline = time.monotonic() + PATIENCE_S
     try:

@@ -185,12 +185,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
 
 
 class MapsElsewhere:
-    """Maps that are published under other names than this daemon's map.
-
-    Args:
-        bus: the session to search.
-        own: keys that the daemon's own map may have.
-    """
+    """Maps that are published under other names than ``own``, those of this daemon's map."""
 
     def __init__(self, bus: Bus, own: list[str]) -> None:
         self._bus = bus

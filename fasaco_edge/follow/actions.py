@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, TypeVar
 
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.wire.messages.nav2_goals import (
@@ -260,7 +260,7 @@ class ActionClient:
     def _ask(self, call: Call, payload: bytes, take: Callable[[bytes | None], None]) -> None:
         """Send a request; ``take`` gets the reply in ``turn``, or None without a reply."""
 
-        def end(replies: list[Reply]) -> None:
+        def end(replies: list[QueryReply]) -> None:
             reply = next((reply.payload for reply in replies if not reply.is_error), None)
             self._replies.append(partial(take, reply))
 

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bus.publisher import Publisher, RosPublisher
+from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, join
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.daemons import BaseClaim
@@ -144,19 +144,17 @@ class FollowerNode(Node):
             self._out.put(encode_velocity(velocity, settings.schema))
 
 
-def _velocities(bus: Bus, settings: FollowSettings) -> Publisher | RosPublisher:
+def _velocities(bus: Bus, settings: FollowSettings) -> Publisher:
     """Return the publisher of velocities; for rmw_zenoh, also declare its node and topic."""
     out = bus.publisher(settings.cmd_key, settings.schema, topics.CMD_VEL.qos or VOLATILE)
-    ros, gid = settings.ros, b""
-    if not ros:
-        return out
-    if ros["kind"] == "rmw_zenoh":
+    ros = settings.ros
+    if ros and ros["kind"] == "rmw_zenoh":
         node = RosNode(ros["domain"], bus.id, ros["namespace"], ros["node"])
         token = node.endpoint_token(1, "MP", RosTopic(ros["topic"], settings.schema))
         bus.token(node.token)
         bus.token(token)
-        gid = gid_of(token)
-    return RosPublisher(out, gid)
+        out.gid = gid_of(token)
+    return out
 
 
 def patience_of(settings: FollowSettings) -> Patience:

@@ -38,7 +38,7 @@ from fasaco_edge.grid.map_images import (
     yaw_in_degrees,
 )
 from fasaco_edge.grid.occupancy import UNKNOWN, OccupancyGrid
-from fasaco_edge.host.documents import Document, inspected
+from fasaco_edge.host.documents import StrictDocument, inspected
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.plain_yaml import read_written
 from fasaco_edge.host.resources import folder
@@ -278,7 +278,7 @@ def _index() -> dict[str, _BuiltIn]:
 NUMBERS = ("resolution", "origin", "occupied_thresh", "free_thresh")
 
 
-class MapKeys(Document, frozen=True):
+class MapKeys(StrictDocument, frozen=True):
     """The keys of a map_server YAML file, which may have further keys of other programs."""
 
     is_open: ClassVar[bool] = True

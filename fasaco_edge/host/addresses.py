@@ -49,12 +49,7 @@ class Address(NamedTuple):
 
 
 def read_address(name: str, text: str, example: int) -> Address:
-    """Return the address in ``text``, the value of ``name``.
-
-    Args:
-        name: name of the key or option.
-        text: address and port; localhost is 127.0.0.1.
-        example: a port for the error's text.
+    """Return the address in ``text``, the value of a key or option; localhost is 127.0.0.1.
 
     Raises:
         BadConfiguration: it is no address with a port.

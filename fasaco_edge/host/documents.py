@@ -1,6 +1,6 @@
 """Documents that people write, as structs: each with all its faults, and each fault with its key.
 
-What types show comes first, then what structs say of themselves (``Document.faults``).
+What types show comes first, then what structs say of themselves (``StrictDocument.faults``).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ MOST_FAULTS = 50
 ALIKE = 0.8
 
 
-class Document(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class StrictDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A document, or an object in one, in which unknown keys are errors.
 
     If it ``is_open`` it may have keys of other programs, and only misspelt ones are errors.
@@ -62,7 +62,7 @@ def inspected(
 ) -> tuple[_Struct, list[_Error]]:
     """Return a parsed document as a struct, and all its faults.
 
-    With faults the struct is as ``Document.faults`` describes; UNSET if the document is no object.
+    With faults the struct is as ``StrictDocument.faults`` says; UNSET if the document is no object.
     """
     reader = _Reader(kind, error)
     read: _Struct = reader.read(kind, document, "")
@@ -93,7 +93,7 @@ def misfits(held: object, error: type[_Error], key: str = "") -> Iterator[_Error
             held.__struct_fields__, held.__struct_encode_fields__, strict=True
         ):
             yield from misfits(getattr(held, name), error, joined(key, encoded))
-        if isinstance(held, Document):
+        if isinstance(held, StrictDocument):
             for fault in held.faults():
                 yield fault.within(key, error)
     elif isinstance(held, list | tuple):

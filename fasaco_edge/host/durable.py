@@ -15,10 +15,7 @@ from fasaco_edge.host.files import open_own
 def write_through(path: Path, payload: bytes, *, mode: int = 0o644) -> None:
     """Write a file; its bytes are on the disk when this returns.
 
-    Args:
-        path: the file.
-        payload: its content.
-        mode: permissions of a new file, restricted by the umask.
+    ``mode``: permissions of a new file, restricted by the umask.
 
     Raises:
         OSError: it failed.
@@ -30,14 +27,9 @@ def write_through(path: Path, payload: bytes, *, mode: int = 0o644) -> None:
 
 
 def make_folder(folder: Path, *, mode: int = 0o777) -> None:
-    """Make a folder, and its missing parents.
+    """Make a folder, and its missing parents; OSError if that fails.
 
-    Args:
-        folder: its path.
-        mode: permissions of new folders, restricted by the umask.
-
-    Raises:
-        OSError: it failed.
+    ``mode``: permissions of new folders, restricted by the umask.
     """
     if folder.is_dir():
         return
@@ -47,11 +39,7 @@ def make_folder(folder: Path, *, mode: int = 0o777) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Write the names in a folder to the disk.
-
-    Raises:
-        OSError: it failed.
-    """
+    """Write the names in a folder to the disk; OSError if that fails."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(descriptor)

@@ -9,11 +9,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def folder(name: str, package: Path = PACKAGE) -> Path:
-    """Return a folder that came with the package.
-
-    Args:
-        name: "maps" or "protocol".
-        package: folder of the installed package.
+    """Return a folder that came with the package: "maps" or "protocol".
 
     Raises:
         FileNotFoundError: this installation has no such folder.

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import atexit
 import errno
+import fcntl
 import functools
 import logging
 import os
@@ -20,9 +21,10 @@ import shutil
 import sys
 import tempfile
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
@@ -65,6 +67,10 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+# Folders of code for one process alone: how their names begin, and an age at which they are
+# locked for certain [s].
+SCRATCH, SURE_S = "fasaco-edge-scratch-", 60.0
 
 
 class _Kept:
@@ -182,7 +188,10 @@ def _scratch() -> str:
     base = temporary_folder()
     if why := why_not_trusted(unguessable(base)):
         raise PermissionError(errno.EPERM, f"no folder for what is compiled: {why}", str(base))
-    folder, maker = tempfile.mkdtemp(prefix="fasaco-edge-", dir=base), os.getpid()
+    _remove_left(base)
+    folder, maker = tempfile.mkdtemp(prefix=SCRATCH, dir=base), os.getpid()
+    with suppress(OSError):  # a disk without locks
+        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_SH)  # until the process has ended
 
     def clear() -> None:
         # A forked process must not remove the folder.
@@ -191,6 +200,18 @@ def _scratch() -> str:
 
     atexit.register(clear)
     return folder
+
+
+def _remove_left(base: Path) -> None:
+    """Remove the folders that killed processes of this user left: nobody holds their locks."""
+    for left in base.glob(f"{SCRATCH}*"):
+        with suppress(OSError), ExitStack() as held:
+            opened = os.open(left, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            held.callback(os.close, opened)
+            about = os.fstat(opened)
+            if about.st_uid == os.geteuid() and time.time() - about.st_mtime > SURE_S:
+                fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(left, ignore_errors=True)
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.rooms_file import decode_rooms
-from fasaco_edge.daemon.loop.inbox import Batch, Received
+from fasaco_edge.daemon.loop.inbox import CycleInput, Received
 from fasaco_edge.daemon.loop.turn_log import (
     EMBEDDED,
     POSE_BYTES,
@@ -240,7 +240,7 @@ class CycleReplay:
         commands = [
             CommandReceived(number, *read_recorded(document)) for number, document in turn.commands
         ]
-        batch = Batch(samples=self._received(turn), updates_lost=turn.patches_lost)
+        batch = CycleInput(samples=self._received(turn), updates_lost=turn.patches_lost)
         plans, before = self._plans(turn), drive.state
         step = drive.cycle(now, batch, commands, plans, may_begin=turn.is_begun)
         if step.decision.plan is not None:

@@ -12,7 +12,7 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.fleet_wing import receiver_of
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper, NoDisk
-from fasaco_edge.daemon.loop.inbox import Batch, Inbox, make_mailbox
+from fasaco_edge.daemon.loop.inbox import CycleInput, Inbox, make_mailbox
 from fasaco_edge.daemon.loop.loader import Loader
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.errors import FasacoError
@@ -105,7 +105,7 @@ class MissionDrive:
     def cycle(
         self,
         now: float,
-        batch: Batch,
+        batch: CycleInput,
         commands: Sequence[CommandReceived],
         plans: Sequence[PlanReady],
         *,

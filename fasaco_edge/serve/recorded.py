@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.client.robot_state import SILENCE_S
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Pose2D
@@ -121,7 +121,7 @@ class Playback:
         text = message_text("recording", **about)
         return [("recording", 1, text), ("track", 1, track_message(self._timeline))]
 
-    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[QueryReply]:
         """Return nothing: there is no daemon to ask."""
         return []
 

@@ -22,7 +22,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.frames import CloseCode
 from websockets.http11 import Request, Response
 
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.client.feed import Feed
 from fasaco_edge.client.phrases import steady_now
 from fasaco_edge.host.addresses import Address
@@ -236,7 +236,7 @@ class LiveServer(Server):
         """Return kind, number and content of the newest messages."""
         return [(kind, number, message) for kind, (number, message) in self._newest.items()]
 
-    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[QueryReply]:
         """Ask the daemon; blocks."""
         return self._feed.ask(query, payload, timeout_s)
 

@@ -23,7 +23,7 @@ from fasaco_edge.wire.reasons import plain
 if TYPE_CHECKING:
     from websockets.asyncio.server import ServerConnection
 
-    from fasaco_edge.bus.queries import Reply
+    from fasaco_edge.bus.queries import QueryReply
     from fasaco_edge.serve.guard import Guard
 
 LOG = logging.getLogger(__name__)
@@ -46,7 +46,7 @@ class Source(Protocol):
     def newest(self) -> list[tuple[str, int, str | bytes]]:
         """Return kind, number and content of the newest messages."""
 
-    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[Reply]:
+    def ask(self, query: str, payload: bytes, timeout_s: float) -> list[QueryReply]:
         """Ask the daemon; blocks."""
 
     def at(self, at_s: float) -> list[str | bytes]:

@@ -151,13 +151,7 @@ def gid_of(token: str) -> bytes:
 
 
 def attachment(sequence: int, time_ns: int, gid: bytes) -> bytes:
-    """Return the attachment that rmw_zenoh requires with each sample.
-
-    Args:
-        sequence: number of the sample, from 1 on.
-        time_ns: when it was published [ns].
-        gid: of its publisher, ``GID_BYTES`` bytes.
-    """
+    """Return the attachment that rmw_zenoh requires with each sample; ``sequence`` begins at 1."""
     return _ATTACHMENT.pack(sequence, time_ns, GID_BYTES, gid)
 
 

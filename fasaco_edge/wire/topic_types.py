@@ -123,66 +123,10 @@ class Topic:
 
     @property
     def size_class(self) -> SizeClass:
-        """Its size limit, see ``bus.access.Limits``."""
+        """Its size limit, see ``bus.access.SenderLimits``."""
         if self.qos is None:
             return "token"
         if not self.schemas:
             return "json"
         small = POSE_SCHEMAS, TWIST_SCHEMAS, (BATTERY_STATE,)
         return "pose" if self.schemas in small else "large"
-
-
-@dataclass(frozen=True, slots=True)
-class Query:
-    """A query to a daemon, ``@rpc/<name>``.
-
-    Attributes:
-        name: name of the query.
-        listeners: roles that may send it.
-        schema: message type of the reply; "" for JSON.
-        json: JSON Schema of the reply; "" for none.
-        payload: JSON Schema of the query's payload; "" for none.
-        answered: ``at once``: with the newest sample; ``loop``: by the loop, with its decision.
-        timeout_s: timeout of the reply [s].
-        errors: codes of its errors, besides ``bad_query``.
-    """
-
-    name: str
-    listeners: tuple[Role, ...]
-    schema: str = ""
-    json: str = ""
-    payload: str = ""
-    answered: Literal["at once", "loop"] = "at once"
-    timeout_s: float = 1.0
-    errors: tuple[str, ...] = ()
-    speaker: Role = "robot"
-
-    @property
-    def suffix(self) -> str:
-        """What its keys end with."""
-        return f"@rpc/{self.name}"
-
-    @property
-    def size_class(self) -> SizeClass:
-        """The size limit of its reply."""
-        return "large" if self.schema else "json"
-
-
-class RosRow(NamedTuple):
-    """A ROS 2 topic.
-
-    Attributes:
-        name: its key under ``ros2.topics`` of the configuration.
-        topic: its name in the daemon and in recordings.
-        direction: as seen by the planner.
-        schemas: allowed message types.
-        latched: transient local.
-        depth: history depth.
-    """
-
-    name: str
-    topic: str
-    direction: Literal["in", "out"]
-    schemas: tuple[str, ...]
-    latched: bool
-    depth: int

@@ -1,4 +1,4 @@
-"""Table of topics: one row for each key, query and ROS 2 topic of the contract.
+"""Table of topics: one row for each key of the contract.
 
 Publishers, subscribers, queues, the recorder's inputs and access rules are made from these rows;
 ``protocol/keys.yaml``, ``protocol/qos.yaml``, the tables of ``protocol/*.md`` and the session
@@ -8,15 +8,7 @@ templates are written from them (``make contract``).
 from __future__ import annotations
 
 from fasaco_edge.wire import schemas
-from fasaco_edge.wire.topic_types import (
-    EVERY,
-    NEWEST,
-    Qos,
-    Query,
-    Queues,
-    RosRow,
-    Topic,
-)
+from fasaco_edge.wire.topic_types import EVERY, NEWEST, Qos, Queues, Topic
 
 MAP = Topic(
     name="map",
@@ -245,14 +237,8 @@ FLEET = Topic(
     rate_hz=1.0,
     queues=Queues(daemon=64),
     limits=(
-        "max_json_bytes",
-        "min_resolution_m",
-        "max_resolution_m",
-        "max_fleet_tiles",
-        "max_fleet_parts",
-        "max_fleet_index",
-        "max_fleet_points",
-        "queue_fleet",
+        *("max_json_bytes", "min_resolution_m", "max_resolution_m", "max_fleet_tiles"),
+        *("max_fleet_parts", "max_fleet_index", "max_fleet_points", "queue_fleet"),
     ),
 )
 ALIVE = Topic(
@@ -338,59 +324,8 @@ RECORDED = (
 IN_ORDER = frozenset({MAP.name, MAP_UPDATE.name})
 QOS = {topic.name: topic.qos for topic in TOPICS if topic.qos is not None}
 
-QUERIES = (
-    Query("path", ("viewer",), schema=schemas.PATH, errors=("not_yet",)),
-    Query("status", ("viewer",), json="status.json"),
-    Query("coverage", ("viewer",), schema=schemas.OCCUPANCY_GRID, errors=("not_yet",)),
-    Query("pheromone", ("viewer",), schema=schemas.PHEROMONE_GRID, errors=("not_yet",)),
-    Query("rooms", ("viewer",), json="rooms.json", errors=("not_yet",)),
-    Query("config", ("viewer",), json="config.json"),
-    Query("version", ("viewer",), json="version.json"),
-    # These queries are commands.
-    Query(
-        "mission",
-        ("operator",),
-        json="reply.json",
-        payload="mission.json",
-        answered="loop",
-        timeout_s=5.0,
-        errors=("bad_order", "not_now", "would_forget", "malformed_message"),
-    ),
-    Query(
-        "replan",
-        ("operator",),
-        json="replan.json",
-        answered="loop",
-        timeout_s=5.0,
-        errors=("not_now",),
-    ),
-)
-RPC_NAMES = tuple(query.name for query in QUERIES)
-
 TF_STATIC = "tf_static"
-# History depths of tf2's listeners. A bridge keeps the static transforms of all nodes in one
-# history.
-TF_DEPTH = POSE_DEPTH = 100
-TF = (schemas.TF_MESSAGE,)
-_ROS_ROWS = (
-    RosRow("map", "map", "in", MAP.schemas, latched=True, depth=1),
-    RosRow("map_updates", "map_update", "in", MAP_UPDATE.schemas, latched=False, depth=256),
-    RosRow("battery", "battery", "in", BATTERY.schemas, latched=False, depth=16),
-    RosRow("priority", "priority", "in", PRIORITY.schemas, latched=True, depth=1),
-    RosRow("keep_out_mask", "keep_out_mask", "in", MAP.schemas, latched=True, depth=1),
-    RosRow("scan", "scan", "in", SCAN.schemas, latched=False, depth=5),
-    RosRow("pose", "pose", "in", POSE.schemas, latched=False, depth=POSE_DEPTH),
-    RosRow("tf", "pose", "in", TF, latched=False, depth=TF_DEPTH),
-    RosRow("tf_static", TF_STATIC, "in", TF, latched=True, depth=TF_DEPTH),
-    RosRow("coverage_path", "path", "out", PATH.schemas, latched=True, depth=1),
-    RosRow("coverage_grid", "coverage", "out", COVERAGE.schemas, latched=True, depth=1),
-    RosRow(
-        "diagnostics", "diagnostics", "out", (schemas.DIAGNOSTIC_ARRAY,), latched=False, depth=10
-    ),
-    RosRow("cmd_vel", "cmd_vel", "out", CMD_VEL.schemas, latched=False, depth=1),
-)
-ROS_TOPICS = {row.name: row for row in _ROS_ROWS}
-"""ROS 2 topics by their key under ``ros2.topics`` of the configuration."""
+"""Name of the static transforms of ROS 2 in queues and recordings."""
 
 
 def _queue_lengths() -> dict[str, int]:

@@ -218,19 +218,6 @@ def test_a_sample_older_than_the_answer_is_dropped(bus, endpoint, numbered):
 
 
 @pytest.mark.parametrize("numbered", [True, False])
-def test_a_sample_published_during_a_subscription_arrives_once(bus, endpoint, numbered):
-    with publishing(endpoint, numbered) as publisher:
-        for number in range(30):
-            samples = Queue()
-            bus.subscribe(KEY, samples.put, latched=True)
-            publisher.put(b"%d" % number)
-            while taken(samples, 1) != [b"%d" % number]:
-                pass  # that of the round before
-            time.sleep(0.1)  # what comes twice comes at once
-            assert samples.empty()
-
-
-@pytest.mark.parametrize("numbered", [True, False])
 def test_a_sample_received_before_its_token_arrives_once(bus, endpoint, numbered):
     """It publishes on a link that stands, before its token is looked for."""
     samples = Queue()

@@ -53,7 +53,7 @@ def parts(config):
 
 def test_there_is_a_template_for_each_kind_of_session():
     assert {path.stem for path in TEMPLATES} == {
-        *("robot", "router", "client", "user-robot", "user-client"),
+        *("robot", "router", "client", "user-robot", "user-client")
     }
 
 

@@ -6,7 +6,7 @@ import pytest
 import zenoh
 
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.topics import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.wire.contract_files import WILDCARDS, load
 
 TOPICS = {

@@ -52,14 +52,13 @@ class Outcome:
 
 def fuzz(schema: str, seconds: int, seed: int) -> Outcome:
     """Fuzz one message type in a process of its own."""
-    from tests.wire.hostile_vectors import hostile_vectors
-    from tests.wire.valid_vectors import valid_vectors
+    from tests.wire.vectors import vectors
 
-    vectors = [v for v in [*valid_vectors(), *hostile_vectors()] if v.schema == schema]
+    seeds = [v for v in [*vectors("valid"), *vectors("hostile")] if v.schema == schema]
     with tempfile.TemporaryDirectory() as folder:
         corpus = Path(folder) / "corpus"
         corpus.mkdir()
-        for vector in vectors:
+        for vector in seeds:
             (corpus / vector.name).write_bytes(vector.payload)
         ended = subprocess.run(
             [sys.executable, "-m", "tests.campaigns.coverage_fuzz_wire", "--child", schema,
@@ -75,7 +74,7 @@ def fuzz(schema: str, seconds: int, seed: int) -> Outcome:
         return Outcome(
             schema,
             int(executed[1]) if executed else 0,
-            len(vectors),
+            len(seeds),
             kept,
             edges,
             said[-4000:] if ended.returncode or failed else "",

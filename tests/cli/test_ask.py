@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.cli import main
 from fasaco_edge.cli.ask import show
 from fasaco_edge.cli.console.rooms_table import show_rooms
@@ -14,7 +14,7 @@ from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import TroubleReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.documents.status import Status
-from fasaco_edge.wire.topics import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
 from tests.support.rooms import map_bytes, pose_bytes, room
@@ -89,7 +89,9 @@ def test_troubles_are_shown_with_what_to_do(capsys):
     trouble = TroubleReport(
         code="no_effect", text="no ground beside keep-out far", do="move it", since_s=7.0
     )
-    show("status", Reply(encode_json(Status(robot="r1", state="covering", troubles=(trouble,)))))
+    show(
+        "status", QueryReply(encode_json(Status(robot="r1", state="covering", troubles=(trouble,))))
+    )
     shown = " ".join(capsys.readouterr().out.split())
     assert "no ground beside keep-out far" in shown
     assert "move it" in shown

@@ -16,16 +16,7 @@ from fasaco_edge.cli import main
 from tests.daemon.test_mission import about, planned
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process, fasaco_edge
-from tests.support.rooms import (
-    HALL,
-    begin,
-    cells_of,
-    drive,
-    lanes,
-    map_bytes,
-    pose_bytes,
-    room,
-)
+from tests.support.rooms import HALL, begin, cells_of, drive, lanes, map_bytes, pose_bytes, room
 
 # Lanes 3 and 4 of the hall, columns 1 to 4.
 KITCHEN = {"name": "kitchen", "polygon": [[0.3, 0.9], [1.5, 0.9], [1.5, 1.5], [0.3, 1.5]]}

@@ -11,7 +11,7 @@ import pytest
 from fasaco_edge.host.processes import own_mb
 from tests.support.outsider import Outsider
 from tests.support.processes import Daemon, daemon_process, mapped_files
-from tests.support.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes
 
 # Memory of its own at most, without pages of files [MB].
 IDLE_MB = 32.0
@@ -34,10 +34,7 @@ def waiting(daemon: Daemon) -> Daemon:
 
 def test_it_is_ready_when_its_token_stands(tmp_path):
     started = time.monotonic()
-    with (
-        daemon_process(tmp_path, executed=True) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with daemon_process(tmp_path, executed=True) as running, Outsider(running.endpoint) as outsider:
         print(f"ready {1e3 * (time.monotonic() - started):.0f} ms after its start")
         assert "ready after" in running.log_text()
         running.stop()
@@ -79,16 +76,6 @@ def test_poses_and_broken_samples_do_not_wake_it(waiting):
     assert status["errors"]["by_code"] == {"malformed_message": 2}
     assert status["state"] == "waiting for map"
     assert "numba" not in mapped_files(waiting.pid)
-
-
-def test_an_update_of_no_map_is_refused_at_once(waiting):
-    """Held until a map comes, they would fill the memory of a daemon that never gets one."""
-    with Outsider(waiting.endpoint) as outsider:
-        before = outsider.ask_status()["errors"]["by_code"].get("patch_without_base", 0)
-        outsider.put("map_update", update_bytes(pillared_room(), 1.0, 1.0, 2.0, 2.0))
-        outsider.wait_status(
-            lambda status: status["errors"]["by_code"].get("patch_without_base") == before + 1
-        )
 
 
 def test_a_second_robot_joins_where_one_listens(daemon, tmp_path):

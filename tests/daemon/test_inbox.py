@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.bus.queries import Question, Reply
+from fasaco_edge.bus.queries import QueryReply, Question
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.daemon.loop.answers import Commands
@@ -23,9 +23,7 @@ from fasaco_edge.daemon.loop.inbox import (
     take_batch,
 )
 from fasaco_edge.daemon.loop.mission_runner import HeldEvents
-from fasaco_edge.errors import MalformedMessage, PatchWithoutBase
-from fasaco_edge.grid.lattice import Footprint
-from fasaco_edge.mission.core.mission import Mission, MissionConfig
+from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.mission.events import (
     BatteryReceived,
     MapReceived,
@@ -41,14 +39,7 @@ from fasaco_edge.wire.schemas import POSE_STAMPED
 from fasaco_edge.wire.topics import QUEUE_LENGTHS
 from tests.support.outsider import TIMEOUT_S, open_client
 from tests.support.processes import free_endpoint
-from tests.support.rooms import (
-    RADIUS_M,
-    TOOL_M,
-    map_bytes,
-    pillared_room,
-    pose_bytes,
-    update_bytes,
-)
+from tests.support.rooms import map_bytes, pillared_room, pose_bytes, update_bytes
 
 MAP = map_bytes(pillared_room())
 f32 = np.float32
@@ -192,32 +183,6 @@ def test_a_map_leaves_the_updates_of_another_frame_alone(arrivals):
     assert (events[1].patch.frame, faults) == ("map", [])
 
 
-def test_an_update_without_its_base_requests_the_full_map(arrivals):
-    mission = Mission(MissionConfig(Footprint(TOOL_M, RADIUS_M)))
-
-    def asked_for_a_map():
-        """Step; return how many updates were refused for want of the full map."""
-        events, faults = arrivals.events()
-        faults += mission.step(events, arrivals.clock).faults
-        assert {type(fault) for fault in faults} <= {PatchWithoutBase}
-        assert all("publish the full map" in fault.hint for fault in faults)
-        return len(faults)
-
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (1, 0)
-    arrivals.post("map", MAP)
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (0, 2)
-    for _ in range(300):
-        arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (1 + 256, 2)
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (1, 2)
-    arrivals.post("map", MAP)
-    arrivals.post("map_update", UPDATE)
-    assert (asked_for_a_map(), mission.map_revision) == (0, 4)
-
-
 def test_a_thread_that_failed_ends_the_daemon(arrivals):
     arrivals.mailbox.post("failed", RuntimeError("planner"))
     with pytest.raises(RuntimeError, match="planner"):
@@ -251,7 +216,7 @@ def test_a_command_that_others_push_out_is_answered(arrivals):
             assert json.loads(reply.err.payload.to_bytes())["code"] == "not_now"
             for _ in range(most):
                 (question,) = take_batch(arrivals.mailbox, 10.0).questions
-                question.answer(Reply(b"{}"))
+                question.answer(QueryReply(b"{}"))
             assert [one.ok is not None for replies in asked[1:] for one in replies] == [True] * most
         finally:
             session.close()

@@ -52,10 +52,6 @@ def test_a_decoded_ledger_equals_the_encoded_one(cells, cell_m, frame):
     assert contents(decode_ledger(encode_ledger(ledger), cell_m)) == contents(ledger)
 
 
-def test_an_empty_ledger_is_a_ledger():
-    assert contents(decode_ledger(encode_ledger(lane(0)), CELL_M)) == contents(lane(0))
-
-
 def test_the_bytes_are_as_described():
     tile = np.zeros((64, 64), "<u2")
     tile[63, 5] = 1

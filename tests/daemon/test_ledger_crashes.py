@@ -5,12 +5,9 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import random
-import signal
 import stat
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -201,38 +198,3 @@ def test_a_complete_newest_ledger_is_not_overwritten(written, monkeypatch):
         file.write(lane(6))
     monkeypatch.setattr(os, "replace", real)
     assert contents(load(written).ledger) == contents(lane(5))
-
-
-WRITES = """
-import sys
-from pathlib import Path
-from fasaco_edge.daemon.ledger.file import LedgerFile
-from tests.support.ledgers import lane
-file = LedgerFile(Path(sys.argv[1]), "robot")
-for length in range(1, 100_000):
-    file.write(lane(length))
-    print(length, flush=True)
-"""
-
-
-def test_a_writer_killed_at_any_moment_leaves_its_last_ledger(tmp_path):
-    rng, torn = random.Random(1), 0
-    for _ in range(12):
-        command = [sys.executable, "-c", WRITES, str(tmp_path)]
-        root = str(Path(__file__).parents[2])
-        environment = ENVIRONMENT | {"PYTHONPATH": root}
-        with subprocess.Popen(
-            command, stdout=subprocess.PIPE, text=True, env=environment
-        ) as writer:
-            assert writer.stdout is not None
-            writer.stdout.readline()
-            time.sleep(rng.uniform(0.0, 0.1))
-            writer.send_signal(signal.SIGKILL)
-            last = int(("1\n" + writer.stdout.read()).split()[-1])
-        torn += (tmp_path / "robot.ledger.new").exists()
-        found = load(tmp_path)
-        assert found.fault is None
-        assert found.ledger is not None
-        assert found.ledger.cells in (last, last + 1)
-        LedgerFile(tmp_path, "robot").set_aside("done")
-    print(f"{torn} of 12 in the middle of a write")

@@ -18,16 +18,7 @@ from fasaco_edge.daemon.ledger.file import KEPT_ASIDE, LedgerFile
 from fasaco_edge.errors import LedgerFileError, LedgerMismatchError
 from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR
 from tests.daemon.test_ledger_codec import enveloped
-from tests.support.ledgers import (
-    CELL_M,
-    NAMES,
-    contents,
-    driven,
-    lane,
-    load,
-    names,
-    visits_of,
-)
+from tests.support.ledgers import CELL_M, NAMES, contents, driven, lane, load, names, visits_of
 
 
 def test_an_absent_folder_holds_no_ledger(tmp_path):
@@ -200,32 +191,6 @@ def test_a_ledger_set_aside_is_complete(written):
     assert contents(load(written).ledger) == contents(lane(4))
 
 
-def test_a_failed_set_aside_is_repeated_before_the_next_write(written, monkeypatch):
-    file = LedgerFile(written, "robot")
-
-    def failing(*_):
-        raise OSError(errno.EROFS, "Read-only file system")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "rename", failing)
-        for attempt in (lambda: file.set_aside("fresh"), lambda: file.write(lane(1))):
-            with pytest.raises(OSError, match="Read-only"):
-                attempt()
-        assert names(written) == list(NAMES)
-    file.write(lane(1))
-    kept = {path.read_bytes() for path in written.iterdir() if "fresh" in path.name}
-    assert kept == {encode_ledger(lane(3)), encode_ledger(lane(4))}
-
-
-def test_a_second_process_is_refused(tmp_path):
-    first = LedgerFile(tmp_path, "robot")
-    first.lock()
-    with pytest.raises(LedgerFileError, match="another daemon uses the ledger") as told:
-        LedgerFile(tmp_path, "robot").lock()
-    assert "--state" in told.value.hint
-    LedgerFile(tmp_path, "mower-2").lock()
-
-
 def test_an_impossible_folder_does_not_prevent_the_start(tmp_path):
     (tmp_path / "file").write_text("not a folder")
     file = LedgerFile(tmp_path / "file", "robot")
@@ -302,15 +267,6 @@ def test_the_newest_and_largest_ledgers_set_aside_are_kept(tmp_path):
     assert len(kept) == KEPT_ASIDE + 1
     assert {400, 20} <= set(kept)
     assert names(tmp_path) == sorted(path.name for path in tmp_path.glob("*.reset-*"))
-
-
-def test_ledgers_set_aside_for_other_reasons_are_kept(tmp_path):
-    file = LedgerFile(tmp_path, "robot")
-    for why in ("mismatch", "broken", *["reset"] * 10):
-        file.write(lane(5))
-        file.set_aside(why)
-    kept = names(tmp_path)
-    assert sum("mismatch" in name for name in kept) == sum("broken" in name for name in kept) == 1
 
 
 def test_an_empty_ledger_is_not_kept(tmp_path):

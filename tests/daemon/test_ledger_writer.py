@@ -77,25 +77,6 @@ def test_the_last_thing_put_is_on_disk_when_it_is_closed(tmp_path):
     assert on_disk(tmp_path) == contents(lane(49))
 
 
-def test_a_written_ledger_is_restored(tmp_path):
-    LedgerFile(tmp_path, "robot").write(lane(7))
-    writer = open_ledger(tmp_path, "robot", CELL_M)
-    assert contents(writer.restored) == contents(lane(7))
-    assert document(writer)["restored_cells"] == 7
-    writer.disk.close(1.0)
-
-
-def test_a_fresh_start_keeps_what_there_was_aside(tmp_path):
-    LedgerFile(tmp_path, "robot").write(lane(7))
-    writer = open_ledger(tmp_path, "robot", CELL_M, fresh=True)
-    assert writer.restored is None
-    assert document(writer)["fault"] is None
-    writer.disk.close(1.0)
-    (aside,) = tmp_path.glob("robot.ledger.fresh-*")
-    aside.rename(tmp_path / "robot.ledger")
-    assert on_disk(tmp_path) == contents(lane(7))
-
-
 def test_a_fault_on_disk_is_reported(tmp_path, caplog):
     LedgerFile(tmp_path, "robot").write(lane(7))
     (tmp_path / "robot.ledger").write_bytes(b"torn")
@@ -140,15 +121,6 @@ def test_each_new_beginning_keeps_what_there_was_until_then(tmp_path, caplog):
     aside = sorted(path.read_bytes() for path in tmp_path.glob("robot.ledger.mismatch-*"))
     assert aside == sorted(encode_ledger(lane(length)) for length in (3, 5))
     assert caplog.text.count("the ledger before is kept as robot.ledger.mismatch-") == 2
-
-
-def test_the_files_are_kept_aside_although_nothing_follows(tmp_path):
-    LedgerFile(tmp_path, "robot").write(lane(7))
-    writer = open_ledger(tmp_path, "robot", CELL_M)
-    writer.begin_anew(LedgerMismatchError("of another building"), "mismatch")
-    until(lambda: not (tmp_path / "robot.ledger").exists())
-    writer.disk.close(1.0)
-    assert on_disk(tmp_path) is None
 
 
 def test_a_failing_disk_is_reported_once_and_retried(tmp_path, monkeypatch, caplog, retry_soon):
@@ -233,13 +205,6 @@ def test_a_hanging_disk_does_not_block_the_caller(tmp_path, caplog, retry_soon):
     writer.disk.close(0.1)
     assert "the disk is too slow" in caplog.text
     os.close(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK))  # so that the thread can end
-
-
-def test_a_ledger_with_another_writer_is_refused(tmp_path):
-    writer = open_ledger(tmp_path, "robot", CELL_M)
-    with pytest.raises(LedgerFileError, match="another daemon"):
-        open_ledger(tmp_path, "robot", CELL_M)
-    writer.disk.close(1.0)
 
 
 def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):

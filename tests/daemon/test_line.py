@@ -9,7 +9,7 @@ import pytest
 
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from tests.daemon.test_mission import START, planned
@@ -66,18 +66,6 @@ def test_by_default_the_path_is_a_line_that_sweeps_the_rims(tmp_path):
         narrow = sum(left["m2"] for left in status["floor"]["out_of_reach"])
         assert pixels[1:4].sum() == pytest.approx(narrow, abs=0.01)
         assert pixels[6] > 10 * pixels[5]
-
-
-def test_a_large_raster_is_shown_in_larger_squares():
-    """Each has the highest value of its pixels; those beyond the edge are 0."""
-    cells = np.zeros((3, 5), np.int8)
-    cells[0, 1], cells[1, 0], cells[2, 4] = 2, 5, 1
-    grid = OccupancyGrid(GridGeometry(3, 5, 0.1, Pose2D(1.0, 2.0, 0.3)), cells, "map", 7)
-    assert coarser(grid, 15) is grid
-    shown = coarser(grid, 6)
-    assert shown.cells.tolist() == [[5, 0, 0], [0, 0, 1]]
-    assert (shown.geometry.resolution, shown.geometry.origin) == (0.2, grid.geometry.origin)
-    assert (shown.geometry.rows, shown.geometry.cols, shown.frame) == (2, 3, "map")
 
 
 def test_cells_at_an_angle_are_published_in_the_map_frame(tmp_path):

@@ -18,7 +18,7 @@ from fasaco_edge.config.config import DaemonConfig, MetricsConfig
 from fasaco_edge.config.loading import inspect_config
 from fasaco_edge.daemon.metrics import (
     CONTENT_TYPE,
-    FIGURES,
+    METRICS,
     PREFIX,
     MetricsServer,
     exposition,
@@ -68,7 +68,7 @@ def parsed(text):
     for line in text.splitlines():
         if line.startswith("# HELP "):
             name = line.split(" ")[2]
-            assert name not in kinds, "all samples of a figure stand together"
+            assert name not in kinds, "all samples of a metric stand together"
             continue
         if line.startswith("# TYPE "):
             _, _, of, kind = line.split(" ")
@@ -99,7 +99,7 @@ def test_the_board_shows_figures_and_labels_that_there_are():
     board = json.loads((MANUAL.parent / "grafana.json").read_text(encoding="utf-8"))
     status = structs.replace(STATUS, battery=BatteryReport(level=0.5))
     told = parsed(exposition(status, 0.5))
-    known = {name for name, _ in told} | {f"{PREFIX}_{figure.name}" for figure in FIGURES}
+    known = {name for name, _ in told} | {f"{PREFIX}_{metric.name}" for metric in METRICS}
     numbers = [panel["id"] for panel in board["panels"]]
     assert len(set(numbers)) == len(numbers) > 10
     shown = set()
@@ -215,20 +215,6 @@ def test_a_flood_of_silent_connections_blocks_no_client():
                 with OPENER.open(f"{url}/metrics", timeout=60) as answer:
                     assert answer.status == 200
                     assert answer.read()
-
-
-def test_all_who_ask_at_once_are_answered():
-    """Some of them take nothing of the answer."""
-    with served() as url, ExitStack() as stack:
-        address, asking = ("127.0.0.1", int(url.rpartition(":")[2])), []
-        for number in range(40):
-            asking.append(stack.enter_context(socket.socket()))
-            asking[-1].settimeout(60.0)
-            if number % 2:
-                asking[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1)
-            asking[-1].connect(address)
-            asking[-1].sendall(b"GET /metrics HTTP/1.0\r\n\r\n")
-        assert all(each.recv(12) == b"HTTP/1.0 200" for each in asking[::2])
 
 
 def test_endless_requests_get_a_few_answers_a_second():

@@ -21,7 +21,7 @@ from fasaco_edge.doctor.finding import CheckContext, Level
 from fasaco_edge.host.processes import peak_mb
 from tests.campaigns.memory import Flood, map_payload, update_payload
 from tests.support.outsider import Collector, Outsider
-from tests.support.processes import daemon_process, free_endpoint, slowness
+from tests.support.processes import daemon_process, free_endpoint
 from tests.support.rooms import map_bytes, pose_bytes, room
 from tests.support.router import router_process
 from tests.support.waiting import until
@@ -184,25 +184,6 @@ def test_a_frozen_daemon_is_replaced_and_then_waits(tmp_path, robot_at):
         assert second.process.poll() is None
 
 
-def test_a_router_that_is_started_again_changes_nothing(tmp_path, robot_at):
-    endpoint = free_endpoint()
-    with router_process(endpoint) as router, two_daemons(tmp_path, endpoint, endpoint) as daemons:
-        robot = robot_at(endpoint)
-        before = robot.wait_claims(1, 1)
-        robot.wait_path()
-        heard = len(robot.paths.heard)
-        router.kill()
-        router.wait()
-        time.sleep(1.0)
-        with router_process(endpoint):
-            assert robot.wait_claims(1, 1) == before
-            robot.tell()
-            time.sleep(1.0)
-            assert robot.claims() == before
-            assert not any("this daemon plans" in daemon.log_text() for daemon in daemons)
-            assert all(attached(path)["steps"] > 0 for path in robot.paths.heard[heard:])
-
-
 def _stood_and_went_on(robot, before):
     goes = [attached(path)["steps"] > 0 for path in robot.paths.heard[before:]]
     return "0 steps then some" if False in goes and goes[-1] else ""
@@ -235,29 +216,6 @@ def test_after_a_partition_one_daemon_continues(tmp_path, robot_at):
                 receiver.wait(lambda heard: True)
                 time.sleep(0.5)
                 assert [attached(path)["steps"] > 0 for path in receiver.heard] == [True]
-
-
-def test_a_flood_of_claims_is_survived(tmp_path, robot_at):
-    """Three thousand tokens that plan, then none: it waits, answers, and goes on."""
-    endpoint = free_endpoint()
-    with router_process(endpoint), two_daemons(tmp_path, endpoint):
-        robot, flood = robot_at(endpoint), robot_at(endpoint)
-        robot.wait_claims(1)
-        robot.wait_path()
-        tokens, slow = [], [slowness()]
-        for number in range(1, 3001):
-            token = flood.session.liveliness().declare_token(f"{PREFIX}/claim/{number:x}/plans")
-            tokens.append(token)
-            if number % 500 == 0:
-                slow.append(slowness())
-        blocked = robot.statuses.wait(lambda heard: heard.json()["state"] == "blocked").json()
-        # A second of a whole core, of which a busy machine gives a share.
-        assert blocked["loop_ms"]["max"] < 1000.0 * max(slow), slow
-        assert len(tokens) == 3000
-        heard = len(robot.paths.heard)
-        flood.session.close()
-        robot.wait_claims(1)
-        robot.wait_path(heard)
 
 
 def test_a_waiting_daemon_keeps_only_its_newest_maps(tmp_path):

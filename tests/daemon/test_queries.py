@@ -16,7 +16,7 @@ from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.security import BusConfig
 from fasaco_edge.daemon.loop.answers import LEFT_OUT, config_document
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
-from fasaco_edge.wire.topics import RPC_NAMES
+from fasaco_edge.wire.query_table import RPC_NAMES
 from tests.daemon.test_mission import about, covers, planned
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process
@@ -45,10 +45,7 @@ def error(outsider: Outsider, name: str, payload: bytes | None = None) -> dict[s
 def covering(tmp_path_factory):
     """A daemon that has planned for a room, without local search."""
     folder = tmp_path_factory.mktemp("covering")
-    with (
-        daemon_process(folder, planner=ANTS) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with daemon_process(folder, planner=ANTS) as running, Outsider(running.endpoint) as outsider:
         for name in ("coverage", "pheromone"):
             assert error(outsider, f"@rpc/{name}")["code"] == "not_yet"
         assert error(outsider, "@rpc/replan")["code"] == "not_now"
@@ -122,10 +119,6 @@ def test_a_payload_that_is_not_taken_is_an_error(covering, name):
     answer = error(covering, f"@rpc/{name}", b"{}")
     assert answer["code"] == "bad_query"
     assert answer["message"] == f"{name} takes no payload, got one of 2 bytes"
-
-
-def test_parameters_of_zenoh_are_stepped_over(covering):
-    assert get(covering, "@rpc/version?_time=[now(-1h)..]")[0].ok is not None
 
 
 def test_the_living_trail_is_answered_without_subscribers(covering):

@@ -95,10 +95,6 @@ def document(**members):
     return {"version": 1, "next_id": 2, "sheets": [SHEET | members]}
 
 
-def test_the_smallest_file_is_one():
-    assert decode_rooms(json.dumps(document()).encode()).room("a").id == 1
-
-
 BOMB = base64.b64encode(zlib.compress(bytes(10_000_000))).decode()
 WRONG = [
     (b"", "truncated"),

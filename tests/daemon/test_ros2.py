@@ -98,10 +98,7 @@ def test_a_daemon_that_comes_late_gets_map_and_static_transforms(naming, tmp_pat
     Each has its own publisher under rmw_zenoh; a bridge speaks for all.
     """
     links = (("odom", "base_footprint"), ("base_footprint", "base"), ("base", "base_link"))
-    with (
-        daemon_process(tmp_path) as router,
-        ros_robot(router.endpoint, naming) as robot,
-    ):
+    with daemon_process(tmp_path) as router, ros_robot(router.endpoint, naming) as robot:
         put_map(robot)
         fixed = oracle.pose(Pose2D(0.0, 0.0))
         publisher = robot.another("tf_static", TF, latched=True)

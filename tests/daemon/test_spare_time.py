@@ -21,10 +21,7 @@ def large_room(pillars: int) -> np.ndarray:
 
 def test_a_hasty_plan_is_made_better_and_a_new_map_comes_first(tmp_path):
     hasty = {"budget_s": 0.002, "spare_share": 1.0}
-    with (
-        daemon_process(tmp_path, planner=hasty) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with daemon_process(tmp_path, planner=hasty) as running, Outsider(running.endpoint) as outsider:
         outsider.put("map", map_bytes(large_room(40)))
         outsider.put("pose", pose_bytes(1.05, 1.05))
         first = outsider.wait_status(lambda status: status["path"])

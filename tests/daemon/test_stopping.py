@@ -58,10 +58,7 @@ def test_a_signal_ends_it_while_it_compiles(tmp_path):
     """A fresh cache takes many seconds; nobody waits for it."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     for loading_s in (0.5, 2.0):
-        with (
-            daemon_process(tmp_path, env=cache) as running,
-            Outsider(running.endpoint) as outsider,
-        ):
+        with daemon_process(tmp_path, env=cache) as running, Outsider(running.endpoint) as outsider:
             outsider.put("map", map_bytes(pillared_room()))
             outsider.wait_status(lambda status: status["state"] == "loading")
             time.sleep(loading_s)

@@ -90,10 +90,7 @@ def test_a_keep_out_zone_over_a_driving_robot_by_reload(tmp_path, manager):
 
 
 def test_the_end_of_the_daemon(tmp_path, bus):
-    with (
-        daemon_process(tmp_path, bus=bus) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with daemon_process(tmp_path, bus=bus) as running, Outsider(running.endpoint) as outsider:
         paths = outsider.listen("path")
         since = drive(outsider, paths)
         running.stop()
@@ -102,10 +99,7 @@ def test_the_end_of_the_daemon(tmp_path, bus):
 
 def test_a_daemon_that_was_killed_and_started_again(tmp_path, bus):
     """Its follower may still have the path of before."""
-    with (
-        daemon_process(tmp_path, bus=bus) as running,
-        Outsider(running.endpoint) as outsider,
-    ):
+    with daemon_process(tmp_path, bus=bus) as running, Outsider(running.endpoint) as outsider:
         drive(outsider, outsider.listen("path"))
         running.kill()
         begun = outsider.listen("path", late=False, begins=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.loop.inbox import Batch, Received
+from fasaco_edge.daemon.loop.inbox import CycleInput, Received
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.mission.events import Decision
 from fasaco_edge.samples import SampleDecoder
@@ -30,7 +30,7 @@ def test_a_long_wait_for_a_map_keeps_the_newest_pose_and_charge():
     def note(number):
         kind = "pose" if number % 10 else "battery"
         received = Received(kind, Sample(kind, b"%50d" % number), 0.1 * number)
-        log.note(received.at, Batch(samples=[received]), (), Decision(), None)
+        log.note(received.at, CycleInput(samples=[received]), (), Decision(), None)
 
     for number in range(5_000):
         note(number)

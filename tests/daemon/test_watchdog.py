@@ -8,7 +8,7 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.daemon.figures import LATE_S, CycleTimes
+from fasaco_edge.daemon.counters import LATE_S, CycleTimes
 from fasaco_edge.daemon.loop.worker import PlanningWorker
 from fasaco_edge.daemon.notify import Watchdog, status_line
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D

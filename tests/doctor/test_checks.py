@@ -12,7 +12,7 @@ import pytest
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.config.config import DaemonConfig, MetricsConfig, MissionSettings
+from fasaco_edge.config.config import DaemonConfig, MetricsConfig, MissionPolicyConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.security import BusConfig
 from fasaco_edge.doctor import computer, report, security, session
@@ -162,7 +162,7 @@ def test_folders_and_who_may_write_there(tmp_path):
     file = tmp_path / "config.yaml"
     file.touch(mode=0o644)
     config = DaemonConfig(
-        mission=MissionSettings(state_dir=str(state)),
+        mission=MissionPolicyConfig(state_dir=str(state)),
         bus=BusConfig(connect=("tcp/127.0.0.1:1#key=secret",)),
     )
     context = CheckContext(config, file, recordings=tmp_path / "later" / "recordings")
@@ -188,7 +188,7 @@ def test_folders_and_who_may_write_there(tmp_path):
 
 
 def test_a_read_only_disk_fails_the_check(tmp_path):
-    config = DaemonConfig(mission=MissionSettings(state_dir="/proc/x"))
+    config = DaemonConfig(mission=MissionPolicyConfig(state_dir="/proc/x"))
     read_only = next(
         (
             line.split()[4]
@@ -200,12 +200,12 @@ def test_a_read_only_disk_fails_the_check(tmp_path):
     assert computer.disk(CheckContext(config)).level is not Level.OK
     if read_only is None:
         pytest.skip("nothing is mounted read-only here")
-    config = DaemonConfig(mission=MissionSettings(state_dir=f"{read_only}/x"))
+    config = DaemonConfig(mission=MissionPolicyConfig(state_dir=f"{read_only}/x"))
     assert "read-only" in computer.disk(CheckContext(config)).found
 
 
 def test_a_link_in_place_of_the_lock_fails_the_check(tmp_path):
-    config = DaemonConfig(mission=MissionSettings(state_dir=str(tmp_path)))
+    config = DaemonConfig(mission=MissionPolicyConfig(state_dir=str(tmp_path)))
     assert computer.disk(CheckContext(config)).level is Level.OK
     lock = tmp_path / "robot.ledger.lock"
     lock.symlink_to("nowhere")

@@ -5,10 +5,6 @@ import pytest
 from fasaco_edge.host.resources import folder
 
 
-def test_a_checkout_has_its_maps():
-    assert (folder("maps") / "index.yaml").is_file()
-
-
 def test_beside_the_package_in_a_checkout(tmp_path):
     (tmp_path / "pyproject.toml").touch()
     (tmp_path / "maps").mkdir()

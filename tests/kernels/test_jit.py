@@ -11,7 +11,7 @@ import pytest
 
 from fasaco_edge.kernels import folder
 from fasaco_edge.kernels.random import draw
-from tests.kernels.installations import ALL_LOADED, COMPILES
+from tests.kernels.installations import ALL_LOADED, COMPILES, PATIENCE_S
 from tests.support.examples import PLAIN
 from tests.support.inner import entry
 from tests.support.processes import ENVIRONMENT
@@ -81,6 +81,23 @@ def test_code_for_other_types_is_kept_for_one_process(compiled, tmp_path, monkey
         assert (told.loaded, told.compiled, told.warnings) == (0, 2, [])
     after = sorted((file.name, file.stat().st_mtime_ns) for file in compiled.folder.iterdir())
     assert after == before
+    assert list(tmp.iterdir()) == []
+
+
+def test_what_a_killed_process_left_is_removed_and_nothing_in_use(compiled, tmp_path):
+    (tmp := tmp_path / "tmp").mkdir(0o700)
+    env = {"TMPDIR": str(tmp)}
+    killed = compiled.start("import os; seven.tell(1.5); os.kill(os.getpid(), 9)", env=env)
+    killed.communicate(timeout=PATIENCE_S)
+    (left,) = tmp.iterdir()
+    living = compiled.start("seven.tell(1.5); input()", env=env, stdin=subprocess.PIPE)
+    assert living.stdout.readline()
+    for folder_in_tmp in tmp.iterdir():
+        os.utime(folder_in_tmp, (1, 1))
+    compiled.tell("seven.tell(1.5)", env=env)
+    (used,) = tmp.iterdir()
+    assert used != left
+    living.communicate("\n", timeout=PATIENCE_S)
     assert list(tmp.iterdir()) == []
 
 

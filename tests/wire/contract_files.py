@@ -16,8 +16,9 @@ import yaml
 
 from fasaco_edge.bus import access
 from fasaco_edge.host.resources import folder
-from fasaco_edge.wire.topic_types import Query, Topic
-from fasaco_edge.wire.topics import QOS, QUERIES, TOPICS
+from fasaco_edge.wire.query_table import QUERIES, Query
+from fasaco_edge.wire.topic_types import Topic
+from fasaco_edge.wire.topics import QOS, TOPICS
 from tests.wire import make_schemas, page_rows
 
 PROTOCOL = folder("protocol")
@@ -197,7 +198,7 @@ def template_grants() -> dict[str, list[access.Grant]]:
 def with_keys(template: str, grants: Sequence[access.Grant]) -> str:
     """Return a session template with the key expressions that the table of topics gives it."""
     rules = access.access_control(grants, "usernames")["rules"]
-    limits = access.limits(grants[-1].prefix, access.Limits())
+    limits = access.limits(grants[-1].prefix, access.SenderLimits())
     found = {rule["id"]: rule["key_exprs"] for rule in (*rules, *limits["low_pass_filter"])}
     rates = {
         part["id"]: [rule["key_expr"] for rule in part["rules"]] for part in limits["downsampling"]

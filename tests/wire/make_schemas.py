@@ -23,7 +23,8 @@ from fasaco_edge.wire import documents
 from fasaco_edge.wire.documents.fleet import FleetMember
 from fasaco_edge.wire.documents.replies import Error
 from fasaco_edge.wire.documents.turns import TurnBatch
-from fasaco_edge.wire.topics import QUERIES, TOPICS
+from fasaco_edge.wire.query_table import QUERIES
+from fasaco_edge.wire.topics import TOPICS
 
 HEAD = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -76,10 +77,7 @@ def config_schema() -> dict[str, Any]:
         "stand in each section is the package's own business.",
         "type": "object",
         "properties": {
-            field.name: {
-                "description": _summary(next(_structs_of(field.type))),
-                "type": "object",
-            }
+            field.name: {"description": _summary(next(_structs_of(field.type))), "type": "object"}
             for field in fields
         },
         "required": [field.name for field in fields if field.default is not msgspec.UNSET],

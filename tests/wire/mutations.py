@@ -6,7 +6,7 @@ import random
 import struct
 from collections.abc import Callable, Sequence
 
-from tests.wire.valid_vectors import valid_vectors
+from tests.wire.vectors import vectors
 
 ODD_NUMBERS = [0, 1, 2, 3, 4, 7, 8, 2**16, 2**24, 2**31 - 1, 2**31, 2**32 - 1]
 ODD_FLOATS = [0.0, -0.0, 5e-324, 1e-42, 1e308, float("inf"), float("-inf"), float("nan")]
@@ -26,7 +26,7 @@ def seeds_of(schema: str) -> list[bytes]:
     Raises:
         LookupError: there are none.
     """
-    seeds = [vector.payload for vector in valid_vectors() if vector.schema == schema]
+    seeds = [vector.payload for vector in vectors("valid") if vector.schema == schema]
     if not seeds:
         raise LookupError(f"{schema} has a decoder but no valid vector to mutate")
     return seeds

@@ -50,42 +50,28 @@ def header(frame: str, stamp_ns: int) -> Any:
     return make("std_msgs/msg/Header", stamp=time(stamp_ns), frame_id=frame)
 
 
-def turned(x: float, y: float, sin: float, cos: float) -> Any:
-    """Return a geometry_msgs/Pose turned about z, by the sine and cosine of half the yaw."""
+def pose(where: Pose2D) -> Any:
+    """Return a geometry_msgs/Pose."""
+    sin, cos = float(np.sin(where.yaw / 2)), float(np.cos(where.yaw / 2))
     return make(
         "geometry_msgs/msg/Pose",
-        position=make("geometry_msgs/msg/Point", x=x, y=y, z=0.0),
+        position=make("geometry_msgs/msg/Point", x=where.x, y=where.y, z=0.0),
         orientation=make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=sin, w=cos),
     )
 
 
-def pose(where: Pose2D) -> Any:
-    """Return a geometry_msgs/Pose."""
-    return turned(where.x, where.y, float(np.sin(where.yaw / 2)), float(np.cos(where.yaw / 2)))
-
-
-def info(geometry: GridGeometry, stamp_ns: int, origin: Any = None) -> Any:
-    """Return a nav_msgs/MapMetaData; ``origin`` takes the place of the geometry's."""
-    return make(
+def occupancy_grid(frame: str, stamp_ns: int, geometry: GridGeometry, cells: Any) -> Any:
+    """Return a nav_msgs/OccupancyGrid."""
+    info = make(
         "nav_msgs/msg/MapMetaData",
         map_load_time=time(stamp_ns),
         resolution=geometry.resolution,
         width=geometry.cols,
         height=geometry.rows,
-        origin=origin or pose(geometry.origin),
+        origin=pose(geometry.origin),
     )
-
-
-def occupancy_grid(
-    frame: str, stamp_ns: int, geometry: GridGeometry, cells: Any, origin: Any = None
-) -> Any:
-    """Return a nav_msgs/OccupancyGrid."""
-    return make(
-        schemas.OCCUPANCY_GRID,
-        header=header(frame, stamp_ns),
-        info=info(geometry, stamp_ns, origin),
-        data=cells.ravel(),
-    )
+    head = header(frame, stamp_ns)
+    return make(schemas.OCCUPANCY_GRID, header=head, info=info, data=cells.ravel())
 
 
 def update(frame: str, stamp_ns: int, corner: tuple[int, int], cells: Any) -> Any:
@@ -127,59 +113,20 @@ def twist(numbers: Any) -> Any:
     return make(schemas.TWIST, linear=vector(x=x, y=y, z=z), angular=vector(x=roll, y=pitch, z=yaw))
 
 
-def twist_stamped(frame: str, stamp_ns: int, numbers: Any) -> Any:
-    """Return a geometry_msgs/TwistStamped."""
-    return make(schemas.TWIST_STAMPED, header=header(frame, stamp_ns), twist=twist(numbers))
-
-
-def battery(
-    percentage: float,
-    power: int,
-    stamp_ns: int = 0,
-    cells: int = 0,
-    frame: str = "",
-    name: str = "",
-) -> Any:
-    """Return a sensor_msgs/BatteryState, of so many cells."""
-    floats = ("voltage", "temperature", "current", "charge", "capacity", "design_capacity")
-    each = np.linspace(3.0, 4.0, cells, dtype=np.float32)
-    return make(
-        schemas.BATTERY_STATE,
-        header=header(frame, stamp_ns),
-        **dict.fromkeys(floats, np.nan),
-        percentage=percentage,
-        power_supply_status=power,
-        power_supply_health=0,
-        power_supply_technology=0,
-        present=True,
-        cell_voltage=each,
-        cell_temperature=each,
-        location=name,
-        serial_number=name,
-    )
-
-
-def scan(
-    ranges: Any,
-    angles: tuple[float, float] = (-1.5, 0.5),
-    limits: tuple[float, float] = (0.25, 8.0),
-    stamp_ns: int = 0,
-    frame: str = "",
-    intensities: int = 0,
-) -> Any:
-    """Return a sensor_msgs/LaserScan: its first angle and the step, its least and longest range."""
-    floats = dict.fromkeys(("time_increment", "scan_time"), 0.0)
+def scan(ranges: Any, first_rad: float, step_rad: float) -> Any:
+    """Return a sensor_msgs/LaserScan without intensities."""
     return make(
         schemas.LASER_SCAN,
-        header=header(frame, stamp_ns),
-        angle_min=angles[0],
-        angle_max=angles[0] + angles[1] * (len(ranges) - 1),
-        angle_increment=angles[1],
-        range_min=limits[0],
-        range_max=limits[1],
-        **floats,
+        header=header("", 0),
+        angle_min=first_rad,
+        angle_max=first_rad + step_rad * (len(ranges) - 1),
+        angle_increment=step_rad,
+        range_min=0.25,
+        range_max=8.0,
+        time_increment=0.0,
+        scan_time=0.0,
         ranges=np.array(ranges, np.float32),
-        intensities=np.ones(intensities, np.float32),
+        intensities=np.ones(0, np.float32),
     )
 
 
@@ -193,9 +140,7 @@ def odometry(
         child_frame_id=child,
         pose=pose_with_covariance(where, covariance),
         twist=make(
-            "geometry_msgs/msg/TwistWithCovariance",
-            twist=twist(numbers),
-            covariance=spread,
+            "geometry_msgs/msg/TwistWithCovariance", twist=twist(numbers), covariance=spread
         ),
     )
 
@@ -203,9 +148,7 @@ def odometry(
 def path(frame: str, stamp_ns: int, poses: list[tuple[str, int, Any]]) -> Any:
     """Return a nav_msgs/Path of poses, each with its own frame and stamp."""
     return make(
-        schemas.PATH,
-        header=header(frame, stamp_ns),
-        poses=[pose_stamped(*each) for each in poses],
+        schemas.PATH, header=header(frame, stamp_ns), poses=[pose_stamped(*each) for each in poses]
     )
 
 
@@ -231,17 +174,4 @@ def transforms(*each: tuple[str, str, int, Any]) -> Any:
             )
             for frame, child, stamp_ns, where in each
         ],
-    )
-
-
-def pheromone_grid(
-    frame: str, stamp_ns: int, geometry: GridGeometry, levels: Any, **fields: object
-) -> Any:
-    """Return a fasaco_msgs/PheromoneGrid."""
-    return make(
-        schemas.PHEROMONE_GRID,
-        header=header(frame, stamp_ns),
-        info=info(geometry, stamp_ns),
-        levels=levels.ravel(),
-        **fields,
     )

@@ -58,16 +58,6 @@ def test_coverage_values_are_those_of_the_contract() -> None:
     np.testing.assert_array_equal(again.cells, grid.cells)
 
 
-def test_coverage_lies_where_the_lattice_says() -> None:
-    free = np.ones((4, 5), bool)
-    plan = lattice.CoverageLattice.from_free(free, 0.25)
-    geometry = GridGeometry.of_cells(plan.window, plan.cell_m)
-    for cell in ((0, 0), (3, 4), (2, 1)):
-        (centre,) = plan.centres(np.array([cell], np.int32))
-        col, row = geometry.to_pixels(*centre)
-        assert (math.floor(row), math.floor(col)) == cell
-
-
 @examples(150)
 @given(trails)
 def test_a_level_is_the_trail_to_half_a_step(trail: np.ndarray) -> None:

@@ -25,7 +25,7 @@ from tests.support.examples import examples
 from tests.wire.decoders import DECODERS
 from tests.wire.mutations import mutant, seeds_of
 from tests.wire.soundness import is_read, peak_bytes
-from tests.wire.valid_vectors import valid_vectors
+from tests.wire.vectors import vectors
 
 MUTATIONS = 3000
 
@@ -49,7 +49,7 @@ def test_noise_is_refused(payload: bytes, schema: str) -> None:
 
 @pytest.mark.parametrize("schema", DECODERS)
 def test_a_message_of_another_type_is_refused(schema: str) -> None:
-    for vector in valid_vectors():
+    for vector in vectors("valid"):
         if vector.schema != schema:
             with pytest.raises(MalformedMessage):
                 DECODERS[schema](vector.payload)
@@ -84,7 +84,7 @@ def test_large_messages_take_no_more_memory_than_they_justify() -> None:
 
 
 def test_limits_on_size_are_the_callers_to_lower() -> None:
-    seeds = {vector.name: vector.payload for vector in valid_vectors()}
+    seeds = {vector.name: vector.payload for vector in vectors("valid")}
     for name, schema in (
         ("occupancy_grid", schemas.OCCUPANCY_GRID),
         ("occupancy_grid_update", schemas.OCCUPANCY_GRID_UPDATE),
@@ -95,7 +95,7 @@ def test_limits_on_size_are_the_callers_to_lower() -> None:
 
 
 def test_the_number_of_poses_of_a_path_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    (seed,) = (vector.payload for vector in valid_vectors() if vector.name == "path")
+    (seed,) = (vector.payload for vector in vectors("valid") if vector.name == "path")
     monkeypatch.setattr(path_points, "MAX_PATH_POSES", 4)
     decode_path(seed)
     monkeypatch.setattr(path_points, "MAX_PATH_POSES", 3)
@@ -104,7 +104,7 @@ def test_the_number_of_poses_of_a_path_is_limited(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_pose_must_come_in_a_known_type() -> None:
-    payload = valid_vectors()[0].payload
+    payload = vectors("valid")[0].payload
     for schema in ("", "geometry_msgs/msg/Pose", schemas.PATH):
         with pytest.raises(MalformedMessage, match="a pose must come as one of") as caught:
             DECODERS[POSE_SCHEMAS[0]](payload, schema=schema)  # type: ignore[call-arg]
@@ -112,7 +112,7 @@ def test_a_pose_must_come_in_a_known_type() -> None:
 
 
 def test_the_number_of_transforms_of_a_message_is_limited() -> None:
-    (seed,) = (v.payload for v in valid_vectors() if v.name == "tf_without_names")
+    (seed,) = (v.payload for v in vectors("valid") if v.name == "tf_without_names")
     # Each after the first is 80 bytes: no padding before its floats.
     one = bytes(8) + struct.pack("<I", 1) + bytes(4) + struct.pack("<I", 1) + bytes(4) + seed[-56:]
     for count in (limits.MAX_TRANSFORMS, limits.MAX_TRANSFORMS + 1):

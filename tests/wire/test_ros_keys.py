@@ -9,7 +9,7 @@ import zenoh
 import zenoh.ext
 
 from fasaco_edge.config.ros import RosConfig
-from fasaco_edge.wire import schemas, topics
+from fasaco_edge.wire import schemas
 from fasaco_edge.wire.ros_keys import (
     GID_BYTES,
     SERVICE_HASHES,
@@ -20,6 +20,7 @@ from fasaco_edge.wire.ros_keys import (
     attachment,
     gid_of,
 )
+from fasaco_edge.wire.ros_topics import ROS_TOPICS
 from tests.wire import oracle
 from tests.wire.contract_files import CONTRACT, load
 
@@ -57,10 +58,10 @@ def test_topics_are_those_of_the_table() -> None:
     by_pose = RosConfig(kind="rmw_zenoh", pose=schemas.ODOMETRY)
     inputs = list(by_pose.inputs.values())
     ours = [
-        *(*inputs[:4], config.keep_out_mask, config.scan, *inputs[4:]),
+        *(*inputs[:4], config.topic("keep_out_mask"), config.topic("scan"), *inputs[4:]),
         *(config.inputs["pose"], config.inputs["tf_static"]),
         *config.outputs.values(),
-        config.velocities(schemas.TWIST),
+        config.topic("cmd_vel", schemas.TWIST),
     ]
     shown = re.findall(r"^\| `(/\w+)` \| (in|out).* \| (.*) \| (.*) \|$", CONTRACT, re.MULTILINE)
     for topic, entry, row in zip(ours, TABLE["topics"], shown, strict=True):
@@ -122,7 +123,7 @@ def test_each_publisher_has_a_gid_of_its_own() -> None:
 def test_rows_are_those_of_the_table() -> None:
     rows = [
         (row.name, row.direction, list(row.schemas), row.latched, row.depth)
-        for row in topics.ROS_TOPICS.values()
+        for row in ROS_TOPICS.values()
     ]
     columns = ("name", "direction", "schema", "latched", "depth")
     assert rows == [tuple(entry[name] for name in columns) for entry in TABLE["topics"]]

@@ -85,7 +85,7 @@ def test_each_state_has_its_level() -> None:
     levels = {state: level_of(Status(state=state)) for state in STATES}
     assert [state for state, level in levels.items() if level == ERROR] == ["blocked"]
     assert [state for state, level in levels.items() if level == WARN] == [
-        *("waiting for map", "waiting for pose", "paused", "degraded"),
+        *("waiting for map", "waiting for pose", "paused", "degraded")
     ]
     assert level_of(Status(state="covering", ledger=LedgerReport(fault="disk full"))) == WARN
     assert level_of(Status(state="covering")) == OK

@@ -23,7 +23,7 @@ def test_infinite_and_nan_ranges_are_kept():
     ("beams", "is_read"), [(MAX_SCAN_BEAMS, True), (MAX_SCAN_BEAMS + 1, False)]
 )
 def test_the_number_of_beams_of_a_scan_is_limited(beams, is_read):
-    payload = oracle.to_bytes(schemas.LASER_SCAN, oracle.scan([1.0] * beams, (0.0, 1e-4)))
+    payload = oracle.to_bytes(schemas.LASER_SCAN, oracle.scan([1.0] * beams, 0.0, 1e-4))
     if is_read:
         assert len(decode_scan(payload).ranges) == beams
         return

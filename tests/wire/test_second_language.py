@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
@@ -29,9 +28,9 @@ from tests.support.rooms import map_bytes, pillared_room
 from tests.wire.decoders import DECODERS
 from tests.wire.facts import check_facts, facts_of
 from tests.wire.mutations import mutant, seeds_of
+from tests.wire.vectors import vectors
 
 CLIENTS = folder("protocol") / "clients"
-VECTORS = folder("protocol") / "vectors"
 COMPILER = shutil.which("cc")
 STRICT = ("-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -68,35 +67,28 @@ def read(client: Path, messages: Sequence[tuple[str, bytes]]) -> list[dict[str, 
     return said
 
 
-def index(kind: str) -> list[dict[str, Any]]:
-    entries = yaml.safe_load((VECTORS / kind / "index.yaml").read_text(encoding="utf-8"))
-    assert isinstance(entries, list)
-    return entries
-
-
-def messages_of(kind: str) -> list[tuple[str, bytes]]:
-    return [(e["schema"], (VECTORS / kind / e["file"]).read_bytes()) for e in index(kind)]
-
-
 def test_valid_vectors_are_read(client: Path) -> None:
-    entries = index("valid")
-    assert {entry["schema"] for entry in entries} == set(TYPES)
-    for said, entry in zip(read(client, messages_of("valid")), entries, strict=True):
-        check_facts(said, {k: v for k, v in entry.items() if k not in ("file", "schema")})
+    valid = vectors("valid")
+    assert {vector.schema for vector in valid} == set(TYPES)
+    messages = [(vector.schema, vector.payload) for vector in valid]
+    for said, vector in zip(read(client, messages), valid, strict=True):
+        check_facts(said, vector.facts)
 
 
 def test_hostile_vectors_are_refused_for_their_reason(client: Path) -> None:
-    for said, entry in zip(read(client, messages_of("hostile")), index("hostile"), strict=True):
-        assert said.keys() == {"error"}, entry["file"]
-        assert entry["refused"] in said["error"]
+    hostile = vectors("hostile")
+    messages = [(vector.schema, vector.payload) for vector in hostile]
+    for said, vector in zip(read(client, messages), hostile, strict=True):
+        assert said.keys() == {"error"}, vector.name
+        assert vector.facts["refused"] in said["error"]
         assert "got" in said["error"]
 
 
 def test_every_prefix_is_refused(client: Path) -> None:
     prefixes = [
-        (schema, payload[:size])
-        for schema, payload in messages_of("valid")
-        for size in range(len(payload) - 4)
+        (vector.schema, vector.payload[:size])
+        for vector in vectors("valid")
+        for size in range(len(vector.payload) - 4)
     ]
     assert all("error" in said for said in read(client, prefixes))
 
@@ -134,7 +126,7 @@ def test_resolutions_are_the_same_decimals(client: Path) -> None:
 
 
 def test_a_type_of_another_name_is_refused(client: Path) -> None:
-    (said,) = read(client, [("geometry_msgs/msg/Pose", messages_of("valid")[0][1])])
+    (said,) = read(client, [("geometry_msgs/msg/Pose", vectors("valid")[0].payload)])
     assert "message type must be" in said["error"]
 
 

@@ -16,8 +16,9 @@ from fasaco_edge.mission.coverage.swept_floor import MOST_FLOOR_TILES
 from fasaco_edge.mission.orders import keep_outs, order, passes
 from fasaco_edge.wire import limits
 from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.query_table import QUERIES
 from fasaco_edge.wire.topic_types import VOLATILE
-from fasaco_edge.wire.topics import QOS, QUERIES, QUEUE_LENGTHS, RECORDED, TOPICS, TURNS
+from fasaco_edge.wire.topics import QOS, QUEUE_LENGTHS, RECORDED, TOPICS, TURNS
 from tests.wire import contract_files, page_rows
 from tests.wire.contract_files import CONTRACT, PAGES, PROTOCOL, load
 

@@ -29,7 +29,7 @@ from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, e
 from fasaco_edge.wire.documents.replies import Reply
 
 if TYPE_CHECKING:
-    from fasaco_edge.bus.queries import Reply as Answer
+    from fasaco_edge.bus.queries import QueryReply
 
 NO_MAP = "there is no map yet: `mission status` shows later whether known floor lies in the area"
 ROOMS_KEPT = (
@@ -213,7 +213,7 @@ def run(args: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def _answer(args: argparse.Namespace, asked: dict[str, object]) -> Answer | None:
+def _answer(args: argparse.Namespace, asked: dict[str, object]) -> QueryReply | None:
     """Return the answer to a command; None if it would forget cells and the user declines."""
     try:
         return ask(args, "mission", payload=encode_json(asked))

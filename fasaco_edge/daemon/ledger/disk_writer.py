@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from fasaco_edge.daemon.figures import fault_text, log_fault
+from fasaco_edge.daemon.counters import fault_text, log_fault
 from fasaco_edge.errors import FasacoError
 
 LOG = logging.getLogger(__name__)

@@ -86,11 +86,7 @@ class LedgerFile:
             self._take_lock()
 
     def load(self, cell_m: float) -> LoadedLedger:
-        """Return the newest complete ledger, and finish an interrupted write.
-
-        Args:
-            cell_m: configured edge of a cell [m].
-        """
+        """Return the newest complete ledger and any fault; finish an interrupted write."""
         broken: dict[Path, str] = {}
         for path in self._generations:
             try:
@@ -148,10 +144,7 @@ class LedgerFile:
         return kept
 
     def set_aside(self, why: str) -> list[str]:
-        """Rename existing files, and return the new names.
-
-        Args:
-            why: a word for the new names.
+        """Rename existing files, with the word ``why`` in their new names; return these.
 
         Raises:
             OSError: renaming failed; it is retried before the next write.

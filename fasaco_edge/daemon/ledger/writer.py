@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from fasaco_edge.daemon.figures import fault_text, log_fault
+from fasaco_edge.daemon.counters import fault_text, log_fault
 from fasaco_edge.daemon.ledger.disk_writer import MOST_WAIT_S, DiskWriter
 from fasaco_edge.daemon.ledger.file import LedgerFile, LoadedLedger, reason_of
 from fasaco_edge.errors import (
@@ -159,13 +159,7 @@ class LedgerKeeper:
 
 
 def open_ledger(folder: Path, robot: str, cell_m: float, *, fresh: bool = False) -> LedgerWriter:
-    """Load a robot's ledger and start its writer thread.
-
-    Args:
-        folder: its folder.
-        robot: the robot's name.
-        cell_m: edge of a cell [m].
-        fresh: set the existing ledger aside, and start over.
+    """Load a robot's ledger and start its writer thread; ``fresh``: set aside what there is.
 
     Raises:
         LedgerFileError: another process writes this ledger.

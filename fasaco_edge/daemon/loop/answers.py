@@ -17,14 +17,13 @@ import msgspec
 
 from fasaco_edge import __version__
 from fasaco_edge.bus.mailbox import Mailbox
-from fasaco_edge.bus.queries import Question, Reply, Request, Shared, matches
+from fasaco_edge.bus.queries import QueryReply, Question, Request, Shared, matches
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import BadQuery, CommandError, FasacoError, UnknownQuery
 from fasaco_edge.mission.events import Answer, CommandReceived
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.order import Command
-from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import Settings, decode_json, encode_json
 from fasaco_edge.wire.documents.replies import Version, encode_error
@@ -36,19 +35,20 @@ from fasaco_edge.wire.messages.ros_node import (
     encode_response,
     response_attachment,
 )
+from fasaco_edge.wire.query_table import RPC_NAMES
 
 # Least period of requested replans, as a path that keeps changing is hard to follow [s].
 REPLAN_PERIOD_S = 1.0
 # Limit on a query with its JSON document [bytes].
 QUERY_BYTES = MAX_JSON_BYTES + 4096
-AnyReply = Reply | Shared
+AnyReply = QueryReply | Shared
 
 _NO_WILDCARD = "ask by the whole key, without *"
 
 
-def error_reply(error: FasacoError) -> Reply:
+def error_reply(error: FasacoError) -> QueryReply:
     """Return an error as a reply."""
-    return Reply(encode_error(error), is_error=True)
+    return QueryReply(encode_error(error), is_error=True)
 
 
 def answering(answer: Callable[[Request], AnyReply]) -> Callable[[Request], AnyReply]:
@@ -114,18 +114,18 @@ def _shown(value: object) -> object:
     return value
 
 
-def _document_reply(document: Callable[[], object], request: Request) -> Reply:
+def _document_reply(document: Callable[[], object], request: Request) -> QueryReply:
     check(request)
-    return Reply(encode_json(document()))
+    return QueryReply(encode_json(document()))
 
 
-def _unknown(keys: Keys, request: Request) -> Reply | None:
+def _unknown(keys: Keys, request: Request) -> QueryReply | None:
     """Reply to queries that no other queryable serves, as this one gets every query."""
-    if any(matches(request.key, keys.rpc(name)) for name in topics.RPC_NAMES):
+    if any(matches(request.key, keys.rpc(name)) for name in RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]
     return error_reply(
-        UnknownQuery(f"there is no query {name!r}; there are {', '.join(topics.RPC_NAMES)}")
+        UnknownQuery(f"there is no query {name!r}; there are {', '.join(RPC_NAMES)}")
     )
 
 
@@ -214,7 +214,7 @@ class Commands:
         """Reply to queries for the status; and to commands, once the ledger has them on disk."""
         payload = encode_json(report)
         for question in self._status_questions:
-            question.answer(Reply(payload))
+            question.answer(QueryReply(payload))
         self._status_questions.clear()
         if not is_kept:
             return
@@ -227,9 +227,9 @@ class Commands:
             elif question.key == self._replan_key:
                 assert answer.plan is not None
                 accepted = replies.Replan(report.robot, answer.plan)
-                question.answer(Reply(encode_json(accepted)))
+                question.answer(QueryReply(encode_json(accepted)))
             else:
-                question.answer(Reply(payload))
+                question.answer(QueryReply(payload))
         self._decided.clear()
 
     def _refuse(self, question: Question, error: FasacoError) -> None:
@@ -244,4 +244,4 @@ class Commands:
         request = question.request
         beside = response_attachment(request.attachment, time.time_ns())
         payload = encode_response(message, success=success)
-        question.answer(Reply(payload, attachment=beside), request.key)
+        question.answer(QueryReply(payload, attachment=beside), request.key)

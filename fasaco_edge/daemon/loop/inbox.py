@@ -79,7 +79,7 @@ class Oversized:
 
 
 @dataclass(slots=True)
-class Batch:
+class CycleInput:
     """The input of one cycle.
 
     Attributes:
@@ -97,13 +97,13 @@ class Batch:
     updates_lost: int = 0
 
 
-def take_batch(mailbox: Mailbox[object], timeout_s: float) -> Batch:
+def take_batch(mailbox: Mailbox[object], timeout_s: float) -> CycleInput:
     """Wait up to ``timeout_s`` [s] for an arrival, and take all arrivals.
 
     Raises:
         BaseException: posted by a thread that failed.
     """
-    batch = Batch()
+    batch = CycleInput()
     for _, item in mailbox.take(timeout_s):
         match item:
             case Received():
@@ -201,7 +201,7 @@ class Inbox:
             for topic, many in PLURALS.items()
         }
 
-    def drop_second_publishers(self, batch: Batch, now: float) -> None:
+    def drop_second_publishers(self, batch: CycleInput, now: float) -> None:
         """Drop the samples in a batch that ``bus.one_publisher`` refuses."""
         batch.samples = [one for one in batch.samples if self._counts(one)]
         if self._publishers[topics.MAP.name].takes_over(now):
@@ -231,7 +231,7 @@ class Inbox:
             subscription.ask()
 
     def decode(
-        self, batch: Batch, *, has_mission: bool = True
+        self, batch: CycleInput, *, has_mission: bool = True
     ) -> tuple[list[Event], list[FasacoError]]:
         """Return the events in a batch, and the faults; a malformed sample affects no other.
 

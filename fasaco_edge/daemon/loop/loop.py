@@ -13,28 +13,22 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.mailbox import Mailbox
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.claim import NameClaim
-from fasaco_edge.daemon.figures import MapLatency
+from fasaco_edge.daemon.counters import MapLatency
 from fasaco_edge.daemon.ledger.rooms_file import RoomsKeeper
 from fasaco_edge.daemon.ledger.writer import LedgerKeeper
 from fasaco_edge.daemon.loop.answers import Commands
-from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Inbox, take_batch
+from fasaco_edge.daemon.loop.inbox import MAPS, CycleInput, Inbox, take_batch
 from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.periodic import OF_MISSION, RoomsPublisher
 from fasaco_edge.daemon.loop.status import StatusBoard
 from fasaco_edge.daemon.loop.turn_log import TurnLog
+from fasaco_edge.daemon.name_claim import NameClaim
 from fasaco_edge.daemon.notify import Watchdog
 from fasaco_edge.daemon.reload import Reload
 from fasaco_edge.daemon.supervisor import RecorderSupervisor
 from fasaco_edge.errors import FasacoError, MissionBroke, PatchWithoutBase
-from fasaco_edge.mission.events import (
-    Answer,
-    CommandReceived,
-    Decision,
-    Event,
-    PlanReady,
-)
+from fasaco_edge.mission.events import Answer, CommandReceived, Decision, Event, PlanReady
 
 if TYPE_CHECKING:
     from fasaco_edge.daemon.fleet_wing import PeriodicMessage
@@ -71,11 +65,7 @@ class Loop:
     """Connects bus and mission; everything but planning runs on its thread."""
 
     def __init__(
-        self,
-        config: DaemonConfig,
-        ports: Ports,
-        keeper: LedgerKeeper,
-        rooms: RoomsKeeper,
+        self, config: DaemonConfig, ports: Ports, keeper: LedgerKeeper, rooms: RoomsKeeper
     ) -> None:
         self._ports = ports
         self._keeper, self._rooms = keeper, rooms
@@ -107,7 +97,7 @@ class Loop:
         is_idle = runner.mission is None and not runner.loading and self._ports.claim.is_settled
         return IDLE_TICK_S if is_idle else TICK_S
 
-    def _cycle(self, batch: Batch) -> None:
+    def _cycle(self, batch: CycleInput) -> None:
         taken = time.monotonic()
         if self._ports.reload.is_read and not self._runner.loading:
             self._reload_config(batch)
@@ -187,7 +177,7 @@ class Loop:
             mailbox.hold()
             reload.begin(self.config, partial(mailbox.post, "reloaded", None))
 
-    def _reload_config(self, batch: Batch) -> None:
+    def _reload_config(self, batch: CycleInput) -> None:
         """Apply the configuration that was read; restart the mission if it has changed."""
         reload, watchdog = self._ports.reload, self._ports.watchdog
         self._ports.mailbox.release()
@@ -200,17 +190,12 @@ class Loop:
         reload.done()
 
     def _restart(
-        self,
-        why: str,
-        config: DaemonConfig | None = None,
-        held: Sequence[Event] | None = None,
+        self, why: str, config: DaemonConfig | None = None, held: Sequence[Event] | None = None
     ) -> None:
         """Let another mission continue from the ledger, as after a restart of the daemon.
 
-        Args:
-            why: reason for the turn log, which ends.
-            config: the new configuration, if it changed.
-            held: the first events; None for the present map and pose.
+        The turn log ends with ``why``. ``held``: the first events; None for the present map and
+        pose.
         """
         self._ports.turns.end(why)
         if config is not None:
@@ -240,7 +225,7 @@ class Loop:
         mask = self._ports.reload.mask
         return self._ports.inbox.conflicts(now) + (mask.conflicts(now) if mask else [])
 
-    def _note(self, batch: Batch) -> None:
+    def _note(self, batch: CycleInput) -> None:
         """Take the times of plans and maps."""
         mission = self._runner.mission
         for plan in batch.plans:
@@ -252,7 +237,7 @@ class Loop:
     # The step, and its consequences.
 
     def _step(
-        self, events: list[Event], commands: list[CommandReceived], batch: Batch, now: float
+        self, events: list[Event], commands: list[CommandReceived], batch: CycleInput, now: float
     ) -> Decision:
         """Step the mission and perform its decision; during startup, only hold events."""
         mission, events, faults = self._runner.mission_for(events, self._ports.claim.state)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.bus.queries import Request, Shared
 from fasaco_edge.bus.session import Bus
-from fasaco_edge.daemon.figures import log_fault
+from fasaco_edge.daemon.counters import log_fault
 from fasaco_edge.daemon.loop.answers import AnyReply, answering, check
 from fasaco_edge.daemon.ros_bridge import RosBridge
 from fasaco_edge.errors import FasacoError, NotPublished, NotYet
@@ -29,6 +29,7 @@ from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
+from fasaco_edge.wire.query_table import RPC_NAMES
 from fasaco_edge.wire.topic_types import Topic
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Outbox:
         self._ros_publishers = {} if ros is None else ros.publishers
         self._kept: dict[str, Callable[[], AnyReply]] = {}
         for topic in SENT_TOPICS:
-            if topic.name in topics.RPC_NAMES:
+            if topic.name in RPC_NAMES:
                 answer = answering(partial(self._answer, topic.name))
                 for key in (keys.rpc(topic.name), keys.of(topic)):
                     bus.serve(key, answer)

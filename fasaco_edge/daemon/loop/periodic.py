@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fasaco_edge.bus.queries import Reply
+from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.daemon.loop.mission_reports import room_progress, unswept
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.grid.geometry import GridGeometry
@@ -17,12 +17,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.orders.passes import passes_document
 from fasaco_edge.mission.rooms.room_book import Room, RoomBook
-from fasaco_edge.planners.living_trail import (
-    TrailSnapshot,
-    branching,
-    directions,
-    strongest_into,
-)
+from fasaco_edge.planners.living_trail import TrailSnapshot, branching, directions, strongest_into
 from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.path_documents import TrailAttachment
@@ -215,10 +210,10 @@ class ShownTrail:
         payload = encode_pheromone(seen, self.frame, self.stamp_ns, self.lattice_deg)
         return payload, encode_json(about)
 
-    def reply(self) -> Reply:
+    def reply(self) -> QueryReply:
         """Return the field as the reply to a query."""
         payload, attachment = self.field()
-        return Reply(payload, PHEROMONE.schema, attachment)
+        return QueryReply(payload, PHEROMONE.schema, attachment)
 
     def directions(self) -> bytes:
         """Return its directions as a payload."""

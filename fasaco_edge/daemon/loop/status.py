@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from fasaco_edge import __version__
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.daemon.figures import CycleTimes, Faults
+from fasaco_edge.daemon.counters import CycleTimes, FaultCounter
 from fasaco_edge.daemon.fleet_wing import report_of
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.daemon.loop.mission_reports import (
@@ -74,7 +74,7 @@ class StatusBoard:
     """
 
     def __init__(self, config: DaemonConfig) -> None:
-        self.faults = Faults()
+        self.faults = FaultCounter()
         self.turns = CycleTimes()
         self.ingest_s: float | None = None
         self.plan_s: float | None = None

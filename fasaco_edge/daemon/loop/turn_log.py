@@ -19,7 +19,7 @@ from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.daemon.ledger.codec import encode_ledger
 from fasaco_edge.daemon.loop.answers import config_document
-from fasaco_edge.daemon.loop.inbox import MAPS, Batch, Received
+from fasaco_edge.daemon.loop.inbox import MAPS, CycleInput, Received
 from fasaco_edge.kernels.folder import sources_digest
 from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.events import CommandReceived, Decision, PlanBroken, PlanReady
@@ -70,11 +70,7 @@ NO_SUBSCRIBER = "it has no subscriber"
 class TurnLog:
     """Publishes the log in batches.
 
-    Args:
-        publisher: publisher of the log's key.
-        config: the configuration in force.
-        restored: the ledger that the daemon began with, if any.
-        rooms: the file of rooms that it began with; b"" for none.
+    The first batch contains the ledger and the file of rooms that the daemon began with, if any.
     """
 
     def __init__(
@@ -102,7 +98,7 @@ class TurnLog:
     def note(
         self,
         now: float,
-        batch: Batch,
+        batch: CycleInput,
         commands: Sequence[CommandReceived],
         decision: Decision,
         mission: Mission | None,

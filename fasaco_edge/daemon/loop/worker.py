@@ -33,10 +33,7 @@ class PlanningWorker:
     """
 
     def __init__(
-        self,
-        planner: CoveragePlanner,
-        budget_s: float,
-        post: Callable[[str, object], None],
+        self, planner: CoveragePlanner, budget_s: float, post: Callable[[str, object], None]
     ) -> None:
         self.progress = 0
         self._planner = planner

@@ -25,7 +25,7 @@ from fasaco_edge.wire.keys import VERSION, Keys, is_chunk
 from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
-    from fasaco_edge.bus.queries import Reply
+    from fasaco_edge.bus.queries import QueryReply
     from fasaco_edge.bus.session import Bus
 
 
@@ -125,7 +125,7 @@ def _fleet(status: Status) -> str:
     return status.fleet.name if status.fleet else ""
 
 
-def _member(robot: str, found: list[Reply]) -> _Member:
+def _member(robot: str, found: list[QueryReply]) -> _Member:
     if not found:
         return _Member(robot, None, "no answer")
     try:

@@ -11,7 +11,7 @@ from typing import get_args
 import msgspec
 
 from fasaco_edge.errors import OrderError
-from fasaco_edge.host.documents import Document, converted
+from fasaco_edge.host.documents import StrictDocument, converted
 from fasaco_edge.mission.orders.keep_outs import KeepOutDocument, keep_out_document, keep_out_of
 from fasaco_edge.mission.orders.order import (
     Command,
@@ -26,7 +26,7 @@ FORGETFUL = ("start", "reset")
 """The commands that may forget covered cells."""
 
 
-class CommandDocument(Document, frozen=True):
+class CommandDocument(StrictDocument, frozen=True):
     """A command to a mission.
 
     Attributes:

@@ -16,7 +16,7 @@ from msgspec import Meta
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M, Polygon
 from fasaco_edge.grid.polygons import polygon_flaw
-from fasaco_edge.host.documents import Document
+from fasaco_edge.host.documents import StrictDocument
 
 # Limits on the places of an order, as it is part of the ledger, which is written once a second.
 MOST_KEEP_OUT = 100
@@ -31,7 +31,7 @@ Corners = Annotated[
 PlaceName = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
 
 
-class KeepOutDocument(Document, frozen=True):
+class KeepOutDocument(StrictDocument, frozen=True):
     """A keep-out of the operator; a request to remove it has no polygon."""
 
     name: PlaceName

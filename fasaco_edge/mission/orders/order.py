@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point, Polygon
-from fasaco_edge.host.documents import Document, converted
+from fasaco_edge.host.documents import StrictDocument, converted
 from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     Corners,
@@ -165,14 +165,14 @@ class Command(NamedTuple):
     room: RoomRequest | None = None
 
 
-class StandingZone(Document, frozen=True):
+class StandingZone(StrictDocument, frozen=True):
     """A zone of the configuration, referred to by its name."""
 
     name: PlaceName
     polygon: Corners
 
 
-class ZoneDocument(Document, frozen=True):
+class ZoneDocument(StrictDocument, frozen=True):
     """An area to cover; without a polygon, the standing zone or else the room of that name.
 
     Attributes:
@@ -195,7 +195,7 @@ _Zones = Annotated[list[ZoneDocument], Meta(max_length=MOST_ZONES)]
 _KeepOuts = Annotated[list[Corners], Meta(max_length=MOST_KEEP_OUT)]
 
 
-class OrderDocument(Document, frozen=True):
+class OrderDocument(StrictDocument, frozen=True):
     """What to cover. Without zones: everything the robot can reach.
 
     Attributes:

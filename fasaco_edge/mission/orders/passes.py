@@ -9,7 +9,7 @@ import msgspec
 from msgspec import Meta
 
 from fasaco_edge.errors import BadConfiguration, OrderError
-from fasaco_edge.host.documents import Document
+from fasaco_edge.host.documents import StrictDocument
 from fasaco_edge.planners.passes import (
     MOST_ANGLE_DEG,
     MOST_OVERLAP,
@@ -22,7 +22,7 @@ from fasaco_edge.planners.passes import (
 )
 
 
-class PassDocument(Document, frozen=True, omit_defaults=True):
+class PassDocument(StrictDocument, frozen=True, omit_defaults=True):
     """A pass of an order.
 
     Attributes:

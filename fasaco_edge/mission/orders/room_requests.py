@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import FARTHEST_M
-from fasaco_edge.host.documents import Document
+from fasaco_edge.host.documents import StrictDocument
 from fasaco_edge.mission.orders.keep_outs import LONGEST_NAME, PlaceName
 from fasaco_edge.mission.orders.passes import Passes, passes_faults
 
@@ -25,7 +25,7 @@ RoomNumber = Annotated[int, Meta(ge=1, le=65_000)]
 Corner = Annotated[tuple[float, float], Meta(description="x, y [m] in the map frame")]
 
 
-class RoomRequest(Document, frozen=True, omit_defaults=True):
+class RoomRequest(StrictDocument, frozen=True, omit_defaults=True):
     """A room, and what to change.
 
     Attributes:

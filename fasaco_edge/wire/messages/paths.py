@@ -55,13 +55,9 @@ class PathMessage:
 def encode_path(
     xy: NDArray[np.float64], yaw: NDArray[np.float64], frame: str, stamp_ns: int
 ) -> bytes:
-    """Return a nav_msgs/Path whose poses all carry the header's frame and stamp.
+    """Return a nav_msgs/Path of points (n, 2) [m] and headings (n,) [rad]; n may be 0.
 
-    Args:
-        xy: float64 (n, 2), points [m]; n may be 0.
-        yaw: float64 (n,), headings [rad].
-        frame: name of the frame.
-        stamp_ns: time [ns].
+    All poses carry the header's frame and stamp.
     """
     writer = CdrWriter(PATH)
     if xy.ndim != 2 or xy.shape[1] != 2 or yaw.shape != (len(xy),):

@@ -167,11 +167,7 @@ class TransformTree:
     """Stores the newest transform of each frame, and multiplies those between robot and map.
 
     The frames are usually map, odom and base_link: a localiser publishes the first link, odometry
-    the second. The newest transform is the last to arrive.
-
-    Args:
-        map_frame: the frame of the resulting poses.
-        robot_frame: the robot's own.
+    the second. The newest transform is the last to arrive. Poses are in the map's frame.
 
     Attributes:
         oldest: the moving link between map and robot that arrived longest ago; None if no link
@@ -195,12 +191,8 @@ class TransformTree:
     ) -> StampedPose | None:
         """Store transforms; return the robot's pose if it is known and has changed.
 
-        It has the stamp of the moving link nearest to the robot, which is odometry.
-
-        Args:
-            transforms: the received transforms.
-            is_static: whether they are static.
-            came_at: time of arrival [s].
+        It has the stamp of the moving link nearest to the robot, which is odometry. ``came_at``:
+        the transforms' time of arrival [s].
 
         Raises:
             TransformLoop: the frames form a loop; their links are dropped.
@@ -277,14 +269,10 @@ DEFAULT_FRAMES = ("map", "base_link")
 
 
 class PoseDecoder:
-    """Decodes successive poses: messages of three types, or transforms.
-
-    Args:
-        schema: message type of samples that name none.
-        frames: the map's and the robot's, for transforms; None to take no transforms.
+    """Decodes successive poses: messages of three types, or transforms between two ``frames``.
 
     Attributes:
-        schema: as above; may be changed.
+        schema: message type of samples that name none; may be changed.
     """
 
     def __init__(self, schema: str, frames: tuple[str, str] | None = DEFAULT_FRAMES) -> None:
@@ -307,11 +295,7 @@ class PoseDecoder:
     ) -> StampedPose | None:
         """Return the pose; None for transforms without a new one.
 
-        Args:
-            payload: the message.
-            schema: its type; "" if the sample names none.
-            is_static: whether its transforms are static.
-            came_at: time of arrival [s], for ``oldest_link``.
+        ``schema``: "" if the sample names none; ``came_at``: time of arrival [s].
 
         Raises:
             MalformedMessage: it is of no such type.

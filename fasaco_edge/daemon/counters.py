@@ -34,7 +34,7 @@ def fault_text(fault: FasacoError) -> str:
     return f"{fault}: {fault.hint}" if fault.hint else str(fault)
 
 
-class Faults:
+class FaultCounter:
     """Counts faults by code, and logs them."""
 
     def __init__(self) -> None:
