@@ -58,7 +58,7 @@ class Numbered:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class BatchPlace:
     """Position of a batch: its run, and the number of its first new sample."""
 
     run: int
@@ -219,7 +219,7 @@ class SampleDecoder:
         return samples
 
 
-def place_of(batch: bytes) -> Place:
+def place_of(batch: bytes) -> BatchPlace:
     """Return the position of a batch.
 
     Raises:
@@ -233,7 +233,7 @@ def place_of(batch: bytes) -> Place:
             f"batch of samples: format must be {FORMAT}, got {kind}",
             hint="use the same release for daemon and recorder",
         )
-    return Place(run, first)
+    return BatchPlace(run, first)
 
 
 def _inflated(body: bytes) -> bytes:
@@ -339,7 +339,7 @@ def _flat(lane: _Lane, size: int) -> NDArray[np.uint8]:
     starts, lengths = edges[0::2], runs[1::2]
     if int(lengths.sum(dtype=np.int64)) != body.size - end:
         raise ValueError(f"runs of {lengths.sum(dtype=np.int64)} bytes, {body.size - end} follow")
-    # Place of each byte that is not zero: its index among such bytes plus the zeros before it.
+    # BatchPlace of each byte that is not zero: its index among such bytes plus the zeros before it.
     places = np.arange(body.size - end)
     places += np.repeat(starts - (np.cumsum(lengths, dtype=np.int64) - lengths), lengths)
     flat = np.zeros(size, np.uint8)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.client.events import BAD, GOOD, ORDER, EventLog, differences
+from fasaco_edge.client.phrases import BAD, GOOD, ORDER, EventLog, differences
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.text import is_reported

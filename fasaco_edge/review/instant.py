@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine, lines_in, read_drawings
 from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
+from fasaco_edge.recording.read.timeline import DrawnLine, lines_in, read_drawings
 from fasaco_edge.review.floor import nearest_points
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.run_data import maps_of

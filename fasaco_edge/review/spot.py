@@ -31,9 +31,9 @@ from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine, lines_in, read_drawings
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.recording.read.run import RecordedSamples
+from fasaco_edge.recording.read.timeline import DrawnLine, lines_in, read_drawings
 from fasaco_edge.review.floor import nearest_points, swept_floor
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.settings import known_settings

@@ -16,8 +16,7 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
-from fasaco_edge.client.events import BAD, GOOD, ORDER, PLAIN, Event, EventLog
-from fasaco_edge.client.phrases import clock
+from fasaco_edge.client.phrases import BAD, GOOD, ORDER, PLAIN, Event, EventLog, clock
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.watch import picture
 

@@ -16,7 +16,7 @@ from types import FrameType
 from typing import Any, Protocol, Self, TextIO
 
 from fasaco_edge.client import phrases
-from fasaco_edge.client.events import EventLog
+from fasaco_edge.client.phrases import EventLog
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.text import json_line
 

@@ -151,14 +151,6 @@ def test_shortest_walks_and_empty_captions(cells):
     assert len(inside(places(picture, palette.START), drawing_area(picture))) > 20
 
 
-def test_walk_is_left_as_it_was(picture):
-    lattice = CoverageLattice.from_free(np.ones((4, 6), bool))
-    walk = line((0, 0), (0, 5))
-    walk.flags.writeable = False
-    draw_walk(lattice, walk, grid=None, title="", lines=[])
-    assert walk.tolist() == line((0, 0), (0, 5)).tolist()
-
-
 def test_a_mission_shows_visits_trail_start_and_end():
     grid = room()
     lattice = CoverageLattice.from_map(grid, FOOTPRINT)

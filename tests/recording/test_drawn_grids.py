@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import grids_in
 from fasaco_edge.recording.read.frames import pa
+from fasaco_edge.recording.read.timeline import grids_in
 
 
 def strict(kind):

@@ -10,15 +10,13 @@ from hypothesis import strategies as st
 pytest.importorskip("rerun")
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, size_in_file
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.documents.path_documents import TrailAttachment
-from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 SECOND_NS = 1_000_000_000
 RATE = RATES[entities.MAP]
@@ -34,16 +32,6 @@ class Canvas:
     def draw(self, name: str, size: int, at_s: float, layer: str = entities.MAP) -> None:
         now_ns = round(at_s * SECOND_NS)
         self.layers.draw(layer, size, lambda: self.drawn.append((name, size)), now_ns)
-
-
-def test_a_coarser_map_shows_the_most_occupied_pixel_of_each():
-    cells = np.full((5, 7), -1, np.int8)
-    cells[0, 0], cells[1, 1], cells[4, 6] = 0, 100, 0
-    grid = OccupancyGrid(GridGeometry(5, 7, 0.1, Pose2D(1.0, 2.0)), cells)
-    assert coarser(grid, 35) is grid
-    coarse = coarser(grid, 10)
-    assert coarse.cells.tolist() == [[100, -1, -1, -1], [-1] * 4, [-1, -1, -1, 0]]
-    assert coarse.geometry == GridGeometry(3, 4, 0.2, Pose2D(1.0, 2.0))
 
 
 def test_below_the_rate_everything_is_drawn_at_once():
@@ -112,14 +100,3 @@ def test_a_line_keeps_its_corners_and_loses_the_rest():
     assert archetypes.corners(lanes[[0, 1, 1, 2]]).tolist()[-1] == [2, 0]
     for count in (0, 1, 2):
         assert len(archetypes.corners(lanes[:count])) == count
-
-
-@pytest.mark.parametrize(
-    ("steps", "words"), [(9, "9 steps to drive"), (0, "nothing left to drive")]
-)
-def test_the_trail_s_label_leaves_out_what_says_nothing(steps, words):
-    geometry = GridGeometry(2, 2, 0.3, Pose2D(0.0, 0.0))
-    field = PheromoneMessage(geometry, np.ones((2, 2), np.uint8), 0.1, 0.2, 0, 1, 1, steps)
-    label = archetypes.trail_label(field, TrailAttachment(7, 4, 1.75))
-    assert label.labels is not None
-    assert label.labels.as_arrow_array().to_pylist() == [f"pheromone at path 7, {words}"]

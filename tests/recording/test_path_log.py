@@ -10,7 +10,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.scene.drawings import LOGGED_AGAIN_NS, PathDrawing
-from fasaco_edge.recording.scene.layers import Layers
+from fasaco_edge.recording.scene.layers import Anchor, Layers
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment
@@ -27,7 +27,7 @@ def shown(folder, paths):
     for revision, (at_s, reason, planner) in enumerate(paths, 1):
         writer.at(at_s * SECOND_NS)
         about = PathAttachment(revision=revision, reason=reason, planner=planner)
-        drawing.add(PathMessage("map", 0, empty, empty[:, 0]), about)
+        drawing.add(PathMessage("map", 0, empty, empty[:, 0]), about, Anchor())
     assert writer.close()
     (part,) = folder.glob("*.rrd")
     texts = read_column(part, entities.PATH_LOG, TEXT)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-import numpy as np
-
 STRIDE_M = 0.001
 
 
@@ -32,8 +30,3 @@ def passed_cells(trail, cell_m, reach=0.5):
             passed.append((now, way))
         under = now
     return passed
-
-
-def nearest_rank(values, percent):
-    """Return a percentile that is one of the values."""
-    return float(np.percentile(values, percent, method="inverted_cdf"))

@@ -173,8 +173,7 @@ def test_troubles_and_faults_are_reported(parts):
         ("degraded", "no pose for 3 s"),
         ("paused", "the dock gives no current"),
     ]
-    (log,) = [lines for entity, lines in review.record.log.items() if entity == "log/mission"]
-    texts = [line for _, line in log]
+    texts = [line for _, line in review.record.texts["log/mission"]]
     assert texts.index("trouble: the dock gives no current") < texts.index(
         "trouble is over: no_current"
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -135,8 +134,3 @@ def test_a_flipped_byte_changes_no_sample_unseen(place, flip):
     except MalformedMessage:
         return
     assert told == samples
-
-
-def test_another_schema_is_another_lane():
-    samples = [arrival(b"same"), replace(arrival(b"same"), sample=Sample("k", b"same", "other"))]
-    assert decoded(encoded(samples)) == [samples]

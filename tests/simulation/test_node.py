@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -218,26 +217,12 @@ def test_an_impossible_simulation_is_an_error():
 
 def test_it_waits_for_a_bus_that_is_not_there_yet():
     """As the daemon and `follow` do: a bare base's manual starts the robot first."""
-    endpoint = free_endpoint()
-    with waiting_robot(endpoint) as robot:
-        heard = threading.Event()
+    endpoint, heard = free_endpoint(), threading.Event()
+    words = [*PROGRAM, "simulate", "office", "--connect", endpoint]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
+        assert b"waiting for the bus at " + endpoint.encode() in robot.stderr.readline()
         with open_bus(BusSettings(mode="router", connect=(), listen=(endpoint,))) as bus:
             bus.listen(Keys(), topics.MAP, lambda _: heard.set())
             assert heard.wait(30.0)
             robot.terminate()
             assert robot.wait(30.0) == 0
-
-
-def test_stopped_before_it_has_joined_it_ends_in_order():
-    with waiting_robot(free_endpoint()) as robot:
-        robot.terminate()
-        assert robot.wait(30.0) == 0
-        assert robot.stderr.read() == b""
-
-
-@contextmanager
-def waiting_robot(endpoint):
-    words = [*PROGRAM, "simulate", "office", "--connect", endpoint]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
-        assert b"waiting for the bus at " + endpoint.encode() in robot.stderr.readline()
-        yield robot

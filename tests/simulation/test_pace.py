@@ -18,21 +18,11 @@ def ticks_until(pace, begin_s, end_s, cost_s):
     return count
 
 
-@pytest.mark.parametrize("speed", [0.5, 1.0, 20.0])
-def test_a_fast_machine_keeps_the_speed(speed):
-    pace = Pace(speed, 0.02, 100.0)
-    assert ticks_until(pace, 100.0, 110.0, 1e-4) * 0.02 == pytest.approx(10 * speed, rel=0.01)
-
-
-def test_a_slow_machine_falls_behind_and_does_not_catch_up_fast():
+def test_a_fast_machine_keeps_the_speed_and_a_slow_one_falls_behind():
+    pace = Pace(20.0, 0.02, 100.0)
+    assert ticks_until(pace, 100.0, 110.0, 1e-4) * 0.02 == pytest.approx(200.0, rel=0.01)
     pace = Pace(10.0, 0.02, 0.0)
     assert ticks_until(pace, 0.0, 10.0, 0.01) == pytest.approx(1000, abs=2)
     # 80 s of simulated time were lost; at most a tenth of a second's worth is made good.
     after = ticks_until(pace, 10.0, 12.0, 1e-5)
     assert after * 0.02 == pytest.approx(20.0 + 0.1 * 10.0, rel=0.02)
-
-
-def test_a_pause_is_forgiven():
-    pace = Pace(1.0, 0.02, 0.0)
-    pace.ticked(50.0)
-    assert pace.behind_s(50.0) == pytest.approx(0.1)

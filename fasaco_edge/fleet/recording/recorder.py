@@ -81,10 +81,9 @@ class FleetRecorder(BusRecorder):
     def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
         self._fleet = fleet
         self._schema = config.pose.schema
-        recording = output.begin(file_name(fleet), build_layout((), NO_MAP))
-        self.writer, self._clock = recording.writer, recording.clock
-        self._began_ns = recording.began_ns
-        self._title = f"fleet {fleet} {recording.began} UTC"
+        self.writer, self._clock = output.begin(file_name(fleet), build_layout((), NO_MAP))
+        self._began_ns = self._clock.began_ns
+        self._title = f"fleet {fleet} {self._clock.began:%Y-%m-%d %H:%M:%S} UTC"
         self.writer.describe(self._title)
         self._members = Members()
         self._scene = FleetScene(self.writer, self._members)

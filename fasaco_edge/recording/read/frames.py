@@ -30,19 +30,8 @@ try:
 except ImportError as error:
     raise missing_rerun(error) from error
 
-__all__ = [
-    "BROKEN",
-    "Chunk",
-    "chunk_at",
-    "chunks",
-    "chunks_in",
-    "column",
-    "is_fleet_recording",
-    "missing_rerun",
-    "pa",
-    "recording_id",
-    "wall_ns",
-]
+# Other modules import pyarrow from here.
+__all__ = ["pa"]
 
 # Arrow's own pool keeps about ten megabytes of freed memory.
 pa.set_memory_pool(pa.system_memory_pool())

@@ -40,10 +40,16 @@ EXIT_STALLED = 1
 
 
 class RunClock:
-    """Monotonic UTC [ns]: the timeline continues if the system clock is set during a run."""
+    """Monotonic UTC [ns]: the timeline continues if the system clock is set during a run.
+
+    Attributes:
+        began_ns, began: beginning of the run: since the epoch [ns], and as a date, UTC.
+    """
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
+        self.began_ns = self.now_ns()
+        self.began = datetime.fromtimestamp(self.began_ns / 1e9, UTC)
 
     def now_ns(self) -> int:
         """Return the time since the epoch [ns]; later settings of the system clock are ignored."""
@@ -82,7 +88,7 @@ SUPERSEDED = {
 SUPERSEDED["map"] |= {"map_update"}
 
 
-class Inbox:
+class SampleQueue:
     """A queue of samples in order of arrival, of at most ``capacity_bytes``.
 
     While the writer is behind, a sample replaces older ones (``SUPERSEDED``). While the queue is
@@ -169,31 +175,13 @@ class Output:
     folder: Path
     budget: DiskBudget
 
-    def begin(self, name: str, blueprint: rrb.Blueprint) -> Recording:
-        """Begin a recording of a robot or fleet; ``name``: its name."""
+    def begin(self, name: str, blueprint: rrb.Blueprint) -> tuple[RecordingWriter, RunClock]:
+        """Begin a recording of the robot or fleet ``name``; return its writer and its clock."""
         clock = RunClock()
-        began_ns = clock.now_ns()
-        began = datetime.fromtimestamp(began_ns / 1e9, UTC)
-        run = next_run(self.folder, name, began)
+        run = next_run(self.folder, name, clock.began)
         writer = RecordingWriter(self.folder, run, self.budget, blueprint)
-        writer.at(began_ns)
-        return Recording(writer, clock, began_ns, f"{began:%Y-%m-%d %H:%M:%S}")
-
-
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """A recording that has begun.
-
-    Attributes:
-        writer: writer of its parts.
-        clock: clock of its timeline.
-        began_ns, began: its beginning: since the epoch [ns], and as text, UTC.
-    """
-
-    writer: RecordingWriter
-    clock: RunClock
-    began_ns: int
-    began: str
+        writer.at(clock.began_ns)
+        return writer, clock
 
 
 def record(
@@ -213,11 +201,14 @@ def record(
         BadConfiguration: the folder cannot be made or written to.
     """
     return_soon()
-    repairs = _repaired(folder)
+    try:
+        repairs = repair_folder(folder)
+    except OSError as error:
+        raise cannot_record(folder, error) from error
     with stop_event() as stop, open_bus(bus_settings) as bus:
         recorder = recorder_on(bus)
-        for line in repairs:
-            recorder.note(line)
+        for repair in repairs:
+            recorder.note(str(repair))
         recorder.listen()
         release_unused()
         while not stop.is_set():
@@ -227,12 +218,3 @@ def record(
         # All recoverable data are saved.
         os._exit(code)
     return code
-
-
-def _repaired(folder: Path) -> list[str]:
-    """Repair the recordings in a folder; return a line of text for each repair."""
-    try:
-        repairs = repair_folder(folder)
-    except OSError as error:
-        raise cannot_record(folder, error) from error
-    return [str(repair) for repair in repairs]

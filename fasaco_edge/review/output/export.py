@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.host.durable import whole
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import grids_in, lines_in, read_drawings
+from fasaco_edge.recording.read.timeline import grids_in, lines_in, read_drawings
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import one_line
 

@@ -22,6 +22,7 @@ from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.floor import outlined
 from fasaco_edge.review.instant import Scene
+from fasaco_edge.review.moments import refused_by_code
 from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.output.answers import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
@@ -170,9 +171,10 @@ def _caption(review: Review) -> list[str]:
         lines.append(f"floor swept{ordered_words(review.orders)}: {swept}, by recorded poses")
     median, slowest = replans.milliseconds(50), replans.milliseconds(100)
     if median is not None and slowest is not None:
+        refused = sum(refused_by_code(review.data).values())
         lines.append(
             f"{len(replans.later):,} replans, {median:.1f} ms in the median, "
-            f"{slowest:.0f} ms at worst; {review.faults.total:,} messages refused"
+            f"{slowest:.0f} ms at worst; {refused:,} messages refused"
         )
     return lines
 
