@@ -23,7 +23,7 @@ from fasaco_edge.recording.write.writer import (
     RecordingWriter,
     WriterState,
 )
-from tests.support.recordings import read_column, read_summary
+from tests.support.recordings import read_column, read_static, read_summary
 
 RUN = "run-1"
 
@@ -74,7 +74,7 @@ def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
         summary = read_summary(part)
         assert summary.complete
         assert summary.rows[entities.PATH] == 1
-        assert list(read_cards(part)) == ["card"]
+        assert read_static(part, entities.RUN_CARD, "TextDocument:text") == [["card"]]
     assert sum(read_summary(part).rows.get("noise", 0) for part in parts) == 7
     assert writer.lost == 0
 
@@ -233,15 +233,6 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(BadConfiguration, match="cannot record into"):
         writer_in(tmp_path / "file" / "runs")
-
-
-def read_cards(part):
-    """Yield the texts of the run card, which is static."""
-    from rerun.chunk import RrdReader
-
-    for chunk in RrdReader(str(part)).stream().filter(content=f"/{entities.RUN_CARD}"):
-        for texts in chunk.to_record_batch().column("TextDocument:text").to_pylist():
-            yield texts[0]
 
 
 def drain(pipe, copy) -> None:

@@ -136,6 +136,11 @@ def test_parts_are_one_run(parts):
     assert (told["covered_cells"], told["coverable_cells"]) == (4, 24)
     assert told["reached_s"]["50"] is None
     assert told["complete"] is False
+    # Each part begins with the state in force.
+    last = read_review(parts[-1:])
+    assert all(span.begin_s >= 0 for span in last.states)
+    assert last.lattice is not None
+    assert (document(last)["robot"], document(last)["samples_missing"]) == ("robot", 0)
 
 
 def test_progress_is_reported(parts):
@@ -182,15 +187,6 @@ def test_troubles_and_faults_are_reported(parts):
     assert told["faults"] == 3
 
 
-def test_each_part_begins_with_the_state_in_force(parts):
-    review = read_review(parts[-1:])
-    assert all(span.begin_s >= 0 for span in review.states)
-    assert review.lattice is not None
-    told = document(review)
-    assert told["robot"] == "robot"
-    assert told["samples_missing"] == 0
-
-
 def test_a_killed_recorder_loses_no_figures(tmp_path, parts):
     files = run_told(tmp_path / "runs", faults={"wrong_frame": 2}, silent=1, killed=True)
     content = [file.read_bytes() for file in files]
@@ -230,11 +226,3 @@ def test_two_runs_side_by_side(parts, other, tmp_path, capsys):
         assert 1.5 * alone.width < drawn.width < 2.5 * alone.width
     assert "messages refused" in table
     assert "+3" in table
-
-
-def test_a_file_that_is_no_recording_is_named(tmp_path, capsys):
-    assert main(["review", str(tmp_path / "none.rrd")]) == 1
-    assert "No such file or directory" in capsys.readouterr().err
-    (tmp_path / "text.rrd").write_text("hello")
-    assert main(["review", str(tmp_path / "text.rrd")]) == 1
-    assert "this is no recording" in capsys.readouterr().err

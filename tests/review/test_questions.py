@@ -20,12 +20,12 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.floor import swept_floor
-from fasaco_edge.review.instant import direction, heading_from, scene_at
+from fasaco_edge.review.instant import scene_at
 from fasaco_edge.review.output.answers import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
-from fasaco_edge.review.spot import explain, spots_left
+from fasaco_edge.review.spot import explain
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import FloorReport
@@ -112,16 +112,6 @@ def review(parts):
     return read_review(parts)
 
 
-def test_floor_that_was_not_ordered_is_not_left(review):
-    """The standing zone ends at y = 2.3 m, the room at 3 m."""
-    free = (0.4, 2.6)
-    assert review.all_floor.geometry.values_at(review.all_floor.unswept, np.array([free]))[0]
-    assert not review.floor.geometry.values_at(review.floor.unswept, np.array([free]))[0]
-    assert (
-        " of a, by recorded poses" in dict(screen_rows(review, document_of(review)))["floor swept"]
-    )
-
-
 def turned_s(review):
     """Return when the robot stood half turned [s]."""
     yaws = [yaw for _, _, yaw in review.data.poses]
@@ -152,6 +142,7 @@ def test_changes_of_the_map_and_commands_are_listed(review):
     told = dict(instant_rows(instant))
     assert told["order"].startswith("zone a, keep out of")
     assert "seen for the first time" in told["map"]
+    assert "facing" in told["robot"]
 
 
 def test_the_search_that_found_the_path_is_named(review):
@@ -168,21 +159,12 @@ def test_before_the_first_message_nothing_is_known(review):
     assert instant.path is instant.x is instant.command is None
 
 
-def test_a_line_leads_on_from_its_nearest_point():
-    line = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])
-    assert heading_from(line, (1.0, 0.1)) == pytest.approx(0.0)
-    assert heading_from(line, (1.9, 1.0)) == pytest.approx(90.0)
-    assert heading_from(line, (2.0, 5.0)) is None
-    assert heading_from(line[:1], (0.0, 0.0)) is None
-    assert [direction(deg) for deg in (0, 44, 91, 180, -180, -90)] == [
-        *("east", "north-east", "north", "west", "west", "south")
-    ]
-
-
 @pytest.mark.parametrize(
     ("place", "why", "words"),
     [
         ((0.9, Y), "swept", "first at 0:0"),
+        # Of the path back the robot drove all but the last 15 cm.
+        ((0.2, Y), "still to come", "the robot did not get there"),
         ((9.0, 1.0), "never seen", "unknown to the map"),
         ((5.5, 1.0), "never seen", "unknown to the map"),
         ((2.2, 2.2), "not floor", "an obstacle (100 %)"),
@@ -268,22 +250,10 @@ def test_by_how_much_it_was_missed(review):
     assert spot.seen_s == pytest.approx(review.data.map_s[0], abs=1e-3)
 
 
-def test_floor_on_the_last_path_is_still_to_come(review):
-    """Of the path back the robot drove all but the last 15 cm."""
-    (spot,) = explain(review, [(0.2, Y)])
-    assert spot.why == "still to come"
-
-
 def test_a_spot_without_a_map_is_not_known(review):
     bare = replace(review, data=replace(review.data, grid=None), no_lattice="there is no map")
     (spot,) = explain(bare, [(1.0, 1.0)])
     assert (spot.swept, spot.words) == (None, "there is no map")
-
-
-def test_the_largest_patches_come_with_reasons(review):
-    spots = spots_left(review)
-    assert spots
-    assert all(spot.swept is False for spot in spots)
 
 
 def test_zones_are_drawn_for_the_viewer(parts):
@@ -328,6 +298,8 @@ def test_a_review_fits_on_one_screen_and_cuts_nothing(parts, review, capsys, ter
     assert len(out.splitlines()) <= 24
     assert max(map(len, out.splitlines())) <= 80
     told = " ".join(out.split())
+    # Floor that was not ordered is not left: the zone ends at y = 2.3 m, the room at 3 m.
+    assert " of a, by recorded poses" in told
     for name, text in screen_rows(review, document_of(review)):
         assert f"{name} {text}" in told
     assert "start: zone a, keep out of (2.6, 0.4) (3.4, 0.4) (3.4, 1) (2.6, 1), return home" in told

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -78,16 +76,6 @@ def test_a_map_that_changed_a_little_takes_a_little():
     assert len(first) > 700_000
     assert len(second) < 400
     assert decoded([first, second])[1][0].sample.payload == changed.tobytes()
-
-
-def test_poses_take_less_than_half():
-    rng = np.random.default_rng(0)
-    poses = [
-        arrival(struct.pack("<II7d", n, n * 1000, *rng.normal(size=2), 0, 0, 0, 0.6, 0.8), at_ns=n)
-        for n in range(50)
-    ]
-    (blob,) = encoded(poses)
-    assert len(blob) < 0.5 * sum(len(pose.sample.payload) for pose in poses)
 
 
 def test_without_earlier_batches_only_a_restart_can_be_read():
