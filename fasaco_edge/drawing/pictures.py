@@ -10,7 +10,7 @@ from PIL import Image
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.floor import ENDS, draw_visits, number_rooms, paint_rooms, visits_of
-from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
+from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.label_place import label_place
@@ -147,7 +147,7 @@ def draw_walk(
     """
     centres = lattice.centres(cells)
     driven = centres if line_xy is None else line_xy
-    plot = Plot(View.over(bounds_of(grid, lattice, driven), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(grid, lattice, driven), lattice.cell_m))
     plot.ground(lattice if grid is None else grid)
     if rooms is not None:
         paint_rooms(plot, rooms)
@@ -266,7 +266,7 @@ def draw_mission(
         zones, keep_out: polygons of the order [m].
         rooms: names and outlines [m].
     """
-    plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     if swept is None:

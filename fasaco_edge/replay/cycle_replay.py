@@ -252,7 +252,6 @@ class CycleReplay:
         return replace(step, as_recorded=_facts(turn.decided)["path"] == _facts(decided)["path"])
 
     def _received(self, turn: Cycle) -> list[Received]:
-        """Return the recorded samples that the daemon took in this cycle."""
         found = [(taken, self._find(turn, taken)) for taken in turn.samples]
         return [
             Received(taken.topic, sample, taken.at) for taken, sample in found if sample is not None

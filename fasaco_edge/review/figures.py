@@ -19,7 +19,7 @@ from fasaco_edge.review.document import (
     Charge,
     MapSize,
     ReviewDocument,
-    Trouble,
+    TroublePeriod,
 )
 from fasaco_edge.review.moments import RECORDER_IN_ORDER, refused_by_code
 from fasaco_edge.review.orders import commands_of
@@ -70,7 +70,7 @@ def document_of(review: Review) -> ReviewDocument:
         restored_cells=data.restored_cells,
         states={name: round(seconds, 3) for name, seconds in states.items()},
         troubles=[
-            Trouble(s.name, s.reason, round(s.begin_s, 3), round(s.seconds, 3))
+            TroublePeriod(s.name, s.reason, round(s.begin_s, 3), round(s.seconds, 3))
             for s in review.troubles
         ],
         charges=charges_of(review),

@@ -116,7 +116,7 @@ class Instant(msgspec.Struct):
     next_command: CommandThen | None
 
 
-class Scene(msgspec.Struct, frozen=True):
+class InstantPicture(msgspec.Struct, frozen=True):
     """An instant with the data of its picture: map, and lines of the paths."""
 
     instant: Instant
@@ -126,7 +126,7 @@ class Scene(msgspec.Struct, frozen=True):
     after: DrawnLine | None
 
 
-def scene_at(review: Review, at_s: float) -> Scene:
+def instant_at(review: Review, at_s: float) -> InstantPicture:
     """Return the scene at a time [s].
 
     Raises:
@@ -169,7 +169,7 @@ def scene_at(review: Review, at_s: float) -> Scene:
         next_command=next((each for each in commands if each.at_s > at_s), None),
     )
     shown = (lines.get(each.revision if each else 0) for each in (before, path, after))
-    return Scene(instant, grid, *shown)
+    return InstantPicture(instant, grid, *shown)
 
 
 def _path(
@@ -194,7 +194,6 @@ def _path(
 
 
 def _plan(paths: Sequence[PathSample]) -> PlanThen | None:
-    """Return the plan of the last path that has one."""
     for sample in reversed(paths):
         about = sample.about
         if about.planner is not None:

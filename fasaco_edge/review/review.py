@@ -264,7 +264,6 @@ def review_of(
 
 
 def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
-    """Return the lattice over the last map, or why there is none."""
     footprint = data.footprint
     if data.grid is None:
         return None, "there is no map"

@@ -115,7 +115,6 @@ def _run(glyphs: GlyphSet, upper: int, lower: int, length: int) -> str:
 
 
 def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
-    """Return a character, and the kinds that its foreground and background show."""
     shown = max(upper, lower)
     if shown >= picture.LETTER:
         return picture.LETTERS[shown - picture.LETTER], picture.WALL, picture.UNKNOWN
@@ -137,7 +136,7 @@ FAINT = "bright_black"
 TONES = {PLAIN: "", GOOD: "green", BAD: "red", ORDER: "yellow"}
 
 
-class Blocks:
+class ScreenBlocks:
     """Draws rich's renderables as lines of a given width; unchanged blocks are cached.
 
     Attributes:

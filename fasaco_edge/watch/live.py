@@ -28,7 +28,7 @@ LINE_EVERY_S = 1.0
 MOST_COLUMNS, MOST_LINES = 800, 400
 
 
-class View(Protocol):
+class WatchedView(Protocol):
     """The newest data of a robot or a fleet.
 
     Attributes:
@@ -49,7 +49,7 @@ class Watched(ABC):
     """
 
     rest_s: float
-    view: View
+    view: WatchedView
 
     @abstractmethod
     def take(self, timeout_s: float) -> bool:

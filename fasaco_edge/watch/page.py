@@ -15,7 +15,7 @@ from fasaco_edge.client.phrases import TROUBLED, age, clock
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
-from fasaco_edge.watch.glyphs import FAINT, Blocks, with_keys
+from fasaco_edge.watch.glyphs import FAINT, ScreenBlocks, with_keys
 from fasaco_edge.watch.live import Watched
 from fasaco_edge.watch.picture import MissionPicture, RobotView
 from fasaco_edge.watch.status_table import figures, state_colour
@@ -62,7 +62,7 @@ class Page:
     """Drawing of a robot's view as lines of text, with a cache for unchanged parts."""
 
     def __init__(self, console: Console) -> None:
-        self._blocks = Blocks(console)
+        self._blocks = ScreenBlocks(console)
         self._picture = MissionPicture()
 
     def lines(self, view: RobotView, now: float, width: int, height: int) -> list[str]:

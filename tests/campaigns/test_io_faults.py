@@ -17,9 +17,9 @@ pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 ENDS_A_PART = """
 import logging, pathlib, sys
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.part import Flush, Part
+from fasaco_edge.recording.write.part import Flush, RecordingPart
 logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
-part = Part(pathlib.Path(sys.argv[1], "run-part1.rrd"), "run")
+part = RecordingPart(pathlib.Path(sys.argv[1], "run-part1.rrd"), "run")
 part.stream.log("text", rr.TextLog("hello"))
 assert part.flush(60.0) is Flush.DONE
 part.close()

@@ -25,7 +25,7 @@ from fasaco_edge.recording.read.frames import MOST_CHUNK_BYTES, chunks
 from fasaco_edge.recording.read.repair import FRAME, HEADER_BYTES, scan_recording
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.part import Part
+from fasaco_edge.recording.write.part import RecordingPart
 from fasaco_edge.review.review import read_review
 from fasaco_edge.samples import _HEAD, WHOLE, SampleEncoder, _Lane
 from tests.samples.test_codec import arrival
@@ -37,7 +37,7 @@ BEGAN_NS = 1_767_225_600 * 10**9
 def recorded(folder, *batches):
     """Record some of all that a recorder does; return the file."""
     file = folder / f"{RUN_ID}-part1.rrd"
-    part = Part(file, RUN_ID)
+    part = RecordingPart(file, RUN_ID)
     for number in range(5):
         rr.set_time(
             entities.WALL_CLOCK, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream

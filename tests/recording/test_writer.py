@@ -129,7 +129,7 @@ def test_a_part_that_is_written_is_not_deleted_for_the_quota(tmp_path):
     assert delete_oldest(tmp_path, "robot", 1)
 
 
-def test_no_part_is_written_below_the_floor(tmp_path):
+def test_no_part_is_written_below_the_floor_and_its_samples_keep_their_times(tmp_path, monkeypatch):
     clock = Clock()
     # One more than there is: no room, though the disk is far from full.
     writer = writer_in(tmp_path, least_free_bytes=shutil.disk_usage(tmp_path).total)
@@ -141,20 +141,11 @@ def test_no_part_is_written_below_the_floor(tmp_path):
     assert writer.lost == 1
     (part,) = tmp_path.glob("*.rrd")
     assert read_summary(part).complete
-    assert writer.close()
-
-
-def test_samples_received_on_a_full_disk_keep_their_times(tmp_path, monkeypatch):
-    clock = Clock()
-    writer = writer_in(tmp_path)
-    with monkeypatch.context() as patch:
-        patch.setattr(DiskBudget, "is_full", lambda *_: True)
-        writer.sync(clock.tick())
-    assert writer.state is WriterState.DISK_FULL
     came_ns = clock.now_ns
     writer.at(came_ns)
     writer.log(entities.MISSION_STATE, rr.StateChange(state="blocked"), latched=True)
     writer.at(came_ns + 10**10)
+    monkeypatch.setattr(DiskBudget, "may_begin", lambda *_: True)
     writer.sync(clock.tick() + RETRY_PERIOD_NS)
     assert writer.close()
     column = read_column(tmp_path / f"{RUN}-part2.rrd", entities.MISSION_STATE, "StateChange:state")

@@ -20,7 +20,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.figures import document_of
 from fasaco_edge.review.floor import swept_floor
-from fasaco_edge.review.instant import scene_at
+from fasaco_edge.review.instant import instant_at
 from fasaco_edge.review.output.answers import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
@@ -119,7 +119,7 @@ def turned_s(review):
 
 
 def test_a_turn_of_the_robot_is_explained(review):
-    instant = scene_at(review, turned_s(review)).instant
+    instant = instant_at(review, turned_s(review)).instant
     assert (instant.state, instant.x, instant.y) == ("covering", 1.35, Y)
     assert instant.turn.degrees == pytest.approx(180.0, abs=1.0)
     assert instant.turn.why == (
@@ -132,7 +132,7 @@ def test_a_turn_of_the_robot_is_explained(review):
 
 
 def test_changes_of_the_map_and_commands_are_listed(review):
-    instant = scene_at(review, turned_s(review)).instant
+    instant = instant_at(review, turned_s(review)).instant
     # A band of 40 cm across the room, of which the box and two walls are no floor.
     assert instant.map.seen_m2 == pytest.approx(0.4 * 4.0, abs=0.05)
     assert instant.map.around.y_min == pytest.approx(1.2, abs=0.06)
@@ -146,7 +146,7 @@ def test_changes_of_the_map_and_commands_are_listed(review):
 
 
 def test_the_search_that_found_the_path_is_named(review):
-    instant = scene_at(review, review.data.paths[0].at_s).instant
+    instant = instant_at(review, review.data.paths[0].at_s).instant
     planned = dict(instant_rows(instant))["planned"]
     assert planned.startswith("1 at 0:0")
     found = "ants of velocity 6 saved 14.0 s, local search saved 2.0 s"
@@ -155,7 +155,7 @@ def test_the_search_that_found_the_path_is_named(review):
 
 def test_before_the_first_message_nothing_is_known(review):
     first = min(review.data.map_s[0], review.data.pose_s[0])
-    instant = scene_at(review, max(first - 0.01, 0.0)).instant
+    instant = instant_at(review, max(first - 0.01, 0.0)).instant
     assert instant.path is instant.x is instant.command is None
 
 

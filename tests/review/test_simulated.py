@@ -13,7 +13,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.timeline import open_timeline
-from fasaco_edge.review.instant import scene_at
+from fasaco_edge.review.instant import instant_at
 from fasaco_edge.review.review import read_review
 from fasaco_edge.serve.recorded import Playback
 from fasaco_edge.wire import topics
@@ -62,7 +62,7 @@ def test_times_and_speeds_are_the_robots(parts):
     told = document(review)
     assert np.diff(review.data.times) == pytest.approx(EVERY_S)
     assert told["driven_m"] / np.ptp(review.data.times) == pytest.approx(SPEED_M_S, rel=0.01)
-    assert scene_at(review, review.data.pose_s[10]).instant.speed_m_s == SPEED_M_S
+    assert instant_at(review, review.data.pose_s[10]).instant.speed_m_s == SPEED_M_S
     assert told["time_scale"] == SCALE
     # Before and after the drive no simulated time passes.
     assert told["duration_s"] > DRIVES_S

@@ -86,15 +86,3 @@ def test_as_a_last_resort_waypoints_are_skipped():
         return end[0] > 3.0
 
     assert route(path, track(at(1, 0)), no_way_to_the_first_metres) is None
-
-
-def test_without_going_back_it_drives_straight_or_stands():
-    path, came = centres((0, 0), (0, 3)), track(at(1, 0), at(0, 0), at(0, 1))
-    found = joined(path, came, clear, goes_back=False)
-    assert np.round(found, 6).tolist() == points((0, 3))
-
-    def from_the_row_before(start, _end):
-        return abs(start[1] - at(1, 0)[1]) < 0.01
-
-    assert joined(path, came, from_the_row_before, goes_back=False) is None
-    assert joined(path, came, from_the_row_before) is not None

@@ -115,6 +115,13 @@ def test_a_new_path_along_the_old_one_is_joined_without_a_stop():
     world.follow(lane[3:])
     run(world, 100)
     assert world.distance_m - before == pytest.approx(100 * 0.02 * 0.25, rel=1e-6)
+    # An empty path halts it.
+    world.follow(np.empty((0, 2)))
+    assert world.activity is Activity.IDLE
+    ticks(world, 50)
+    halted = world.pose
+    ticks(world, 50)
+    assert world.pose == halted
 
 
 def test_a_new_path_that_turns_off_behind_is_fetched():
@@ -145,19 +152,6 @@ def test_a_path_that_starts_metres_behind_is_joined_at_the_robot():
     assert world.track[driven:, 0].min() > x - 0.1, "it does not turn back"
     assert world.activity is Activity.IDLE
     assert (world.pose.x, world.pose.y) == pytest.approx((7.0, 1.0), abs=0.01)
-
-
-def test_an_empty_path_halts():
-    world = started(building(8, 4), Pose2D(1.0, 1.0))
-    world.follow(centres(*[(2, col) for col in range(2, 18)]))
-    run(world, 300)
-    world.follow(np.empty((0, 2)))
-    assert world.activity is Activity.IDLE
-    ticks(world, 50)
-    halted = world.pose
-    ticks(world, 50)
-    assert world.pose == halted
-    assert world.pose.x < 3.0
 
 
 def test_without_a_clear_way_it_waits_with_that_activity():

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from fasaco_edge.client.robot_state import Token
-from fasaco_edge.watch.glyphs import Blocks, GlyphSet
+from fasaco_edge.watch.glyphs import GlyphSet, ScreenBlocks
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL, RobotView
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -225,7 +225,7 @@ def test_no_number_that_a_status_may_have_ends_the_page():
 
 
 def test_a_block_says_how_many_rows_have_no_place():
-    blocks = Blocks(Console(file=io.StringIO(), width=40))
+    blocks = ScreenBlocks(Console(file=io.StringIO(), width=40))
     lines = [line.strip() for line in blocks.block(Text("a\nb\nc\nd"), 40, 3)]
     assert lines == ["a", "b", "2 more rows: enlarge the terminal"]
     assert [line.strip() for line in blocks.block(Text("a\nb"), 40, 3)] == ["a", "b", ""]

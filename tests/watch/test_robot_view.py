@@ -10,7 +10,7 @@ import pytest
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.feed import SUBSCRIBED
 from fasaco_edge.client.phrases import KEPT, EventLog
-from fasaco_edge.client.robot_state import PathProgress
+from fasaco_edge.client.robot_state import WatchedPath
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch
 from fasaco_edge.watch.picture import RobotView
@@ -35,24 +35,22 @@ def test_the_path_ahead_begins_at_the_robot():
     assert view.path_ahead[1].tolist() == [2.75, 1.25]
 
 
-def test_a_path_that_passes_a_place_again_is_not_cut_there():
-    out = [(float(step), 0.0) for step in range(20)]
-    walk = PathProgress(np.array(out + out[::-1]))
-    for x, _ in out[:6]:
-        walk.passed(Pose2D(x, 0.1))
-    assert walk.at == 5
-
-
 def test_progress_on_a_long_piece_is_between_its_points():
     """As of a way home, whose end is nearer to the robot than its next corner."""
-    walk = PathProgress([(0.0, 0.0), (0.0, 5.0), (1.0, 5.0), (1.0, 2.0), (0.6, 2.0)])
+    walk = WatchedPath([(0.0, 0.0), (0.0, 5.0), (1.0, 5.0), (1.0, 2.0), (0.6, 2.0)])
     walk.passed(Pose2D(0.05, 1.5))
     assert (walk.at, walk.beyond_m) == (0, 1.5)
     walk.passed(Pose2D(0.05, 4.0))
     assert (walk.at, walk.beyond_m) == (0, 4.0)
     walk.passed(Pose2D(1.0, 5.0))
     assert (walk.at, walk.beyond_m) == (2, 0.0)
-    later = PathProgress(walk.xy)
+    # A path that passes a place again is not cut there.
+    out = [(float(step), 0.0) for step in range(20)]
+    again = WatchedPath(np.array(out + out[::-1]))
+    for x, _ in out[:6]:
+        again.passed(Pose2D(x, 0.1))
+    assert again.at == 5
+    later = WatchedPath(walk.xy)
     later.join(Pose2D(1.0, 3.0))
     assert (later.at, later.beyond_m) == (2, 2.0)
 

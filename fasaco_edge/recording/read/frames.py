@@ -183,7 +183,6 @@ def _unpacked(message: Fields) -> pa.Buffer:
 
 
 def _batch(content: pa.Buffer) -> pa.RecordBatch:
-    """Return the batch of rows in an Arrow stream."""
     messages = pa.ipc.MessageReader.open_stream(content)
     schema = pa.ipc.read_schema(messages.read_next_message())
     rows = messages.read_next_message()

@@ -120,7 +120,6 @@ def _batches_of(chunk: Chunk, path: Path) -> list[SampleBatch]:
 
 
 def _no_samples(paths: Sequence[Path]) -> UnreadableRecording:
-    """Return the error of files that hold no samples."""
     files = ", ".join(str(path) for path in paths)
     if any(map(is_fleet_recording, paths)):
         return UnreadableRecording(

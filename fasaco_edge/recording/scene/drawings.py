@@ -76,7 +76,6 @@ class PathDrawing:
         self._writer.log(entities.PATH_LOG, log_line)
 
     def _draw_window(self, about: PathAttachment, anchor: Anchor) -> None:
-        """Draw the changed part of the map that caused the path, if any."""
         if about.changed is not None:
             x0, y0, x1, y1 = np.subtract(astuple(about.changed), anchor.xy * 2).tolist()
             box = draw.box_archetype((x0, y0, x1, y1), draw.WINDOW)

@@ -203,7 +203,6 @@ class Scene:
         self._layers.draw(entity, in_file, log, self._writer.wall_ns)
 
     def _comes_again(self, entity: str, about: object, pixels: NDArray[np.generic]) -> bool:
-        """Return whether the newest grid of an entity equals the grid before it."""
         before, newest = self._drawn.get(entity), (about, hash(pixels.tobytes()))
         self._drawn[entity] = newest
         return before == newest

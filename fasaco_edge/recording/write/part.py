@@ -44,7 +44,7 @@ class Flush(enum.Enum):
     """Rerun's writer has closed the file after an error."""
 
 
-class Part:
+class RecordingPart:
     """A file being written.
 
     Rerun's logging calls never fail: only ``flush`` shows whether the data were written.

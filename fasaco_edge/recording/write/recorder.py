@@ -158,7 +158,6 @@ class RobotRecorder(BusRecorder):
         self.writer.sync(now_ns)
 
     def _write(self, arrival: Arrival, *, is_drawn: bool = True) -> None:
-        """Write a sample as an input for a replay; draw it if ``is_drawn``."""
         self._messages += 1
         self.writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):

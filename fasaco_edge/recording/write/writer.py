@@ -14,7 +14,7 @@ import numpy as np
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
-from fasaco_edge.recording.write.part import Flush, Part, send_blueprint, sweep
+from fasaco_edge.recording.write.part import Flush, RecordingPart, send_blueprint, sweep
 from fasaco_edge.recording.write.quota import DiskBudget, cannot_record
 
 LOG = logging.getLogger(__name__)
@@ -72,9 +72,9 @@ class RecordingWriter:
         self._latched: dict[str, rr.AsComponents] = {}
         self._missed_ns: dict[str, int] = {}
         self.wall_ns = 0
-        self._part: Part | None = None
+        self._part: RecordingPart | None = None
         self._parts = 0
-        self._abandoned: list[Part] = []
+        self._abandoned: list[RecordingPart] = []
         self._next_flush_ns = 0
         self._part_until_ns: int | None = None
         self._unflushed_messages = 0
@@ -222,7 +222,7 @@ class RecordingWriter:
             return None
         return self._part.stream
 
-    def _is_flushed(self, part: Part) -> bool:
+    def _is_flushed(self, part: RecordingPart) -> bool:
         stalled = self.state is WriterState.STALLED
         outcome = part.flush(PROBE_TIMEOUT_S if stalled else FLUSH_TIMEOUT_S)
         if outcome is Flush.STALLED:
@@ -237,7 +237,7 @@ class RecordingWriter:
             self._send_latched(part.stream)
         return True
 
-    def _check_space(self, part: Part, now_ns: int) -> None:
+    def _check_space(self, part: RecordingPart, now_ns: int) -> None:
         if self._part_until_ns is None:
             # Once per part is enough, as the quota leaves space for a whole part.
             self._budget.keep_quota(self._folder)
@@ -270,7 +270,7 @@ class RecordingWriter:
             if not self._abandoned:
                 sweep()
 
-    def _give_up(self, part: Part) -> None:
+    def _give_up(self, part: RecordingPart) -> None:
         part.abandon()
         self._abandoned.append(part)
         self._part = None
@@ -295,7 +295,7 @@ class RecordingWriter:
     def _begin_part(self) -> None:
         number = self._parts + 1
         path = self._folder / f"{self._recording_id}-part{number}.rrd"
-        part = Part(path, self._recording_id)
+        part = RecordingPart(path, self._recording_id)
         self._parts = number
         if part.refused:
             part.abandon()

@@ -16,12 +16,12 @@ from fasaco_edge.drawing.pictures import (
     draw_order,
     draw_unswept,
 )
-from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
+from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.floor import outlined
-from fasaco_edge.review.instant import Scene
+from fasaco_edge.review.instant import InstantPicture
 from fasaco_edge.review.moments import refused_by_code
 from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.output.answers import instant_rows, spot_rows
@@ -83,20 +83,20 @@ AROUND_S = 10.0
 HEADING_M = 0.3
 
 
-def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
+def draw_instant(review: Review, shown: InstantPicture) -> Image.Image | None:
     """Return the map at one moment with paths, driven track and robot; None without a map."""
-    grid, lattice, instant, data = scene.grid, review.lattice, scene.instant, review.data
+    grid, lattice, instant, data = shown.grid, review.lattice, shown.instant, review.data
     if grid is None or lattice is None:
         return None
     near = np.flatnonzero(np.abs(data.times - instant.at_s) <= AROUND_S)
     drive, driven = _thinned(data, slice(near[0], near[-1] + 1) if len(near) else slice(0))
-    plot = Plot(View.over(bounds_of(grid, lattice, drive), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(grid, lattice, drive), lattice.cell_m))
     plot.ground(grid)
     key = draw_order(plot, data.zones, data.keep_out)
     for line, colour, width, label in (
-        (scene.before, palette.RULE, 4.0, "path before"),
-        (scene.line, palette.PURPLE, 3.0, "path in force"),
-        (scene.after, palette.SKY, 1.5, "path after"),
+        (shown.before, palette.RULE, 4.0, "path before"),
+        (shown.line, palette.PURPLE, 3.0, "path in force"),
+        (shown.after, palette.SKY, 1.5, "path after"),
     ):
         if line is not None and len(line.xy):
             plot.line(line.xy, colour, width)
@@ -125,7 +125,7 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     if data.grid is None or lattice is None or not spots:
         return None
     drive, driven = _thinned(data)
-    plot = Plot(View.over(bounds_of(data.grid, lattice, drive), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(data.grid, lattice, drive), lattice.cell_m))
     plot.ground(data.grid)
     key = []
     if review.floor is not None:

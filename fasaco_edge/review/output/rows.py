@@ -164,7 +164,6 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
 
 
 def _shares(document: ReviewDocument) -> str:
-    """Return the swept share of each room, in ascending order."""
     known = sorted((room.share, room.title) for room in document.rooms if room.share is not None)
     return ", ".join(f"{title} {percent(share)}" for share, title in known)
 
@@ -218,7 +217,6 @@ def _swept(review: Review, document: ReviewDocument) -> str:
 
 
 def _by_others(document: ReviewDocument) -> str:
-    """Return how much floor other robots of a fleet swept; "" for a robot alone."""
     if not in_fleet(document):
         return ""
     if document.swept_by_others_m2 is None:
