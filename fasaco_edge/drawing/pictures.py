@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.floor import ENDS, draw_visits, number_rooms, paint_rooms, visits_of
 from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
+from fasaco_edge.drawing.tints import ENDS, draw_visits, number_rooms, paint_rooms, visits_of
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.grid.lattice import CoverageLattice

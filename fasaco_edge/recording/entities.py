@@ -40,7 +40,7 @@ END: Final = "world/trail/end"
 
 LATENCY: Final = "metrics/latency"
 COVERED_FRACTION: Final = "metrics/coverage/of_order"
-RECOVERED_FRACTION: Final = "metrics/coverage/recovered"
+REVISITED_FRACTION: Final = "metrics/coverage/recovered"
 SAVED: Final = "metrics/saved"
 SAVED_BY_ANTS: Final = "metrics/saved/ants"
 SAVED_BY_LOCAL_SEARCH: Final = "metrics/saved/local_search"

@@ -10,7 +10,7 @@ import msgspec
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.floor import MILESTONES
+from fasaco_edge.review.floor_and_rooms import MILESTONES
 
 # Differences that make floor, cells and times incomparable.
 ANOTHER_PROBLEM = (

@@ -13,7 +13,7 @@ from fasaco_edge.text import percent
 
 if TYPE_CHECKING:
     from fasaco_edge.recording.read.run import PartFile
-    from fasaco_edge.review.floor import RoomChapter
+    from fasaco_edge.review.floor_and_rooms import RoomChapter
     from fasaco_edge.review.moments import Stand
     from fasaco_edge.review.orders import CommandThen, OrderChapter
     from fasaco_edge.review.spot import LeftPatch

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
+from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.recording.read.timeline import DrawnLine, lines_in, read_drawings
-from fasaco_edge.review.floor import nearest_points
+from fasaco_edge.review.floor_and_rooms import nearest_points
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.path_documents import Rectangle
@@ -223,7 +223,7 @@ def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapTh
     since_s = max(at_s - MAP_S, 0.0)
     old: OccupancyGrid | None = None
     new: OccupancyGrid | None = None
-    for came_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
+    for came_s, grid in maps_of(record):
         if came_s > at_s:
             break
         new = grid

@@ -87,16 +87,12 @@ def troubles_at_rest(statuses: Sequence[StatusSample], end_s: float) -> list[Spa
     return [*found, *lasting.values()]
 
 
-def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
-    """Return the periods of each mission, from its first plan to its end, pauses included."""
-    runs = [list(run) for rests, run in groupby(states, lambda s: s.name in AT_REST) if not rests]
-    return tuple(Span("under way", run[0].begin_s, run[-1].end_s) for run in runs)
-
-
 def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
     """Return the longest standstill during a mission; None without any."""
-    found = [stand for during in under_way(states) if (stand := _stand(data, during))]
-    longest = max(found, key=lambda stand: stand[1], default=None)
+    # A mission lasts from its first plan to its end, pauses included.
+    runs = [list(run) for rests, run in groupby(states, lambda s: s.name in AT_REST) if not rests]
+    found = [_stand(data, run[0].begin_s, run[-1].end_s) for run in runs]
+    longest = max(filter(None, found), key=lambda stand: stand[1], default=None)
     if longest is None:
         return None
     since, seconds, x, y = (round(value, 3) for value in longest)
@@ -104,9 +100,9 @@ def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
     return Stand(since, seconds, x, y, list(dict.fromkeys(meanwhile)))
 
 
-def _stand(data: RunData, during: Span) -> tuple[float, float, float, float] | None:
+def _stand(data: RunData, begin_s: float, end_s: float) -> tuple[float, float, float, float] | None:
     """Return begin, length [s], x, y [m] of the longest standstill; None without a pose."""
-    chosen = (data.times >= during.begin_s) & (data.times <= during.end_s)
+    chosen = (data.times >= begin_s) & (data.times <= end_s)
     times, poses = data.times[chosen].tolist(), data.track[chosen].tolist()
     if not times:
         return None

@@ -25,7 +25,7 @@ from fasaco_edge.recording.read.run import (
     read_run_record,
 )
 from fasaco_edge.recording.scene.runcard import cells_of
-from fasaco_edge.review.floor import (
+from fasaco_edge.review.floor_and_rooms import (
     MILESTONES,
     RoomChapter,
     labels_of,

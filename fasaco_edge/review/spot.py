@@ -32,9 +32,8 @@ from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.core.events import BETTER
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.read.timeline import DrawnLine, lines_in, read_drawings
-from fasaco_edge.review.floor import nearest_points, swept_floor
+from fasaco_edge.review.floor_and_rooms import nearest_points, swept_floor
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.reasons import plain
@@ -133,10 +132,10 @@ class _Judge:
     @cached_property
     def _seen_s(self) -> NDArray[np.float64]:
         """Beginning of the last period in which each position is free on the map [s]; else NaN."""
-        record, footprint = self._review.record, self._review.data.footprint
+        footprint = self._data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
         since = np.full(len(self._places), np.nan)
-        for at_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
+        for at_s, grid in maps_of(self._review.record):
             free = (grid.cells >= FREE) & (grid.cells <= free_at_most)
             is_free = grid.geometry.values_at(free, self._places)
             since = np.where(is_free, np.fmin(since, at_s), np.nan)

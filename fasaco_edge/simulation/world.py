@@ -181,7 +181,11 @@ class World:
         """Let one time step pass; return the messages published after it."""
         self._move()
         self._ticks += 1
-        self._count_stand()
+        if self.drive.moving:
+            stood_s = self._stands * self.config.tick_s
+            self._stands, self.longest_stand_s = 0, max(self.longest_stand_s, stood_s)
+        elif self.distance_m > 0.0:
+            self._stands += 1
         self._drain()
         if self._is_due(self.config.scan_hz):
             self.mapper.scan(self.pose)
@@ -326,14 +330,6 @@ class World:
                 self._track.append(here)
             self.distance_m += abs(ahead.speed) * self.config.tick_s
             self.drive = ahead
-
-    def _count_stand(self) -> None:
-        """Count how long the robot stands, once it has moved."""
-        if self.drive.moving:
-            stood_s = self._stands * self.config.tick_s
-            self._stands, self.longest_stand_s = 0, max(self.longest_stand_s, stood_s)
-        elif self.distance_m > 0.0:
-            self._stands += 1
 
 
 def _fits(truth: OccupancyGrid, pose: Pose2D, config: SimulationConfig) -> bool:

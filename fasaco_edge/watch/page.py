@@ -23,7 +23,7 @@ from fasaco_edge.wire.documents.json_text import decode_json
 
 LEGEND = (
     (picture.COVERED, "covered"),
-    (picture.RECOVERED, "twice"),
+    (picture.REVISITED, "twice"),
     (picture.TO_COVER, "to cover"),
     (picture.FLOOR, "not to cover"),
     (picture.WALL, "wall"),

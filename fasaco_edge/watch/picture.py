@@ -146,7 +146,7 @@ class Frame:
 
 
 # If several kinds share a character of a terminal without colours, the largest number is shown.
-UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED, WALL, AHEAD, NEXT, ROBOT = range(9)
+UNKNOWN, FLOOR, TO_COVER, COVERED, REVISITED, WALL, AHEAD, NEXT, ROBOT = range(9)
 HEADING = ROBOT + 1
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
 EIGHTHS = 8
@@ -253,7 +253,7 @@ _MAP_KINDS[OCCUPIED_AT_LEAST : 100 + 1] = WALL
 _COVERAGE_KINDS = np.full(256, UNKNOWN, np.uint8)
 _COVERAGE_KINDS[CoverageValue.TO_COVER] = TO_COVER
 _COVERAGE_KINDS[CoverageValue.COVERED] = COVERED
-_COVERAGE_KINDS[CoverageValue.RECOVERED] = RECOVERED
+_COVERAGE_KINDS[CoverageValue.RECOVERED] = REVISITED
 _COVERAGE_AND_BLOCKED_KINDS = _COVERAGE_KINDS.copy()
 _COVERAGE_AND_BLOCKED_KINDS[CoverageValue.BLOCKED] = WALL
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.floor import draw_visits, visits_of
 from fasaco_edge.drawing.pictures import draw_driven
 from fasaco_edge.drawing.plot import Plot, PlotView
 from fasaco_edge.drawing.sheet import LINE_PX, TEXT_PX, KeyEntry, Sheet, font_of, wrapped
+from fasaco_edge.drawing.tints import draw_visits, visits_of
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
@@ -63,7 +63,7 @@ def _key(walks: Sequence[LabelledWalk]) -> tuple[KeyEntry, ...]:
         KeyEntry("tile", palette.COVERED, "covered once"),
         *(
             KeyEntry("tile", colour, times)
-            for colour, times in zip(palette.RECOVERED, TIMES, strict=True)
+            for colour, times in zip(palette.REVISITED, TIMES, strict=True)
         ),
     )
 

@@ -124,7 +124,7 @@ def test_revisited_missed_and_unreachable_cells_look_different():
     walk = line((0, 0), (0, 4), (0, 0), (2, 0))
     picture = draw_walk(lattice, walk, grid=None, title="", lines=[])
     area = drawing_area(picture)
-    again = relative(places(picture, palette.RECOVERED[0]), area)
+    again = relative(places(picture, palette.REVISITED[0]), area)
     left_out = relative(places(picture, palette.LEFT_OUT), area)
     unreachable = relative(places(picture, palette.UNREACHABLE), area)
     assert again[0] < left_out[0] + 0.1 < unreachable[0]
@@ -159,7 +159,7 @@ def test_a_mission_shows_visits_trail_start_and_end():
     assert (x, y) == pytest.approx((1.25 / 7, 1.25 / 5), abs=0.02)
     x, y = relative(places(picture, palette.END), area)
     assert (x, y) == pytest.approx((2.8 / 7, 3.7 / 5), abs=0.02)
-    x, y = relative(places(picture, palette.RECOVERED[-1]), area)
+    x, y = relative(places(picture, palette.REVISITED[-1]), area)
     assert (x, y) == pytest.approx((5.75 / 7, 3.75 / 5), abs=0.03)
     x, y = relative(places(picture, palette.COVERED, 1), area)
     assert (x, y) == pytest.approx((2.75 / 7, 1.25 / 5), abs=0.03)

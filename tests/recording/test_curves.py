@@ -7,7 +7,7 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.curves import PERIOD_NS, Curves
+from fasaco_edge.recording.scene.status_curves import PERIOD_NS, Curves
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import RecordingWriter
 from tests.support.recordings import SCALAR, read_column

@@ -22,8 +22,8 @@ from rerun.chunk import RrdReader
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import MOST_CHUNK_BYTES, chunks
-from fasaco_edge.recording.read.repair import FRAME, HEADER_BYTES, scan_recording
 from fasaco_edge.recording.read.run import RecordedSamples
+from fasaco_edge.recording.read.torn import FRAME, HEADER_BYTES, scan_recording
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.part import RecordingPart
 from fasaco_edge.review.review import read_review

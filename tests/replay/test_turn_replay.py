@@ -24,7 +24,7 @@ from fasaco_edge.mission.map.room_watch import update
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, inflated_sample, read_turns
 from fasaco_edge.replay.replay import read_run
-from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.turns import EarlySample, decode_turns

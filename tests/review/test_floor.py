@@ -11,7 +11,7 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.floor import swept_floor
+from fasaco_edge.review.floor_and_rooms import swept_floor
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
 from fasaco_edge.wire.documents.status import Status

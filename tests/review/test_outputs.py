@@ -25,7 +25,7 @@ from fasaco_edge.cli.review.screen import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.figures import FLOOR, document_of
+from fasaco_edge.review.conversion import FLOOR, document_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.output import pictures
 from fasaco_edge.review.output.export import export
@@ -57,13 +57,13 @@ def review(parts):
 def test_a_line_over_the_floor_is_drawn_by_what_it_sweeps(review):
     """Its track passes beside the centres of cells that the daemon counts as covered."""
     cells = {colour for _, colour in draw_review([review]).getcolors(maxcolors=1 << 20)}
-    assert {palette.OCCUPIED, palette.COVERED, palette.RECOVERED[0], palette.START} <= cells
+    assert {palette.OCCUPIED, palette.COVERED, palette.REVISITED[0], palette.START} <= cells
     assert palette.UNSWEPT in cells
     config = {**review.data.config, "planner": {"line": "thorough"}}
     line = replace(review, data=replace(review.data, config=config))
     colours = {colour for _, colour in draw_review([line]).getcolors(maxcolors=1 << 20)}
     assert {palette.COVERED, palette.UNSWEPT} <= colours
-    assert not {palette.LEFT_OUT, *palette.RECOVERED} & colours
+    assert not {palette.LEFT_OUT, *palette.REVISITED} & colours
 
 
 def test_floor_that_others_of_its_fleet_swept_is_not_left(review):

@@ -16,7 +16,7 @@ from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns
 from fasaco_edge.recording.read.frames import recording_id
 from fasaco_edge.review.comparison import side_by_side
-from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire import topics

@@ -18,8 +18,8 @@ from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.floor import swept_floor
+from fasaco_edge.review.conversion import document_of
+from fasaco_edge.review.floor_and_rooms import swept_floor
 from fasaco_edge.review.instant import instant_at
 from fasaco_edge.review.output.answers import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots

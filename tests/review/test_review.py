@@ -12,7 +12,7 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.errors import UnreadableRecording
-from fasaco_edge.review.figures import _used
+from fasaco_edge.review.conversion import _used
 from fasaco_edge.review.review import read_review
 from tests.review.naive import passed_cells
 from tests.support.processes import fasaco_edge

@@ -24,7 +24,7 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import scan_recording
+from fasaco_edge.recording.read.torn import scan_recording
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 
@@ -213,7 +213,7 @@ def read_summary(path: Path) -> RecordingSummary:
         ended_ns=int(np.max(spans)) if spans else 0,
         complete=scan is not None and scan.has_footer,
         covered=_last_scalar(path, entities.COVERED_FRACTION),
-        recovered=_last_scalar(path, entities.RECOVERED_FRACTION),
+        recovered=_last_scalar(path, entities.REVISITED_FRACTION),
         paths=_texts(path, entities.PATH_LOG, TEXT),
         states=_texts(path, entities.MISSION_STATE, STATE),
     )

@@ -17,7 +17,7 @@ from fasaco_edge.watch.picture import (
     FLOOR,
     HEADING,
     NEXT,
-    RECOVERED,
+    REVISITED,
     ROBOT,
     TO_COVER,
     UNKNOWN,
@@ -55,13 +55,13 @@ def test_coverage_tints_the_floor_and_nothing_else():
     coverage = grid_of([[50, 75, 0, 100], [-1, 100, 50, 0]])
     assert picture.ground(frame, grid, coverage).tolist() == [
         [FLOOR, FLOOR, UNKNOWN, TO_COVER],
-        [COVERED, RECOVERED, TO_COVER, WALL],
+        [COVERED, REVISITED, TO_COVER, WALL],
     ]
     # Without a map the coverage stands alone.
     coverage = grid_of([[50, 75, 0, 100], [-1, -1, -1, 0]])
     assert picture.ground(frame, None, coverage).tolist() == [
         [UNKNOWN, UNKNOWN, UNKNOWN, TO_COVER],
-        [COVERED, RECOVERED, TO_COVER, WALL],
+        [COVERED, REVISITED, TO_COVER, WALL],
     ]
     # A map turned by a quarter counter-clockwise: its columns run north.
     turned = grid_of([[100, 0]], yaw=math.pi / 2, x=1.0)

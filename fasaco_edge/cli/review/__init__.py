@@ -18,7 +18,7 @@ from fasaco_edge.cli.console.arguments import (
 )
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording.read.repair import open_part
+from fasaco_edge.recording.read.torn import open_part
 from fasaco_edge.review.document import explanations
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
 
     from fasaco_edge.cli.review.screen import print_comparison, print_review
     from fasaco_edge.review.comparison import side_by_side
-    from fasaco_edge.review.figures import document_of
+    from fasaco_edge.review.conversion import document_of
 
     review = _read(args.recordings, "recording")
     if args.at is not None or args.point:

@@ -1,6 +1,6 @@
 """The chunks of a recording, read without Rerun, whose import takes 0.3 s of processor time.
 
-A chunk is a compressed Arrow message in a Protobuf message in a frame (``recording.read.repair``).
+A chunk is a compressed Arrow message in a Protobuf message in a frame (``recording.read.torn``).
 Each message states the size of the message inside. This reader checks the size before it allocates
 memory; Rerun's allocates first, and aborts the process if memory is short or a message is
 malformed. The footer, an index, is not read.
@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from fasaco_edge.errors import MissingExtra
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, open_part
+from fasaco_edge.recording.read.torn import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, open_part
 
 
 def missing_rerun(error: ImportError) -> MissingExtra:

@@ -28,8 +28,8 @@ from fasaco_edge.recording.read.frames import (
     recording_id,
     wall_ns,
 )
-from fasaco_edge.recording.read.repair import HINT, open_part
 from fasaco_edge.recording.read.robot_clock import RobotClock
+from fasaco_edge.recording.read.torn import HINT, open_part
 from fasaco_edge.samples import BatchPlace, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"

@@ -19,7 +19,6 @@ from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import BROKEN, chunk_at, column, pa, wall_ns
-from fasaco_edge.recording.read.repair import open_part
 from fasaco_edge.recording.read.robot_clock import RobotClock, known_of, poses_of
 from fasaco_edge.recording.read.run import (
     PLACE,
@@ -30,6 +29,7 @@ from fasaco_edge.recording.read.run import (
     RecordedSamples,
     read_run_record,
 )
+from fasaco_edge.recording.read.torn import open_part
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST
 
 _STRIPS = pa.list_(pa.list_(pa.field("item", POINT, nullable=False)))

@@ -25,7 +25,7 @@ Colour = tuple[int, int, int]
 ROBOT_COLOUR: Colour = (220, 38, 38)
 HEADING_COLOUR: Colour = (250, 204, 21)
 COVERED_COLOUR: Colour = (56, 152, 222)
-RECOVERED_COLOUR: Colour = (245, 140, 40)
+REVISITED_COLOUR: Colour = (245, 140, 40)
 SWEPT_COLOUR: Colour = (45, 212, 191)
 LABEL_COLOUR: Colour = (255, 255, 255)
 # Bright colours: the labels have them, too, on a dark background.

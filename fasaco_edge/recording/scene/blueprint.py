@@ -61,7 +61,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         origin=f"/{entities.WORLD}",
         name="Map, swept floor, track and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**"],
-        eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
+        eye_controls=eye_above(bounds, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
         overrides={entities.DRIVEN_PATH: up_to_cursor()},
@@ -78,7 +78,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
             f"/{entities.PATH}",
             f"/{entities.ROBOT}/**",
         ],
-        eye_controls=eye_above(bounds, MARGIN, PHEROMONE_ASPECT),
+        eye_controls=eye_above(bounds, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
         overrides={entities.PATH: thin_path},
@@ -138,12 +138,12 @@ def log_view() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/log", name="Log", columns=columns, rows=rows)
 
 
-def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D:
+def eye_above(bounds: Bounds, aspect: float) -> rrb.EyeControls3D:
     """Return a camera that looks down on ``bounds``, in a view of width / height ``aspect``."""
     x0, y0, x1, y1 = bounds
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     reach = max((y1 - y0) / 2, (x1 - x0) / 2 / aspect, 0.5)
-    height = margin * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
+    height = MARGIN * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         # Exactly straight down, the camera's up axis would be undefined.

@@ -17,16 +17,16 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.curves import COUNT_SPACING_NS, NOISE, Curves
 from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
 from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
 from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
+from fasaco_edge.recording.scene.status_curves import COUNT_SPACING_NS, NOISE, Curves
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
-from fasaco_edge.wire.documents.status import ErrorCounts, Recorder, Status
+from fasaco_edge.wire.documents.status import Recorder, Status
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 from fasaco_edge.wire.reasons import plain
@@ -147,13 +147,20 @@ class Scene:
         self._curves.add_status(status)
         self._outcome.add_status(status)
         self._add_configuration(status)
-        self._add_restored(status.ledger.restored_cells)
+        if (restored := status.ledger.restored_cells) != self._restored:
+            self._restored = restored
+            self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
         self._areas.add_report(status.mission)
         self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
         for text, tone in trouble_changes(self._status, status):
             self.add_line(entities.MISSION_LOG, text, "WARN" if tone == BAD else "INFO")
         self._status = status
-        self._add_errors(status.errors)
+        errors = status.errors
+        # The count falls when the planner restarts.
+        if errors.total > self._errors:
+            last = errors.last or "no text"
+            self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
+        self._errors = errors.total
 
     def add_report(self, report: Recorder) -> None:
         """Show the recorder's own state and memory."""
@@ -251,15 +258,3 @@ class Scene:
         body, heading = draw.body_archetypes(radius_m)
         self._writer.log_static(entities.ROBOT_BODY, body)
         self._writer.log_static(entities.ROBOT_HEADING, heading)
-
-    def _add_restored(self, restored: int) -> None:
-        if restored != self._restored:
-            self._restored = restored
-            self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
-
-    def _add_errors(self, errors: ErrorCounts) -> None:
-        # The count falls when the planner restarts.
-        if errors.total > self._errors:
-            last = errors.last or "no text"
-            self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
-        self._errors = errors.total

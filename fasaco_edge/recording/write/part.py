@@ -22,7 +22,7 @@ import rerun_bindings as bindings
 
 from fasaco_edge.host.files import open_own
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import repair_recording, scan_recording
+from fasaco_edge.recording.read.torn import repair_recording, scan_recording
 from fasaco_edge.recording.sdk import rr, rrb
 
 LOG = logging.getLogger(__name__)
@@ -61,7 +61,8 @@ class RecordingPart:
         self.refused = ""
         self._flushed_bytes = 0
         # The lock keeps other recorders from repairing the part.
-        self._lock = _locked(path)
+        self._lock = open_own(path, os.O_RDONLY | os.O_NONBLOCK)
+        fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self.stream = rr.RecordingStream(
             entities.APPLICATION,
             recording_id=recording_id,
@@ -192,12 +193,6 @@ def _is_same_file(descriptor: int, file: os.stat_result) -> bool:
         return os.path.samestat(os.fstat(descriptor), file)
     except OSError:
         return False  # closed since it was listed
-
-
-def _locked(path: Path) -> int:
-    lock = open_own(path, os.O_RDONLY | os.O_NONBLOCK)
-    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    return lock
 
 
 def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:

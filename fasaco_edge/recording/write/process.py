@@ -28,7 +28,7 @@ from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.host.processes import release_unused, return_soon, stop_event
-from fasaco_edge.recording.read.repair import repair_folder
+from fasaco_edge.recording.read.torn import repair_folder
 from fasaco_edge.recording.sdk import rrb
 from fasaco_edge.recording.write.quota import DiskBudget, cannot_record, next_run
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -110,7 +110,10 @@ class SampleQueue:
             # The lock is held: samples of several threads get increasing times.
             arrival = self._stamp(topic, sample)
             if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
-                self._drop(SUPERSEDED.get(arrival.topic, frozenset()))
+                topics = SUPERSEDED.get(arrival.topic, frozenset())
+                self._lost.update(one.topic for one in self._waiting if one.topic in topics)
+                self._waiting = deque(one for one in self._waiting if one.topic not in topics)
+                self._bytes = sum(one.sample.size for one in self._waiting)
             if self._bytes + size > self._capacity:
                 self._lost[arrival.topic] += 1
                 return
@@ -133,12 +136,6 @@ class SampleQueue:
         """Number of lost samples of each topic."""
         with self._changed:
             return self._lost.copy()
-
-    def _drop(self, topics: frozenset[str]) -> None:
-        self._lost.update(arrival.topic for arrival in self._waiting if arrival.topic in topics)
-        kept = deque(arrival for arrival in self._waiting if arrival.topic not in topics)
-        self._bytes = sum(arrival.sample.size for arrival in kept)
-        self._waiting = kept
 
 
 class BusRecorder(ABC):

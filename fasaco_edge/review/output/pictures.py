@@ -20,7 +20,7 @@ from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.floor import outlined
+from fasaco_edge.review.floor_and_rooms import outlined
 from fasaco_edge.review.instant import InstantPicture
 from fasaco_edge.review.moments import refused_by_code
 from fasaco_edge.review.orders import ordered_words
@@ -31,7 +31,7 @@ from fasaco_edge.review.spot import Spot
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.settings import known_settings
 
-TRAIL_SPACING_M = 0.02
+TRACK_SPACING_M = 0.02
 # Width of a driven track drawn together with lines of paths [m].
 DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
@@ -188,7 +188,7 @@ def _thinned(
     if len(track) > 2:
         ways = np.hypot(*np.diff(track, axis=0).T)
         way = np.concatenate(([0.0], np.cumsum(ways)))
-        kept = np.diff(np.floor(way / TRAIL_SPACING_M), prepend=-1.0) > 0
+        kept = np.diff(np.floor(way / TRACK_SPACING_M), prepend=-1.0) > 0
         kept[-1] = True
         # Keep the point before each gap, too.
         kept[:-1] |= np.diff(gaps) > 0

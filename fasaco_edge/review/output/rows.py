@@ -12,7 +12,7 @@ from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import NOT_KNOWN, amount, count, figures, floor_words
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.floor import MILESTONES, room_at
+from fasaco_edge.review.floor_and_rooms import MILESTONES, room_at
 from fasaco_edge.review.orders import order_words, ordered_words
 from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import percent

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
-from fasaco_edge.drawing.floor import number_rooms, paint_rooms
 from fasaco_edge.drawing.plot import Plot, PlotView
+from fasaco_edge.drawing.tints import number_rooms, paint_rooms
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
 from tests.benchmarks.harness import add_floors
 from tests.benchmarks.rooms.homes import KINDS, RESOLUTION_M, home, seen

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from msgspec.structs import asdict
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
+from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, REVISITED_COLOUR, Colour
 from fasaco_edge.recording.scene.runcard import cells_of
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -28,7 +28,7 @@ BATTERY_NOISE = 0.02
 # Entity, name in the legend, colour of each curve in a plot.
 CURVES: tuple[tuple[str, str, Colour], ...] = (
     (entities.COVERED_FRACTION, "covered", COVERED_COLOUR),
-    (entities.RECOVERED_FRACTION, "again", RECOVERED_COLOUR),
+    (entities.REVISITED_FRACTION, "again", REVISITED_COLOUR),
     (f"{entities.LATENCY}/ingest", "map in", (56, 152, 222)),
     (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
@@ -123,7 +123,7 @@ class Curves:
             self.draw(entities.COVERED_FRACTION, share, spacing_ns=SHARE_SPACING_NS)
         if counts is not None and counts.coverable:
             again = counts.recovered / counts.coverable
-            self.draw(entities.RECOVERED_FRACTION, again, spacing_ns=SHARE_SPACING_NS)
+            self.draw(entities.REVISITED_FRACTION, again, spacing_ns=SHARE_SPACING_NS)
         if status.path is not None and status.path.line_gap is not None:
             self.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.recording.read.repair import (
+from fasaco_edge.recording.read.torn import (
     HEADER_BYTES,
     MOST_ZEROS,
     Scan,
