@@ -18,25 +18,19 @@ from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms
 
-
-def draw_swept(plot: Plot, swept: MapLayer, words: str) -> list[KeyEntry]:
-    """Paint the swept floor; return the legend entries of its colour and of a line's marks."""
-    plot.paint(swept, palette.COVERED)
-    return [*ENDS, KeyEntry("tile", palette.COVERED, f"{words} ({swept.area_m2:,.1f} m2)")]
+UNSWEPT = palette.UNSWEPT, "reachable floor not swept"
+BY_OTHERS = palette.BY_OTHERS, "swept by other robots of its fleet"
+"""Colour and label of floor."""
 
 
-def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
-    """Paint unswept reachable floor; return its legend entry."""
-    plot.paint(unswept, palette.UNSWEPT)
-    label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
-    return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
-
-
-def draw_by_others(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
-    """Paint floor that other robots swept; return its legend entry."""
-    plot.paint(swept, palette.BY_OTHERS)
-    label = f"swept by other robots of its fleet ({swept.area_m2:,.1f} m2)"
-    return [KeyEntry("tile", palette.BY_OTHERS, label)]
+def draw_floor(
+    plot: Plot, floor: MapLayer | None, colour: palette.Colour, label: str
+) -> list[KeyEntry]:
+    """Paint floor; return its legend entry, none without any floor."""
+    if floor is None or not floor.mask.any():
+        return []
+    plot.paint(floor, colour)
+    return [KeyEntry("tile", colour, f"{label} ({floor.area_m2:,.1f} m2)")]
 
 
 def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
@@ -151,10 +145,10 @@ def draw_walk(
     plot.ground(lattice if grid is None else grid)
     if rooms is not None:
         paint_rooms(plot, rooms)
-    left = draw_unswept(plot, unswept) if unswept is not None else []
+    left = draw_floor(plot, unswept, *UNSWEPT)
     key: list[KeyEntry] = []
     if rooms is None and swept is not None:
-        key = draw_swept(plot, swept, "floor swept")
+        key = [*ENDS, *draw_floor(plot, swept, palette.COVERED, "floor swept")]
     elif rooms is None:
         key = draw_visits(plot, lattice, visits_of(lattice, cells), tuple(cells[0].tolist()))
     key += draw_driven(plot, driven, is_backward, lattice.cell_m) + left
@@ -273,11 +267,8 @@ def draw_mission(
         assert visits is not None
         key = draw_visits(plot, lattice, visits, start)
     else:
-        key = draw_swept(plot, swept, "reachable floor swept")
-    if unswept is not None:
-        key += draw_unswept(plot, unswept)
-    if by_others is not None:
-        key += draw_by_others(plot, by_others)
+        key = [*ENDS, *draw_floor(plot, swept, palette.COVERED, "reachable floor swept")]
+    key += draw_floor(plot, unswept, *UNSWEPT) + draw_floor(plot, by_others, *BY_OTHERS)
     for _, outline in rooms:
         plot.line(np.array((*outline, outline[0])), palette.FAINT_INK, ROOM_PX)
     key += draw_order(plot, zones, keep_out)

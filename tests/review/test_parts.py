@@ -19,18 +19,11 @@ from fasaco_edge.review.comparison import side_by_side
 from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
-from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.paths import encode_path
-from tests.support.recordings import (
-    TIMEOUT_S,
-    begun_parts,
-    bus_on_free_port,
-    recorder_process,
-)
+from tests.support.recordings import TIMEOUT_S, begun_parts, told_recorder
 from tests.support.reviews import document
 from tests.support.rooms import map_bytes, pose_bytes, room
-from tests.support.senders import Sender
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "mission": {"lost_pose_s": 3.0}}
 # Three cells to the right and back, in the lowest row of the room.
@@ -47,45 +40,28 @@ DEAD_DOCK = {"code": "no_current", "text": "the dock gives no current"}
 
 def run_told(folder, *, faults, silent=0, killed=False):
     """Record a run of known figures, in parts as small as can be; return its files."""
-    folder.mkdir()
-    with bus_on_free_port() as (bus, endpoint):
-        publishers = {
-            "map": Sender(bus, topics.MAP),
-            "pose": Sender(bus, topics.POSE),
-            "path": Sender(bus, topics.PATH),
-            "status": Sender(bus, topics.STATUS),
-        }
-        with recorder_process(bus, endpoint, folder, part_bytes=1) as recorder:
-            sent = 0
-
-            def put(topic, payload, note=None):
-                nonlocal sent
-                sent += 1
-                publishers[topic].put(payload, encode_json(note) if note else b"")
-                # Each is to come at a time of its own, and in this order.
-                time.sleep(0.03)
-
-            put("map", map_bytes(room(2.4, 1.8)))
-            put("status", _status("planning", "first plan", {}))
-            for revision, (planner, ms, why) in enumerate(PATHS):
-                note = {"revision": revision + 1, "reason": why, "planner": planner, "plan_ms": ms}
-                put("path", _path(), note)
-            put("status", _status("covering", "path 1", {}))
-            for x in WAY:
-                put("pose", pose_bytes(x, Y))
-            # A part ends with a flush, and these are seconds apart.
-            recorder.wait_until(lambda report: "-part1." not in report["file"])
-            put("status", _status("degraded", "no pose for 3 s", {}))
-            put("status", _status("paused", "paused by command", {}, troubles=[DEAD_DOCK]))
-            put("status", _status("covering", "path 1", faults))
-            for _ in range(silent):
-                put("status", _status("covering", "path 1", faults | {"late": 1}))
-            recorder.written(sent)
-            if killed:
-                kill_within_a_part(recorder, folder, faults)
-            else:
-                recorder.process.terminate()
-            recorder.process.wait(120)
+    with told_recorder(folder, part_bytes=1) as told:
+        told.tell("map", map_bytes(room(2.4, 1.8)))
+        told.tell("status", _status("planning", "first plan", {}))
+        for revision, (planner, ms, why) in enumerate(PATHS):
+            note = {"revision": revision + 1, "reason": why, "planner": planner, "plan_ms": ms}
+            told.tell("path", _path(), note)
+        told.tell("status", _status("covering", "path 1", {}))
+        for x in WAY:
+            told.tell("pose", pose_bytes(x, Y))
+        # A part ends with a flush, and these are seconds apart.
+        told.recorder.wait_until(lambda report: "-part1." not in report["file"])
+        told.tell("status", _status("degraded", "no pose for 3 s", {}))
+        told.tell("status", _status("paused", "paused by command", {}, troubles=[DEAD_DOCK]))
+        told.tell("status", _status("covering", "path 1", faults))
+        for _ in range(silent):
+            told.tell("status", _status("covering", "path 1", faults | {"late": 1}))
+        if killed:
+            told.recorder.written(told.sent)
+            kill_within_a_part(told.recorder, folder, faults)
+            told.recorder.process.wait(120)
+        else:
+            told.end()
     return sorted(folder.glob("*.rrd"))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -26,13 +25,11 @@ from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
 from fasaco_edge.review.spot import explain
-from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import FloorReport
 from fasaco_edge.wire.messages.paths import encode_path
-from tests.support.recordings import bus_on_free_port, read_column, recorder_process
+from tests.support.recordings import read_column, told_recorder
 from tests.support.rooms import UNKNOWN, WALL, fill, map_bytes, pose_bytes, room
-from tests.support.senders import Sender
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "planner": {"line": "thorough"}}
 KEEP_OUT = [[2.6, 0.4], [3.4, 0.4], [3.4, 1.0], [2.6, 1.0]]
@@ -59,51 +56,38 @@ def seen_first():
 def parts(tmp_path_factory):
     """A robot drives east along a path, until the map grows and another leads back west."""
     folder = tmp_path_factory.mktemp("questions") / "runs"
-    folder.mkdir()
-    with bus_on_free_port() as (bus, endpoint):
-        names = ("map", "pose", "path", "status", "command")
-        put = {name: Sender(bus, getattr(topics, name.upper())) for name in names}
-        with recorder_process(bus, endpoint, folder) as recorder:
-            sent = 0
+    with told_recorder(folder, 0.04) as told:
 
-            def tell(name, payload, note=None):
-                nonlocal sent
-                sent += 1
-                put[name].put(payload, encode_json(note) if note else b"")
-                time.sleep(0.04)
+        def path(revision, reason, xs, y=Y, **more):
+            xy = np.array([(x, y) for x in xs])
+            note = {"revision": revision, "reason": reason, "planner": "aco", "steps": 3}
+            told.tell("path", encode_path(xy, np.zeros(len(xy)), "map", 1), note | more)
 
-            def path(revision, reason, xs, y=Y, **more):
-                xy = np.array([(x, y) for x in xs])
-                note = {"revision": revision, "reason": reason, "planner": "aco", "steps": 3}
-                tell("path", encode_path(xy, np.zeros(len(xy)), "map", 1), note | more)
+        def status(state, reason, **more):
+            said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
+            mission = {"zones": [{"name": "a", "polygon": ZONE}] if told.sent > 2 else []}
+            mission["keep_outs"] = [{"polygon": KEEP_OUT, "by": "order"}] if told.sent > 2 else []
+            told.tell("status", encode_json(said | {"mission": mission | more}))
 
-            def status(state, reason, **more):
-                said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
-                mission = {"zones": [{"name": "a", "polygon": ZONE}] if sent > 2 else []}
-                mission["keep_outs"] = [{"polygon": KEEP_OUT, "by": "order"}] if sent > 2 else []
-                tell("status", encode_json(said | {"mission": mission | more}))
-
-            tell("map", map_bytes(seen_first()))
-            status("idle", "waits for an order")
-            tell("command", encode_json({"command": "start", "order": ORDER}))
-            status("covering", "path 1")
-            saved = {"saved_by_velocity_s": {"6": 14.0}, "saved_by_local_search_s": 2.0}
-            path(1, "first plan", [0.45, 2.0], ants=32, **saved)
-            for x in np.arange(0.45, 1.4, 0.15):
-                tell("pose", pose_bytes(float(x), Y))
-            tell("map", map_bytes(ground()))
-            box = {"x_min": 1.0, "y_min": 1.2, "x_max": 2.0, "y_max": 1.6}
-            path(2, "map: 3 cells more", [1.35, 0.3], changed=box)
-            for yaw in np.linspace(0.0, math.pi, 6):
-                tell("pose", pose_bytes(1.35, Y, yaw=float(yaw)))
-            for x in np.arange(1.2, 0.4, -0.15):
-                tell("pose", pose_bytes(float(x), Y, yaw=math.pi))
-            tell("command", encode_json({"command": "pause"}))
-            area = {"cells": 4, "m2": 0.36, "x": 3.0, "y": 0.7, "reason": "in a keep-out zone"}
-            status("paused", "paused by command", unreached={"areas": [area]})
-            recorder.written(sent)
-            recorder.process.terminate()
-            recorder.process.wait(120)
+        told.tell("map", map_bytes(seen_first()))
+        status("idle", "waits for an order")
+        told.tell("command", encode_json({"command": "start", "order": ORDER}))
+        status("covering", "path 1")
+        saved = {"saved_by_velocity_s": {"6": 14.0}, "saved_by_local_search_s": 2.0}
+        path(1, "first plan", [0.45, 2.0], ants=32, **saved)
+        for x in np.arange(0.45, 1.4, 0.15):
+            told.tell("pose", pose_bytes(float(x), Y))
+        told.tell("map", map_bytes(ground()))
+        box = {"x_min": 1.0, "y_min": 1.2, "x_max": 2.0, "y_max": 1.6}
+        path(2, "map: 3 cells more", [1.35, 0.3], changed=box)
+        for yaw in np.linspace(0.0, math.pi, 6):
+            told.tell("pose", pose_bytes(1.35, Y, yaw=float(yaw)))
+        for x in np.arange(1.2, 0.4, -0.15):
+            told.tell("pose", pose_bytes(float(x), Y, yaw=math.pi))
+        told.tell("command", encode_json({"command": "pause"}))
+        area = {"cells": 4, "m2": 0.36, "x": 3.0, "y": 0.7, "reason": "in a keep-out zone"}
+        status("paused", "paused by command", unreached={"areas": [area]})
+        told.end()
     return sorted(folder.glob("*.rrd"))
 
 

@@ -73,20 +73,6 @@ def test_the_map_grows_with_the_robot_and_stays_true():
     assert len(sizes) > 5
 
 
-def test_a_scan_tells_which_window_changed():
-    truth = building(12, 6)
-    mapper = Mapper(truth, SimulationConfig())
-    first = mapper.scan(Pose2D(2.0, 3.0))
-    before = placed_in(truth, mapper.snapshot(0))
-    window = mapper.scan(Pose2D(3.0, 3.0))
-    changed = placed_in(truth, mapper.snapshot(0)) != before
-    rows, cols = np.nonzero(changed)
-    assert (window.row0, window.row1) == (rows.min(), rows.max() + 1)
-    assert (window.col0, window.col1) == (cols.min(), cols.max() + 1)
-    assert window.col0 > first.col0
-    assert mapper.scan(Pose2D(3.0, 3.0)) is None
-
-
 def test_the_ground_under_the_robot_is_known_even_without_sight():
     truth = building(4, 4)
     config = SimulationConfig(range_m=0.01)

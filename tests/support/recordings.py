@@ -26,7 +26,9 @@ from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.torn import scan_recording
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
+from tests.support.senders import Sender
 
 RUN = """
 import json, pathlib, sys
@@ -95,6 +97,42 @@ def recorder_process(bus: Bus, endpoint: str, out: Path, **settings: Any) -> Ite
     finally:
         process.kill()
         process.communicate()
+
+
+@dataclass
+class ToldRecorder:
+    """A recorder process, and publishers of what it records."""
+
+    recorder: Recorder
+    senders: dict[str, Sender]
+    pause_s: float
+
+    @property
+    def sent(self) -> int:
+        """Number of samples sent."""
+        return sum(sender.sent for sender in self.senders.values())
+
+    def tell(self, topic: str, payload: bytes, note: dict[str, Any] | None = None) -> None:
+        """Publish a sample; each comes at a time of its own, and in this order."""
+        self.senders[topic].put(payload, encode_json(note) if note else b"")
+        time.sleep(self.pause_s)
+
+    def end(self) -> None:
+        """Wait until all samples are recorded, and end the recorder."""
+        self.recorder.written(self.sent)
+        self.recorder.process.terminate()
+        self.recorder.process.wait(TIMEOUT_S)
+
+
+@contextmanager
+def told_recorder(folder: Path, pause_s: float = 0.03, **settings: Any) -> Iterator[ToldRecorder]:
+    """Run a recorder on a bus of its own; it writes into ``folder``, which is made."""
+    folder.mkdir()
+    told = topics.MAP, topics.POSE, topics.PATH, topics.STATUS, topics.COMMAND
+    with bus_on_free_port() as (bus, endpoint):
+        senders = {topic.name: Sender(bus, topic) for topic in told}
+        with recorder_process(bus, endpoint, folder, **settings) as recorder:
+            yield ToldRecorder(recorder, senders, pause_s)
 
 
 SCALAR = "Scalars:scalars"

@@ -12,7 +12,7 @@ from PIL import Image
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.pictures import draw_unswept
+from fasaco_edge.drawing.pictures import UNSWEPT, draw_floor
 from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.errors import UnreadableRecording
@@ -72,7 +72,7 @@ def draw_fleet_mission(
     twice = MapLayer(unswept.geometry, times > 1)
     plot.paint(twice, palette.RULE)
     key.append(KeyEntry("tile", palette.RULE, f"by two or more ({twice.area_m2:,.1f} m2)"))
-    key += draw_unswept(plot, unswept)
+    key += draw_floor(plot, unswept, *UNSWEPT)
     for name, trail in trails.items():
         plot.line(trail, _track_colour(numbers[name]), TRACK_PX)
         plot.end_mark(trail[-1])

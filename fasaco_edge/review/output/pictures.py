@@ -11,10 +11,11 @@ from PIL import Image
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import (
-    draw_by_others,
+    BY_OTHERS,
+    UNSWEPT,
+    draw_floor,
     draw_mission,
     draw_order,
-    draw_unswept,
 )
 from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
@@ -129,9 +130,10 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     plot.ground(data.grid)
     key = []
     if review.floor is not None:
-        key += draw_unswept(plot, MapLayer(review.floor.geometry, review.floor.unswept))
-        if review.by_others is not None:
-            key += draw_by_others(plot, MapLayer(review.floor.geometry, review.by_others))
+        geometry, others = review.floor.geometry, review.by_others
+        key += draw_floor(plot, MapLayer(geometry, review.floor.unswept), *UNSWEPT)
+        if others is not None:
+            key += draw_floor(plot, MapLayer(geometry, others), *BY_OTHERS)
     key += draw_order(plot, data.zones, data.keep_out)
     if driven.any():
         plot.track(drive[:-1][driven], drive[1:][driven], DRIVE_M)
