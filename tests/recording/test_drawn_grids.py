@@ -15,9 +15,7 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import chunks_in, pa
 from fasaco_edge.recording.read.timeline import grids_in
 from fasaco_edge.recording.scene import archetypes
-from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.writer import RecordingWriter
+from tests.support.recordings import writer_in
 
 CELLS = np.array([[1, 2, 3], [9, 8, 100]], np.int8)
 
@@ -27,7 +25,7 @@ def batches(tmp_path):
     """Return the rows of a map at an angle, and of swept floor, by their entity."""
     geometry = GridGeometry(2, 3, 0.3, Pose2D(0.6, -0.3, math.radians(-25.0)))
     grid = OccupancyGrid(geometry, CELLS)
-    writer = RecordingWriter(tmp_path, "run", DiskBudget(10**9, 0), build_blueprint(None))
+    writer = writer_in(tmp_path)
     writer.log(entities.MAP, archetypes.map_archetype(grid))
     writer.log(entities.FLOOR, archetypes.floor_archetype(grid))
     assert writer.close()

@@ -18,12 +18,11 @@ from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.recording.scene.blueprint import build_blueprint
 from fasaco_edge.recording.write import input_log, recorder
 from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
+from fasaco_edge.recording.write.writer import WriterState
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_document, encode_json
 from fasaco_edge.wire.documents.path_documents import DIGEST_BYTES, PATH_DIGEST, digest
@@ -31,7 +30,13 @@ from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.paths import encode_path
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from tests.support.recordings import TEXT, bus_on_free_port, read_column, read_summary
+from tests.support.recordings import (
+    TEXT,
+    bus_on_free_port,
+    read_column,
+    read_summary,
+    writer_in,
+)
 from tests.support.senders import Sender
 
 SECOND_NS = 1_000_000_000
@@ -48,8 +53,7 @@ class Desk:
     told: list[Arrival] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        room = DiskBudget(self.part_bytes, 0)
-        self.writer = RecordingWriter(self.folder, "run", room, build_blueprint(None))
+        self.writer = writer_in(self.folder, self.part_bytes)
         self.inputs = InputLog(self.writer, BEGAN_NS)
 
     def hear(self, topic: str, payload: bytes, attachment: bytes = b"", after_s: float = 0.1):

@@ -23,9 +23,7 @@ from fasaco_edge.recording.write.writer import (
     RecordingWriter,
     WriterState,
 )
-from tests.support.recordings import read_column, read_static, read_summary
-
-RUN = "run-1"
+from tests.support.recordings import read_column, read_static, read_summary, writer_in
 
 
 class Clock:
@@ -47,12 +45,6 @@ def noise(seed: int, size: int = 100_000) -> rr.GridMap:
             width=100, height=size // 100, color_model="L", channel_datatype="U8"
         ),
         cell_size=0.1,
-    )
-
-
-def writer_in(folder, part_bytes: int = 10**9, least_free_bytes: int = 0) -> RecordingWriter:
-    return RecordingWriter(
-        folder, RUN, DiskBudget(part_bytes, least_free_bytes), build_blueprint(None)
     )
 
 
@@ -148,7 +140,7 @@ def test_no_part_is_written_below_the_floor_and_its_samples_keep_their_times(tmp
     monkeypatch.setattr(DiskBudget, "may_begin", lambda *_: True)
     writer.sync(clock.tick() + RETRY_PERIOD_NS)
     assert writer.close()
-    column = read_column(tmp_path / f"{RUN}-part2.rrd", entities.MISSION_STATE, "StateChange:state")
+    column = read_column(tmp_path / "run-part2.rrd", entities.MISSION_STATE, "StateChange:state")
     assert column.wall_ns.tolist() == [came_ns]
 
 
@@ -179,7 +171,7 @@ def test_a_deleted_part_is_reported_and_followed_by_another(tmp_path, caplog, le
 
 def test_a_stalled_disk_is_reported_and_used_again(tmp_path):
     # A pipe that nobody empties: to rerun's writer, a disk that hangs.
-    pipe = tmp_path / f"{RUN}-part1.rrd"
+    pipe = tmp_path / "run-part1.rrd"
     os.mkfifo(pipe)
     clock = Clock()
     writer = writer_in(tmp_path)
@@ -206,7 +198,7 @@ def test_a_stalled_disk_is_reported_and_used_again(tmp_path):
 
 def test_a_disk_that_pauses_loses_nothing(tmp_path):
     """As a memory card does for a second, or a flush on a slow computer."""
-    pipe = tmp_path / f"{RUN}-part1.rrd"
+    pipe = tmp_path / "run-part1.rrd"
     os.mkfifo(pipe)
     clock = Clock()
     writer = writer_in(tmp_path)

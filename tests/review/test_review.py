@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from itertools import groupby, pairwise
 
@@ -14,7 +15,6 @@ from fasaco_edge.drawing.spread import percentile
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.review.conversion import _used
 from fasaco_edge.review.review import read_review
-from tests.review.naive import passed_cells
 from tests.support.processes import fasaco_edge
 from tests.support.recorded_mission import record_mission
 from tests.support.reviews import document
@@ -250,3 +250,30 @@ def _began(recording, review):
 def _late_s(recording):
     """How late a status may come: a slow computer brings them late."""
     return 0.3 + max(np.diff([at for at, _ in recording.statuses]))
+
+
+STRIDE_M = 0.001
+
+
+def passed_cells(trail, cell_m, reach=0.5):
+    """Return the cells (row, col) whose centre came to lie under the tool, and after how far [m].
+
+    The tool reaches so many cells around its middle: as wide as a cell, half of one. A cell is
+    passed anew once the tool has left its centre.
+    """
+    passed, under, way = [], None, 0.0
+    points = [trail[0]]
+    for begin, end in pairwise(trail):
+        count = max(math.ceil(math.dist(begin, end) / STRIDE_M), 1)
+        points += [begin + (end - begin) * (k + 1) / count for k in range(count)]
+    last = points[0]
+    for point in points:
+        way += math.dist(last, point)
+        last = point
+        cell = (math.floor(point[1] / cell_m), math.floor(point[0] / cell_m))
+        centre = ((cell[1] + 0.5) * cell_m, (cell[0] + 0.5) * cell_m)
+        now = cell if math.dist(point, centre) < reach * cell_m - 1e-9 else None
+        if now is not None and now != under:
+            passed.append((now, way))
+        under = now
+    return passed

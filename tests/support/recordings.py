@@ -25,6 +25,9 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.torn import scan_recording
+from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.write.quota import DiskBudget
+from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
@@ -97,6 +100,12 @@ def recorder_process(bus: Bus, endpoint: str, out: Path, **settings: Any) -> Ite
     finally:
         process.kill()
         process.communicate()
+
+
+def writer_in(folder: Path, part_bytes: int = 10**9, least_free_bytes: int = 0) -> RecordingWriter:
+    """Begin a recording of a run ``run`` in ``folder``; without limits unless given."""
+    budget = DiskBudget(part_bytes, least_free_bytes)
+    return RecordingWriter(folder, "run", budget, build_blueprint(None))
 
 
 @dataclass

@@ -88,7 +88,7 @@ class InputLog:
         self.write(in_any_case=part > 1 and part != self._part)
 
     def write(self, *, in_any_case: bool = False) -> None:
-        """Write the gathered samples; without samples only ``in_any_case``."""
+        """Write the gathered samples; ``in_any_case``: a batch even without samples."""
         if self._part != self._writer.part_number:
             self._part = self._writer.part_number
             self._encoder.restart(self._in_force.samples())
