@@ -127,7 +127,7 @@ class InstantPicture(msgspec.Struct, frozen=True):
 
 
 def instant_at(review: Review, at_s: float) -> InstantPicture:
-    """Return the scene at a time [s].
+    """Return what a picture of a time [s] shows.
 
     Raises:
         UnreadableRecording: a file of the recording is gone.

@@ -186,8 +186,8 @@ class Desk:
     """What a recorder does with a sample, at any speed."""
 
     def __init__(self, folder: Path) -> None:
-        room = budget_of(DaemonConfig())
-        self.writer = RecordingWriter(folder, "run", room, build_blueprint(None))
+        budget = budget_of(DaemonConfig(), folder)
+        self.writer = RecordingWriter("run", budget, build_blueprint(None))
         self.writer.at(BEGAN_NS)
         self._inputs = InputLog(self.writer, BEGAN_NS)
         self._scene = Scene(self.writer, RunDescription("robot", "now"))

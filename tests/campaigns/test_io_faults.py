@@ -89,8 +89,8 @@ def test_an_io_fault_is_reported_and_loses_nothing(fault):
 def test_an_unreadable_recording_does_not_stop_the_recorder(tmp_path):
     old = tmp_path / "old.rrd"
     old.write_bytes(b"RRF2 and so on")
-    script = "import sys; from pathlib import Path; from fasaco_edge.recording.read import repair; "
-    script += "print(*repair.repair_folder(Path(sys.argv[1])))"
+    script = "import sys; from pathlib import Path; from fasaco_edge.recording.read import torn; "
+    script += "print(*torn.repair_folder(Path(sys.argv[1])))"
     with Watch([tmp_path], Failure(Kind.READ, 1, "EIO")) as watch:
         command = [sys.executable, "-c", script, str(tmp_path)]
         environment = ENVIRONMENT | watch.environment

@@ -20,7 +20,6 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.write import input_log, recorder
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.writer import WriterState
 from fasaco_edge.wire import topics
@@ -192,7 +191,7 @@ def test_changes_of_rooms_are_kept_and_shares_now_and_then(tmp_path):
 def test_inputs_queued_at_the_end_are_kept_and_drawn_if_in_time(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "LAST_DRAWN_NS", 0)
     with bus_on_free_port() as (bus, _):
-        one = recorder.RobotRecorder(DaemonConfig(), bus, Output(tmp_path, DiskBudget(10**9, 0)))
+        one = recorder.RobotRecorder(DaemonConfig(), bus, DiskBudget(tmp_path, 10**9, 0))
         poses = hear(one, bus, 300)
         assert one.end()
     (path,) = parts(tmp_path)
@@ -209,7 +208,7 @@ def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "REPORT_PERIOD_NS", 0)
     reports = []
     with bus_on_free_port() as (bus, _):
-        one = recorder.RobotRecorder(DaemonConfig(), bus, Output(tmp_path, DiskBudget(10**9, 0)))
+        one = recorder.RobotRecorder(DaemonConfig(), bus, DiskBudget(tmp_path, 10**9, 0))
         hear(one, bus, 50)
         bus.listen(Keys(), topics.RECORDER, lambda sample: reports.append(sample.payload))
         one.step(0.0)

@@ -92,9 +92,9 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
     for path in (*others, *before):
         path.write_bytes(bytes(400_000))
     clock = Clock()
-    room = DiskBudget(300_000, 0, 3 * FLUSH_PERIOD_NS / 1e9, "robot", 1_000_000)
+    room = DiskBudget(tmp_path, 300_000, 0, 3 * FLUSH_PERIOD_NS / 1e9, "robot", 1_000_000)
     name = "20260101T000000Z-robot"
-    writer = RecordingWriter(tmp_path, name, room, build_blueprint(None))
+    writer = RecordingWriter(name, room, build_blueprint(None))
     writer.sync(clock.tick())
     # With the part that is coming, one of the two that there were is too much.
     assert not before[0].exists()
@@ -114,8 +114,8 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
 
 
 def test_a_part_that_is_written_is_not_deleted_for_the_quota(tmp_path):
-    room = DiskBudget(10**6, 0)
-    writer = RecordingWriter(tmp_path, "20200101T000000Z-robot", room, build_blueprint(None))
+    room = DiskBudget(tmp_path, 10**6, 0)
+    writer = RecordingWriter("20200101T000000Z-robot", room, build_blueprint(None))
     assert not delete_oldest(tmp_path, "robot", 1)
     assert writer.close()
     assert delete_oldest(tmp_path, "robot", 1)

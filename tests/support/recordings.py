@@ -37,14 +37,13 @@ RUN = """
 import json, pathlib, sys
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.recorder import run_recorder
 told = json.loads(sys.argv[1])
 bus = BusSettings(connect=(told.pop("endpoint"),))
 out = pathlib.Path(told.pop("out"))
-budget = DiskBudget(**{"part_bytes": 64_000_000, "least_free_bytes": 50_000_000} | told)
-sys.exit(run_recorder(DaemonConfig(), bus, Output(out, budget)))
+budget = DiskBudget(out, **{"part_bytes": 64_000_000, "least_free_bytes": 50_000_000} | told)
+sys.exit(run_recorder(DaemonConfig(), bus, budget))
 """
 TIMEOUT_S = 120.0
 
@@ -104,8 +103,8 @@ def recorder_process(bus: Bus, endpoint: str, out: Path, **settings: Any) -> Ite
 
 def writer_in(folder: Path, part_bytes: int = 10**9, least_free_bytes: int = 0) -> RecordingWriter:
     """Begin a recording of a run ``run`` in ``folder``; without limits unless given."""
-    budget = DiskBudget(part_bytes, least_free_bytes)
-    return RecordingWriter(folder, "run", budget, build_blueprint(None))
+    budget = DiskBudget(folder, part_bytes, least_free_bytes)
+    return RecordingWriter("run", budget, build_blueprint(None))
 
 
 @dataclass

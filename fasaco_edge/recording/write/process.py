@@ -20,7 +20,6 @@ import time
 from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -160,25 +159,15 @@ class BusRecorder(ABC):
         """Write waiting samples and the footer; False if the disk fails."""
 
 
-@dataclass(frozen=True, slots=True)
-class Output:
-    """Where and how a recorder writes.
-
-    Attributes:
-        folder: folder of the recordings; created if missing.
-        budget: limits of disk space.
-    """
-
-    folder: Path
-    budget: DiskBudget
-
-    def begin(self, name: str, blueprint: rrb.Blueprint) -> tuple[RecordingWriter, RunClock]:
-        """Begin a recording of the robot or fleet ``name``; return its writer and its clock."""
-        clock = RunClock()
-        run = next_run(self.folder, name, clock.began)
-        writer = RecordingWriter(self.folder, run, self.budget, blueprint)
-        writer.at(clock.began_ns)
-        return writer, clock
+def begin_recording(
+    budget: DiskBudget, name: str, blueprint: rrb.Blueprint
+) -> tuple[RecordingWriter, RunClock]:
+    """Begin a recording of the robot or fleet ``name``; return its writer and its clock."""
+    clock = RunClock()
+    run = next_run(budget.folder, name, clock.began)
+    writer = RecordingWriter(run, budget, blueprint)
+    writer.at(clock.began_ns)
+    return writer, clock
 
 
 def record(

@@ -28,11 +28,12 @@ from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.process import (
     QUEUE_BYTES,
     BusRecorder,
-    Output,
     SampleQueue,
     afforded_bytes,
+    begin_recording,
     record,
 )
+from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.text import is_reported
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
@@ -52,21 +53,21 @@ SILENCE_NS = 3_500_000_000
 LAST_DRAWN_NS = 300_000_000
 
 
-def run_recorder(config: DaemonConfig, bus_settings: BusSettings, output: Output) -> int:
+def run_recorder(config: DaemonConfig, bus_settings: BusSettings, budget: DiskBudget) -> int:
     """Record a robot until SIGTERM or SIGINT; return the exit code. Errors as for ``record``.
 
     Importing this module raises MissingExtra if Rerun is not installed.
     """
-    return record(output.folder, bus_settings, lambda bus: RobotRecorder(config, bus, output))
+    return record(budget.folder, bus_settings, lambda bus: RobotRecorder(config, bus, budget))
 
 
 class RobotRecorder(BusRecorder):
     """Connects the bus to the writer: ``step`` takes samples, writes them, and reports."""
 
-    def __init__(self, config: DaemonConfig, bus: Bus, output: Output) -> None:
+    def __init__(self, config: DaemonConfig, bus: Bus, budget: DiskBudget) -> None:
         self._config = config
         self._bus = bus
-        self.writer, self._clock = output.begin(config.robot.name, build_blueprint(None))
+        self.writer, self._clock = begin_recording(budget, config.robot.name, build_blueprint(None))
         self._inputs = InputLog(self.writer, self._clock.began_ns)
         began = f"{self._clock.began:%Y-%m-%d %H:%M:%S} UTC"
         self._scene = Scene(self.writer, RunDescription(config.robot.name, began))

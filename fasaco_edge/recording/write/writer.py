@@ -46,7 +46,7 @@ class WriterState(enum.Enum):
 
 
 class RecordingWriter:
-    """Writes to the parts ``<recording_id>-part<n>.rrd`` in ``folder``; for one thread only.
+    """Writes to the parts ``<recording_id>-part<n>.rrd`` in a folder; for one thread only.
 
     Rerun keeps times per thread, and logs data of a thread without a time as static.
 
@@ -59,10 +59,8 @@ class RecordingWriter:
         BadConfiguration: the folder cannot be made or written to.
     """
 
-    def __init__(
-        self, folder: Path, recording_id: str, budget: DiskBudget, blueprint: rrb.Blueprint
-    ) -> None:
-        self._folder = folder
+    def __init__(self, recording_id: str, budget: DiskBudget, blueprint: rrb.Blueprint) -> None:
+        self._folder = budget.folder
         self._recording_id = recording_id
         self._budget = budget
         self._name, self._blueprint = recording_id, blueprint
@@ -85,11 +83,11 @@ class RecordingWriter:
         self.state = WriterState.RECORDING
         self.reason = ""
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            self._folder.mkdir(parents=True, exist_ok=True)
             self._begin_part()
         except OSError as error:
             if not self._abandoned:
-                raise cannot_record(folder, error) from error
+                raise cannot_record(self._folder, error) from error
             self._enter(WriterState.STALLED, f"no part: {error}")
 
     @property
@@ -240,7 +238,7 @@ class RecordingWriter:
     def _check_space(self, part: RecordingPart, now_ns: int) -> None:
         if self._part_until_ns is None:
             # Once per part is enough, as the quota leaves space for a whole part.
-            self._budget.keep_quota(self._folder)
+            self._budget.keep_quota()
             self._part_until_ns = now_ns + round(1e9 * self._budget.part_s)
         is_old = self._budget.part_s > 0 and now_ns >= self._part_until_ns
         is_deleted = part.is_deleted
@@ -252,7 +250,7 @@ class RecordingWriter:
                 self._part_messages,
                 extra={"event": "part_deleted"},
             )
-        if self._budget.is_full(self._folder):
+        if self._budget.is_full():
             part.close()
             self._part = None
             floor_mb = self._budget.least_free_bytes / 1e6
@@ -277,13 +275,13 @@ class RecordingWriter:
         self.lost += self._unflushed_messages
         self._unflushed_messages = self._unflushed_bytes = 0
         reason = f"{part.path.name} can no longer be written"
-        if self._budget.may_begin(self._folder):
+        if self._budget.may_begin():
             self._enter(WriterState.STALLED, reason)
         else:
             self._enter(WriterState.DISK_FULL, f"{reason}: no space left")
 
     def _try_again(self) -> None:
-        if not self._budget.may_begin(self._folder):
+        if not self._budget.may_begin():
             return
         try:
             self._begin_part()
