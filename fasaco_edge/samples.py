@@ -58,7 +58,7 @@ class Numbered:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class BatchPlace:
     """Position of a batch: its run, and the number of its first new sample."""
 
     run: int
@@ -156,7 +156,7 @@ class SampleEncoder:
             ahead_ns=_differences([arrival.wall_ns - arrival.at_ns for arrival in arrivals]),
             attachments=attachments if any(attachments) else [],
             against=last.number if last else WHOLE,
-            checksum=_checksum(payloads),
+            checksum=zlib.crc32(b"".join(payloads)),
             sparse=sparse,
             body=body,
         )
@@ -202,7 +202,7 @@ class SampleDecoder:
                 )
             before = last.arrival.sample.payload
         payloads = _payloads(lane, before)
-        if _checksum(payloads) != lane.checksum:
+        if zlib.crc32(b"".join(payloads)) != lane.checksum:
             raise MalformedMessage(f"sample {numbers[0]}, or a later one, has a wrong checksum")
         attachments = lane.attachments or [b""] * len(numbers)
         times = accumulate(lane.at_ns), accumulate(lane.ahead_ns)
@@ -219,7 +219,7 @@ class SampleDecoder:
         return samples
 
 
-def place_of(batch: bytes) -> Place:
+def place_of(batch: bytes) -> BatchPlace:
     """Return the position of a batch.
 
     Raises:
@@ -233,7 +233,7 @@ def place_of(batch: bytes) -> Place:
             f"batch of samples: format must be {FORMAT}, got {kind}",
             hint="use the same release for daemon and recorder",
         )
-    return Place(run, first)
+    return BatchPlace(run, first)
 
 
 def _inflated(body: bytes) -> bytes:
@@ -271,13 +271,6 @@ def _by_lane(samples: Sequence[Numbered]) -> list[list[Numbered]]:
         lane = (*_kind(numbered.arrival), numbered.number if large else WHOLE)
         lanes.setdefault(lane, []).append(numbered)
     return list(lanes.values())
-
-
-def _checksum(payloads: Sequence[bytes]) -> int:
-    value = 0
-    for payload in payloads:
-        value = zlib.crc32(payload, value)
-    return value
 
 
 def _differences(values: Sequence[int]) -> list[int]:
@@ -339,7 +332,7 @@ def _flat(lane: _Lane, size: int) -> NDArray[np.uint8]:
     starts, lengths = edges[0::2], runs[1::2]
     if int(lengths.sum(dtype=np.int64)) != body.size - end:
         raise ValueError(f"runs of {lengths.sum(dtype=np.int64)} bytes, {body.size - end} follow")
-    # Place of each byte that is not zero: its index among such bytes plus the zeros before it.
+    # BatchPlace of each byte that is not zero: its index among such bytes plus the zeros before it.
     places = np.arange(body.size - end)
     places += np.repeat(starts - (np.cumsum(lengths, dtype=np.int64) - lengths), lengths)
     flat = np.zeros(size, np.uint8)

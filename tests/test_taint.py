@@ -32,7 +32,7 @@ from fasaco_edge.planners.planner import ColonySnapshot
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.timeline import open_timeline
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.part import Part
+from fasaco_edge.recording.write.part import RecordingPart
 from fasaco_edge.samples import SampleEncoder
 from fasaco_edge.serve.recorded import Playback
 from fasaco_edge.text import json_line
@@ -269,7 +269,7 @@ def recorded(folder: Path) -> Path:
     for number, (topic, payload, attachment) in enumerate(told):
         at_ns = BEGAN_NS + number * 10**9
         encoder.add(Arrival(topic, Sample(TAINT, payload, TAINT, attachment), at_ns, at_ns))
-    part = Part(file, TAINT)
+    part = RecordingPart(file, TAINT)
     rr.set_time(entities.WALL_CLOCK, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream)
     for entity in (entities.MISSION_LOG, entities.BUS_LOG, entities.RECORDER_LOG):
         rr.log(entity, rr.TextLog(TAINT), recording=part.stream)

@@ -86,7 +86,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _record(args: argparse.Namespace) -> int:
-    from fasaco_edge.recording.write.process import Output
     from fasaco_edge.recording.write.quota import budget_of
     from fasaco_edge.recording.write.recorder import run_recorder
 
@@ -97,9 +96,9 @@ def _record(args: argparse.Namespace) -> int:
     if args.fleet is not None:
         from fasaco_edge.cli.fleet_wing import file_name, run_fleet_recorder
 
-        budget = budget_of(config, file_name(args.fleet))
-        return run_fleet_recorder(config, bus, args.fleet, Output(args.out, budget))
-    return run_recorder(config, bus, Output(args.out, budget_of(config)))
+        budget = budget_of(config, args.out, file_name(args.fleet))
+        return run_fleet_recorder(config, bus, args.fleet, budget)
+    return run_recorder(config, bus, budget_of(config, args.out))
 
 
 def config_of_options(args: argparse.Namespace) -> tuple[DaemonConfig, BusSettings]:

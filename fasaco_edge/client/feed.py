@@ -25,7 +25,7 @@ RETRY_S = 0.5
 END_S = 0.5
 
 
-class Joining(ABC):
+class BusJoining(ABC):
     """Joins the bus in a thread, and listens on it; a context manager.
 
     Attributes:
@@ -92,7 +92,7 @@ def _size_of(item: object) -> int:
     return item.size if isinstance(item, Sample) else 0
 
 
-class Feed(Joining):
+class Feed(BusJoining):
     """The samples of one robot, and the names of all robots; a context manager.
 
     ``with_fleet``: also the fleet messages of all robots.

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.client.events import BAD, GOOD, ORDER, EventLog, differences
+from fasaco_edge.client.phrases import BAD, GOOD, ORDER, EventLog, differences
 from fasaco_edge.errors import FasacoError, MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.text import is_reported
@@ -70,7 +70,7 @@ class RobotState:
         self.document = b""
         self.settings = KnownSettings()
         self.rooms = Rooms()
-        self.walk = PathProgress()
+        self.walk = WatchedPath()
         self.robots: set[str] = set()
         self.trouble = ""
         self.gone_since: float | None = None
@@ -156,7 +156,7 @@ class RobotState:
         self.status, self.document, self._reported_at = status, sample.payload, now
         if status.path is None:
             # A restarted daemon has no path yet.
-            self.walk = PathProgress()
+            self.walk = WatchedPath()
         # The number of steps left gives the progress only if the path's points are its cells.
         elif (status.path.revision, status.path.steps) == (
             self.walk.revision,
@@ -182,7 +182,6 @@ class RobotState:
         self._follow(decode_json(sample.payload), now)
 
     def _follow(self, document: dict[str, object], now: float) -> None:
-        """Note a command that the mission has accepted."""
         order = document.get("order")
         names = [str(zone["name"]) for zone in _zones(order)]
         about = f" with {', '.join(names)}" if names else ""
@@ -199,7 +198,6 @@ class RobotState:
 
 
 def _order_of(status: Status) -> tuple[object, ...]:
-    """Return values that distinguish orders."""
     return status.mission.ordered, *(zone.name for zone in status.mission.zones)
 
 
@@ -217,7 +215,7 @@ LOOK_AHEAD_M = 2.5
 NEAR_M, EQUAL_M = 0.5, 0.02
 
 
-class PathProgress:
+class WatchedPath:
     """A path, and the robot's progress on it.
 
     Attributes:

@@ -18,7 +18,7 @@ UNKNOWN: Colour = (222, 226, 231)
 
 COVERED: Colour = (226, 238, 247)
 # Colours by number of visits: two, three, four and more.
-RECOVERED: tuple[Colour, ...] = ((255, 232, 176), (255, 206, 140), (250, 172, 120))
+REVISITED: tuple[Colour, ...] = ((255, 232, 176), (255, 206, 140), (250, 172, 120))
 LEFT_OUT: Colour = (244, 214, 232)
 # Reachable floor that was not swept: darker than cells left out, as it may lie on them.
 UNSWEPT: Colour = (233, 120, 170)

@@ -9,34 +9,28 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.floor import ENDS, draw_visits, number_rooms, paint_rooms, visits_of
-from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
+from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
+from fasaco_edge.drawing.tints import ENDS, draw_visits, number_rooms, paint_rooms, visits_of
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.grid.rooms import FoundRooms
 
-
-def draw_swept(plot: Plot, swept: MapLayer, words: str) -> list[KeyEntry]:
-    """Paint the swept floor; return the legend entries of its colour and of a line's marks."""
-    plot.paint(swept, palette.COVERED)
-    return [*ENDS, KeyEntry("tile", palette.COVERED, f"{words} ({swept.area_m2:,.1f} m2)")]
+UNSWEPT = palette.UNSWEPT, "reachable floor not swept"
+BY_OTHERS = palette.BY_OTHERS, "swept by other robots of its fleet"
+"""Colour and label of floor."""
 
 
-def draw_unswept(plot: Plot, unswept: MapLayer) -> list[KeyEntry]:
-    """Paint unswept reachable floor; return its legend entry."""
-    plot.paint(unswept, palette.UNSWEPT)
-    label = f"reachable floor not swept ({unswept.area_m2:,.1f} m2)"
-    return [KeyEntry("tile", palette.UNSWEPT, label)] if unswept.mask.any() else []
-
-
-def draw_by_others(plot: Plot, swept: MapLayer) -> list[KeyEntry]:
-    """Paint floor that other robots swept; return its legend entry."""
-    plot.paint(swept, palette.BY_OTHERS)
-    label = f"swept by other robots of its fleet ({swept.area_m2:,.1f} m2)"
-    return [KeyEntry("tile", palette.BY_OTHERS, label)]
+def draw_floor(
+    plot: Plot, floor: MapLayer | None, colour: palette.Colour, label: str
+) -> list[KeyEntry]:
+    """Paint floor; return its legend entry, none without any floor."""
+    if floor is None or not floor.mask.any():
+        return []
+    plot.paint(floor, colour)
+    return [KeyEntry("tile", colour, f"{label} ({floor.area_m2:,.1f} m2)")]
 
 
 def draw_order(plot: Plot, zones: Sequence[Polygon], keep_out: Sequence[Polygon]) -> list[KeyEntry]:
@@ -147,14 +141,14 @@ def draw_walk(
     """
     centres = lattice.centres(cells)
     driven = centres if line_xy is None else line_xy
-    plot = Plot(View.over(bounds_of(grid, lattice, driven), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(grid, lattice, driven), lattice.cell_m))
     plot.ground(lattice if grid is None else grid)
     if rooms is not None:
         paint_rooms(plot, rooms)
-    left = draw_unswept(plot, unswept) if unswept is not None else []
+    left = draw_floor(plot, unswept, *UNSWEPT)
     key: list[KeyEntry] = []
     if rooms is None and swept is not None:
-        key = draw_swept(plot, swept, "floor swept")
+        key = [*ENDS, *draw_floor(plot, swept, palette.COVERED, "floor swept")]
     elif rooms is None:
         key = draw_visits(plot, lattice, visits_of(lattice, cells), tuple(cells[0].tolist()))
     key += draw_driven(plot, driven, is_backward, lattice.cell_m) + left
@@ -266,18 +260,15 @@ def draw_mission(
         zones, keep_out: polygons of the order [m].
         rooms: names and outlines [m].
     """
-    plot = Plot(View.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(grid, lattice, driven_xy), lattice.cell_m))
     plot.ground(grid)
     start = lattice.cell_at(*driven_xy[0].tolist())
     if swept is None:
         assert visits is not None
         key = draw_visits(plot, lattice, visits, start)
     else:
-        key = draw_swept(plot, swept, "reachable floor swept")
-    if unswept is not None:
-        key += draw_unswept(plot, unswept)
-    if by_others is not None:
-        key += draw_by_others(plot, by_others)
+        key = [*ENDS, *draw_floor(plot, swept, palette.COVERED, "reachable floor swept")]
+    key += draw_floor(plot, unswept, *UNSWEPT) + draw_floor(plot, by_others, *BY_OTHERS)
     for _, outline in rooms:
         plot.line(np.array((*outline, outline[0])), palette.FAINT_INK, ROOM_PX)
     key += draw_order(plot, zones, keep_out)

@@ -27,7 +27,7 @@ FINE_UP_TO = 1_200_000
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class PlotView:
     """A rectangle of the map frame as a rectangle of pixels, y upwards.
 
     Attributes:
@@ -51,7 +51,7 @@ class View:
         cell_m: float,
         widest: int = MAX_WIDTH,
         highest: int = MAX_HEIGHT,
-    ) -> View:
+    ) -> PlotView:
         """Return a view of ``bounds`` (x0, y0, x1, y1) [m], with a margin around.
 
         Args:
@@ -123,7 +123,7 @@ NAME_PX, RIM_PX = 16, 2
 class Plot:
     """A picture under construction, drawn in layers from the bottom up."""
 
-    def __init__(self, view: View) -> None:
+    def __init__(self, view: PlotView) -> None:
         self.view = view
         self._size = (view.width * view.oversampling, view.height * view.oversampling)
         self._image = Image.new("RGB", self._size, palette.UNKNOWN)

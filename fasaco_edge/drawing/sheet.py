@@ -166,7 +166,6 @@ def wrapped(lines: Sequence[str], size: int, width: int) -> list[str]:
 
 
 def _flowed(entries: Sequence[KeyEntry], width: int) -> list[list[tuple[int, KeyEntry]]]:
-    """Return rows of key entries, each with its left edge [px]."""
     rows: list[list[tuple[int, KeyEntry]]] = []
     left = width
     for entry in entries:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
+
+import numpy as np
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,5 +54,4 @@ def percentile(values: Sequence[float], percent: float) -> float | None:
     """
     if not values:
         return None
-    rank = max(math.ceil(percent / 100.0 * len(values)), 1)
-    return sorted(values)[rank - 1]
+    return float(np.percentile(values, percent, method="inverted_cdf"))

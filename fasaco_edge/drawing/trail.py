@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.plot import Plot, View, bounds_of
+from fasaco_edge.drawing.plot import Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -46,7 +46,9 @@ def draw_trail(
         lines: caption below it.
     """
     pointed, decided = pointed_and_decided(tau)
-    decided = _compared(decided, tau)
+    # Relative to the most decided cell with a choice.
+    choice = decided[np.count_nonzero(tau > 0, axis=2) > 1]
+    decided = np.minimum(decided / (float(choice.max(initial=0.0)) or 1.0), 1.0)
     colours = np.full((*pointed.shape, 3), palette.PAPER, np.float64)
     key = []
     for direction, (name, colour) in WAYS.items():
@@ -55,7 +57,7 @@ def draw_trail(
         share = 0.15 + 0.85 * decided[here][:, np.newaxis]
         colours[here] += share * (np.array(colour) - palette.PAPER)
         key.append(KeyEntry("tile", colour, f"{name} ({np.count_nonzero(here):,} cells)"))
-    view = View.over(bounds_of(grid, lattice, np.empty((0, 2))), lattice.cell_m)
+    view = PlotView.over(bounds_of(grid, lattice, np.empty((0, 2))), lattice.cell_m)
     plot = Plot(view)
     plot.ground(lattice if grid is None else grid)
     plot.tint(lattice, np.rint(colours).astype(np.uint8))
@@ -84,13 +86,6 @@ def pointed_and_decided(tau: Tau) -> tuple[NDArray[np.int8], NDArray[np.float64]
     # A rounding error in an even cell decides nothing.
     decided[(decided < 1e-5) | (ways == 0)] = 0.0
     return pointed, np.minimum(decided, 1.0)
-
-
-def _compared(decided: NDArray[np.float64], tau: Tau) -> NDArray[np.float64]:
-    """Return how decided cells are, 0 to 1, relative to the most decided cell with a choice."""
-    choice = decided[np.count_nonzero(tau > 0, axis=2) > 1]
-    most = float(choice.max(initial=0.0))
-    return np.minimum(decided / most, 1.0) if most > 0.0 else decided
 
 
 def _most_decided(decided: NDArray[np.float64], every: int) -> list[tuple[int, int]]:

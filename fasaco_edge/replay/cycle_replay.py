@@ -110,32 +110,6 @@ def read_turns(samples: Iterable[Arrival]) -> CycleRecord | None:
     return CycleRecord(beginning, kernels, turns, gap, frozenset(taken), began_ns)
 
 
-class UntakenSamples:
-    """Recorded samples that no cycle has taken yet."""
-
-    def __init__(self, taken: frozenset[tuple[str, int]]) -> None:
-        self._taken = taken
-        self._samples: dict[tuple[str, int], Arrival] = {}
-
-    def add(self, arrival: Arrival) -> None:
-        """Keep a sample if a cycle of the recorded daemon took it."""
-        key = arrival.topic, zlib.crc32(arrival.sample.payload)
-        if key not in self._taken:
-            return
-        self._samples.pop(key, None)
-        self._samples[key] = arrival
-        # The oldest samples are first.
-        while (oldest := next(iter(self._samples))) != key:
-            if arrival.wall_ns - self._samples[oldest].wall_ns < KEPT_NS:
-                break
-            del self._samples[oldest]
-
-    def find(self, taken: TakenSample) -> Sample | None:
-        """Return the sample; None if it is missing."""
-        arrival = self._samples.get((taken.topic, taken.checksum))
-        return arrival.sample if arrival else None
-
-
 def inflated_sample(told: EarlySample) -> Sample:
     """Return a sample that the turn log itself contains.
 
@@ -194,7 +168,8 @@ class CycleReplay:
         restored = decode_ledger(ledger, config.cell_m) if ledger else None
         self._drive = MissionDrive(config, restored, decode_rooms(rooms) if rooms else None)
         self.mission = self._drive.mission
-        self._untaken = UntakenSamples(record.taken)
+        # Recorded samples by topic and checksum, the oldest first.
+        self._samples: dict[tuple[str, int], Arrival] = {}
         self._decoder = SampleDecoder()
         self._logged: dict[str, deque[Sample]] = defaultdict(deque)
         self._filter = DecisionFilter()
@@ -212,7 +187,7 @@ class CycleReplay:
             if arrival.topic in EMBEDDED and len(arrival.sample.payload) <= POSE_BYTES:
                 continue  # these samples are in the log
             if arrival.topic != TURNS.name:
-                self._untaken.add(arrival)
+                self._keep(arrival)
                 continue
             if batch is not None:
                 yield from self._play(batch)
@@ -252,7 +227,6 @@ class CycleReplay:
         return replace(step, as_recorded=_facts(turn.decided)["path"] == _facts(decided)["path"])
 
     def _received(self, turn: Cycle) -> list[Received]:
-        """Return the recorded samples that the daemon took in this cycle."""
         found = [(taken, self._find(turn, taken)) for taken in turn.samples]
         return [
             Received(taken.topic, sample, taken.at) for taken, sample in found if sample is not None
@@ -263,11 +237,22 @@ class CycleReplay:
             return inflated_sample(taken.told)
         if not taken.checksum and self._logged[taken.topic]:
             return self._logged[taken.topic].popleft()
-        sample = self._untaken.find(taken)
-        if sample is None:
+        arrival = self._samples.get((taken.topic, taken.checksum))
+        if arrival is None:
             what = f"{taken.topic} with checksum {taken.checksum:08x}"
             self._differ(turn, what, "taken", "not in the recording")
-        return sample
+            return None
+        return arrival.sample
+
+    def _keep(self, arrival: Arrival) -> None:
+        """Keep a sample for a while if a cycle of the recorded daemon took it."""
+        key = arrival.topic, zlib.crc32(arrival.sample.payload)
+        if key not in self._record.taken:
+            return
+        self._samples.pop(key, None)
+        self._samples[key] = arrival
+        while arrival.wall_ns - next(iter(self._samples.values())).wall_ns >= KEPT_NS:
+            del self._samples[next(iter(self._samples))]
 
     def _plans(self, turn: Cycle) -> list[PlanReady]:
         """Make the plan again that was finished in this cycle; return it, or none."""

@@ -185,7 +185,6 @@ class Replay:
         yield self._cycle(now, arrivals)
 
     def _wait(self, until: float) -> Iterator[ReplayStep]:
-        """Make the cycles without samples up to ``until`` [s]."""
         while True:
             now = self._now + TICK_S
             if self._due is not None:

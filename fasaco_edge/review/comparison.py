@@ -10,7 +10,7 @@ import msgspec
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.floor import MILESTONES
+from fasaco_edge.review.floor_and_rooms import MILESTONES
 
 # Differences that make floor, cells and times incomparable.
 ANOTHER_PROBLEM = (
@@ -107,24 +107,24 @@ def side_by_side(one: ReviewDocument, other: ReviewDocument) -> dict[str, object
 
 def compared_rows(one: ReviewDocument, other: ReviewDocument) -> list[Row]:
     """Return the figures of two runs side by side, with the difference of numbers."""
-    pairs = zip(figures(one), figures(other), strict=True)
-    return [(mine.name, mine.text, theirs.text, mine.less(theirs)) for mine, theirs in pairs]
+    found = []
+    for mine, theirs in zip(figures(one), figures(other), strict=True):
+        difference = ""
+        if mine.value is not None and theirs.value is not None:
+            less = round(mine.value - theirs.value, 1)
+            words = f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}"
+            difference = words if less else "0"
+        found.append((mine.name, mine.text, theirs.text, difference))
+    return found
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class ReviewFigure:
     """A figure: name, text, and its value if it is a number."""
 
     name: str
     text: str
     value: float | None = None
-
-    def less(self, other: Figure) -> str:
-        """Return this value minus the other one as text; "" if one is no number."""
-        if self.value is None or other.value is None:
-            return ""
-        less = round(self.value - other.value, 1)
-        return (f"{less:+,d}" if isinstance(less, int) else f"{less:+,.1f}") if less else "0"
 
 
 def floor_words(document: ReviewDocument) -> str:
@@ -134,29 +134,29 @@ def floor_words(document: ReviewDocument) -> str:
     return swept_words(document.swept_m2, document.reachable_m2)
 
 
-def figures(document: ReviewDocument) -> Iterator[Figure]:
+def figures(document: ReviewDocument) -> Iterator[ReviewFigure]:
     """Yield the figures used to compare two runs."""
     share = f" ({document.share_covered})" if document.share_covered else ""
     covered = document.covered_cells
-    yield Figure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document.complete])
-    yield Figure("duration", clock(document.duration_s), document.duration_s)
+    yield ReviewFigure("complete", {True: "yes", False: "no", None: NOT_KNOWN}[document.complete])
+    yield ReviewFigure("duration", clock(document.duration_s), document.duration_s)
     text = NOT_KNOWN if covered is None else f"{covered} of {document.coverable_cells} cells{share}"
-    yield Figure("covered", text, covered)
-    yield Figure("floor swept", floor_words(document) or NOT_KNOWN, document.swept_m2)
+    yield ReviewFigure("covered", text, covered)
+    yield ReviewFigure("floor swept", floor_words(document) or NOT_KNOWN, document.swept_m2)
     patches, largest_m2 = document.patches_over_4_dm2, document.largest_patch_m2
-    yield Figure("patches left, over 4 dm2", count(patches, ""), patches)
-    yield Figure("largest patch left", count(largest_m2, "m2"), largest_m2)
-    yield Figure("floor left", _by_reason(document.left_by_reason))
-    yield Figure("floor out of reach", _by_reason(document.out_of_reach_by_reason))
+    yield ReviewFigure("patches left, over 4 dm2", count(patches, ""), patches)
+    yield ReviewFigure("largest patch left", count(largest_m2, "m2"), largest_m2)
+    yield ReviewFigure("floor left", _by_reason(document.left_by_reason))
+    yield ReviewFigure("floor out of reach", _by_reason(document.out_of_reach_by_reason))
     for percent in MILESTONES:
         at_s = (document.reached_s or {}).get(str(percent))
         text = "never" if document.reached_s else NOT_KNOWN
-        yield Figure(
+        yield ReviewFigure(
             f"{percent} % of cells covered after", text if at_s is None else clock(at_s), at_s
         )
     for name, member, unit in NUMBERS:
         value: float | None = getattr(document, member)
-        yield Figure(name, count(value, unit), value)
+        yield ReviewFigure(name, count(value, unit), value)
 
 
 def _by_reason(floor: dict[str, float] | None) -> str:

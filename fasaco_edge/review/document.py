@@ -13,7 +13,7 @@ from fasaco_edge.text import percent
 
 if TYPE_CHECKING:
     from fasaco_edge.recording.read.run import PartFile
-    from fasaco_edge.review.floor import RoomChapter
+    from fasaco_edge.review.floor_and_rooms import RoomChapter
     from fasaco_edge.review.moments import Stand
     from fasaco_edge.review.orders import CommandThen, OrderChapter
     from fasaco_edge.review.spot import LeftPatch
@@ -32,7 +32,7 @@ class MapSize(msgspec.Struct):
         return self.cols * self.resolution_m, self.rows * self.resolution_m
 
 
-class Trouble(msgspec.Struct):
+class TroublePeriod(msgspec.Struct):
     """A period with a fault."""
 
     state: str
@@ -177,7 +177,7 @@ class ReviewDocument(msgspec.Struct):
     recorder_processor_s: float | None = None
     restored_cells: int = 0
     states: dict[str, float] = {}
-    troubles: list[Trouble] = []
+    troubles: list[TroublePeriod] = []
     charges: list[Charge] = []
     longest_stand: Stand | None = None
     faults: int = 0

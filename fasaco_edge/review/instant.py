@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import FREE, OccupancyGrid
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine, lines_in, read_drawings
-from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
-from fasaco_edge.review.floor import nearest_points
+from fasaco_edge.recording.read.run import RunRecord
+from fasaco_edge.recording.read.timeline import DrawnLine, lines_in, read_drawings
+from fasaco_edge.review.floor_and_rooms import nearest_points
 from fasaco_edge.review.orders import CommandThen, commands_of, order_words
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.path_documents import Rectangle
@@ -116,7 +116,7 @@ class Instant(msgspec.Struct):
     next_command: CommandThen | None
 
 
-class Scene(msgspec.Struct, frozen=True):
+class InstantPicture(msgspec.Struct, frozen=True):
     """An instant with the data of its picture: map, and lines of the paths."""
 
     instant: Instant
@@ -126,8 +126,8 @@ class Scene(msgspec.Struct, frozen=True):
     after: DrawnLine | None
 
 
-def scene_at(review: Review, at_s: float) -> Scene:
-    """Return the scene at a time [s].
+def instant_at(review: Review, at_s: float) -> InstantPicture:
+    """Return what a picture of a time [s] shows.
 
     Raises:
         UnreadableRecording: a file of the recording is gone.
@@ -169,7 +169,7 @@ def scene_at(review: Review, at_s: float) -> Scene:
         next_command=next((each for each in commands if each.at_s > at_s), None),
     )
     shown = (lines.get(each.revision if each else 0) for each in (before, path, after))
-    return Scene(instant, grid, *shown)
+    return InstantPicture(instant, grid, *shown)
 
 
 def _path(
@@ -194,7 +194,6 @@ def _path(
 
 
 def _plan(paths: Sequence[PathSample]) -> PlanThen | None:
-    """Return the plan of the last path that has one."""
     for sample in reversed(paths):
         about = sample.about
         if about.planner is not None:
@@ -224,7 +223,7 @@ def _map_at(record: RunRecord, at_s: float) -> tuple[OccupancyGrid | None, MapTh
     since_s = max(at_s - MAP_S, 0.0)
     old: OccupancyGrid | None = None
     new: OccupancyGrid | None = None
-    for came_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
+    for came_s, grid in maps_of(record):
         if came_s > at_s:
             break
         new = grid

@@ -1,20 +1,17 @@
-"""States of a recording and their durations, longest standstill, replans, faults."""
+"""States of a recording and their durations, longest standstill, replans, refused messages."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 
 import msgspec
 import numpy as np
-from msgspec import UNSET
 
-from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
 
 # Smaller changes of the pose do not count as motion.
@@ -32,8 +29,6 @@ _DETAIL = re.compile(r":| at cell|,| \d")
 # Texts of ``grid.reachable_area.AreaChange``.
 _MAP = "map: "
 _CHANGES = ("more", "fewer", "passages changed")
-# Log lines of a recorder without a fault.
-IN_ORDER = tuple(f"{state}: " for state in RECORDER_IN_ORDER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,16 +87,12 @@ def troubles_at_rest(statuses: Sequence[StatusSample], end_s: float) -> list[Spa
     return [*found, *lasting.values()]
 
 
-def under_way(states: Sequence[Span]) -> tuple[Span, ...]:
-    """Return the periods of each mission, from its first plan to its end, pauses included."""
-    runs = [list(run) for rests, run in groupby(states, lambda s: s.name in AT_REST) if not rests]
-    return tuple(Span("under way", run[0].begin_s, run[-1].end_s) for run in runs)
-
-
 def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
     """Return the longest standstill during a mission; None without any."""
-    found = [stand for during in under_way(states) if (stand := _stand(data, during))]
-    longest = max(found, key=lambda stand: stand[1], default=None)
+    # A mission lasts from its first plan to its end, pauses included.
+    runs = [list(run) for rests, run in groupby(states, lambda s: s.name in AT_REST) if not rests]
+    found = [_stand(data, run[0].begin_s, run[-1].end_s) for run in runs]
+    longest = max(filter(None, found), key=lambda stand: stand[1], default=None)
     if longest is None:
         return None
     since, seconds, x, y = (round(value, 3) for value in longest)
@@ -109,9 +100,9 @@ def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
     return Stand(since, seconds, x, y, list(dict.fromkeys(meanwhile)))
 
 
-def _stand(data: RunData, during: Span) -> tuple[float, float, float, float] | None:
+def _stand(data: RunData, begin_s: float, end_s: float) -> tuple[float, float, float, float] | None:
     """Return begin, length [s], x, y [m] of the longest standstill; None without a pose."""
-    chosen = (data.times >= during.begin_s) & (data.times <= during.end_s)
+    chosen = (data.times >= begin_s) & (data.times <= end_s)
     times, poses = data.times[chosen].tolist(), data.track[chosen].tolist()
     if not times:
         return None
@@ -175,45 +166,10 @@ def kind_of(reason: str) -> str:
     return _DETAIL.split(reason, maxsplit=1)[0].strip() or "no reason given"
 
 
-@dataclass(frozen=True, slots=True)
-class Faults:
-    """Refused messages and losses.
-
-    Attributes:
-        by_code: messages refused by the daemon.
-        lost: number of samples that the recorder lost; None if unknown.
-        complaints: faults in the recorder's log, one a line.
-    """
-
-    by_code: dict[str, int]
-    lost: int | None
-    complaints: tuple[str, ...]
-
-    @property
-    def total(self) -> int:
-        """Number of messages refused by the daemon."""
-        return sum(self.by_code.values())
-
-
-def faults_of(data: RunData, record: RunRecord) -> Faults:
-    """Return the faults in a recording."""
-    recorders = [each.status.recorder for each in data.statuses]
-    lost = [recorder.lost for recorder in recorders if recorder and recorder.lost is not UNSET]
-    return Faults(
-        by_code=_totals([each.status.errors.by_code for each in data.statuses]),
-        lost=max(lost, default=None),
-        complaints=tuple(
-            line
-            for log in (entities.BUS_LOG, entities.RECORDER_LOG)
-            for _, line in record.log.get(log, ())
-            if not line.startswith(IN_ORDER)
-        ),
-    )
-
-
-def _totals(counted: Sequence[Mapping[str, int]]) -> dict[str, int]:
-    """Return the total of each count, which a restart of the daemon resets."""
+def refused_by_code(data: RunData) -> dict[str, int]:
+    """Return the number of messages refused by the daemon, whose restart resets its counts."""
     total = Counter[str]()
+    counted = [each.status.errors.by_code for each in data.statuses]
     for before, now in pairwise((*counted, {})):
         total.update({code: count for code, count in before.items() if now.get(code, 0) < count})
     return dict(sorted(total.items()))

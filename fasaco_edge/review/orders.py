@@ -54,17 +54,15 @@ class CommandThen(msgspec.Struct):
 
 def commands_of(data: RunData) -> list[CommandThen]:
     """Return the commands of a recording, in order."""
-    return [
-        CommandThen(round(at_s, 3), command_words(name, order))
-        for at_s, name, order in data.commands
-    ]
+    found = []
+    for at_s, name, order in data.commands:
+        words = f"start: {order_words(_document(order))}" if name == "start" else name
+        found.append(CommandThen(round(at_s, 3), words))
+    return found
 
 
-def command_words(name: str, order: MissionOrder) -> str:
-    """Return a command and its order as text."""
-    if name != "start":
-        return name
-    return f"start: {order_words(msgspec.convert(order_document(order), OrderDocument))}"
+def _document(order: MissionOrder) -> OrderDocument:
+    return msgspec.convert(order_document(order), OrderDocument)
 
 
 def order_words(order: OrderDocument) -> str:
@@ -143,7 +141,8 @@ def _held(
     ordered, began, order = next(filter(None, reported), "itself"), 0.0, None
     is_open = True
     for at_s, name, given in data.commands:
-        if name == "start" and is_open and _goes_on(order, given, _state_at(states, at_s)):
+        is_the_same = name == "start" and is_open and order == given
+        if is_the_same and _state_at(states, at_s) not in OVER:
             continue
         if name == "start" or (name in ENDS and is_open):
             if is_open:
@@ -151,10 +150,6 @@ def _held(
             ordered, began, order, is_open = "command", at_s, given, name == "start"
     if is_open:
         yield ordered, began, end_s, None, order
-
-
-def _goes_on(order: MissionOrder | None, given: MissionOrder, state: str) -> bool:
-    return order is not None and order == given and state not in OVER
 
 
 def _state_at(states: Sequence[Span], at_s: float) -> str:
@@ -198,7 +193,7 @@ def _chapter(
         complete,
         covered,
         coverable,
-        order=msgspec.convert(order_document(order), OrderDocument) if order else _by_zones(zones),
+        order=_document(order) if order else _by_zones(zones),
         replans=sum(
             begin_s <= path.at_s < until for path in data.paths if path.about.planner is not None
         ),

@@ -25,7 +25,7 @@ from fasaco_edge.recording.read.run import (
     read_run_record,
 )
 from fasaco_edge.recording.scene.runcard import cells_of
-from fasaco_edge.review.floor import (
+from fasaco_edge.review.floor_and_rooms import (
     MILESTONES,
     RoomChapter,
     labels_of,
@@ -36,11 +36,9 @@ from fasaco_edge.review.floor import (
 from fasaco_edge.review.moments import (
     RECORDER_IN_ORDER,
     TROUBLES,
-    Faults,
     Replans,
     Span,
     Stand,
-    faults_of,
     longest_stand,
     spans_of,
     troubles_at_rest,
@@ -120,7 +118,6 @@ class Review:
         states: states of the mission, in order.
         recorder_states: states of the recorder, in order.
         longest_stand: longest standstill during a mission; None without any.
-        faults: refused messages and losses.
         missing: number of samples lost before they were written.
     """
 
@@ -136,7 +133,6 @@ class Review:
     states: tuple[Span, ...]
     recorder_states: tuple[Span, ...]
     longest_stand: Stand | None
-    faults: Faults
     missing: int
 
     @property
@@ -197,14 +193,6 @@ class Review:
             if span.name not in RECORDER_IN_ORDER
         ]
         return sorted(mission + recorder, key=lambda span: span.begin_s)
-
-    @property
-    def seconds_by_state(self) -> dict[str, float]:
-        """Total duration of each state [s]."""
-        total: dict[str, float] = {}
-        for span in self.states:
-            total[span.name] = total.get(span.name, 0.0) + span.seconds
-        return total
 
     @property
     def reached_s(self) -> dict[int, float | None] | None:
@@ -271,13 +259,11 @@ def review_of(
             _entered(record, entities.RECORDER_STATE, entities.RECORDER_LOG), end_s
         ),
         longest_stand=longest_stand(data, states),
-        faults=faults_of(data, record),
         missing=missing,
     )
 
 
 def _lattice(data: RunData) -> tuple[CoverageLattice | None, str]:
-    """Return the lattice over the last map, or why there is none."""
     footprint = data.footprint
     if data.grid is None:
         return None, "there is no map"
@@ -306,14 +292,14 @@ def _mission_states(data: RunData, record: RunRecord) -> list[Entered]:
 
 
 def _entered(record: RunRecord, entity: str, log: str) -> list[Entered]:
-    lines = record.log.get(log, ())
+    lines = record.texts.get(log, ())
     return [
         (record.clock.seconds(at), state, _reason(lines, at, state))
-        for at, state in record.states.get(entity, ())
+        for at, state in record.texts.get(entity, ())
     ]
 
 
-def _reason(lines: tuple[TimedText, ...], at_ns: int, state: str) -> str:
+def _reason(lines: Sequence[TimedText], at_ns: int, state: str) -> str:
     """Return the reason in the log for a state entered at ``at_ns``; "" for none."""
     prefix = f"{state}: "
     found = (line for at, line in lines if at == at_ns and line.startswith(prefix))

@@ -24,6 +24,7 @@ from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.recording.read.robot_clock import RobotClock
+from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
 from fasaco_edge.wire.documents.json_text import Settings, decode_json, decode_tolerant
 from fasaco_edge.wire.documents.path_documents import PATH_DIGEST, PathAttachment
 from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport
@@ -210,14 +211,13 @@ def gather(samples: Iterable[Arrival], clock: RobotClock) -> RunData:
     return reader.data
 
 
-def maps_of(samples: Iterable[Arrival], clock: RobotClock) -> Iterator[tuple[float, OccupancyGrid]]:
+def maps_of(record: RunRecord) -> Iterator[tuple[float, OccupancyGrid]]:
     """Yield each version of the map, and its arrival since the recording began [s]."""
-    reader = _SampleReader(clock)
-    for arrival in samples:
-        if arrival.topic in ("map", "map_update"):
-            reader.read(arrival)
-            if reader.data.grid is not None:
-                yield reader.data.map_s[-1], reader.data.grid
+    reader = _SampleReader(record.clock)
+    for arrival in RecordedSamples((), record.batches, ("map", "map_update")):
+        reader.read(arrival)
+        if reader.data.grid is not None:
+            yield reader.data.map_s[-1], reader.data.grid
 
 
 class _SampleReader:

@@ -31,10 +31,9 @@ from fasaco_edge.judge.floor import JudgedFloor
 from fasaco_edge.judge.pixels import Mask, Patches, within
 from fasaco_edge.mission.events import BETTER
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine, lines_in, read_drawings
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.review.floor import nearest_points, swept_floor
+from fasaco_edge.recording.read.timeline import DrawnLine, lines_in, read_drawings
+from fasaco_edge.review.floor_and_rooms import nearest_points, swept_floor
 from fasaco_edge.review.run_data import maps_of
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.reasons import plain
@@ -117,50 +116,44 @@ def explain(review: Review, places: Sequence[tuple[float, float]]) -> list[Spot]
     Raises:
         UnreadableRecording: a file of the recording is gone.
     """
-    recorded = _Recorded(review, np.array(places, np.float64).reshape(-1, 2))
-    return [_Judge(review, recorded, number).spot() for number in range(len(places))]
+    judge = _Judge(review, np.array(places, np.float64).reshape(-1, 2))
+    return [judge.spot(number) for number in range(len(places))]
 
 
-class _Recorded:
-    """Data read from a recording on demand, once for all positions, float64 (n, 2) [m]."""
+class _Judge:
+    """Finds the reasons for spots (n, 2) [m], one by one; reads the recording on demand."""
 
     def __init__(self, review: Review, places: NDArray[np.float64]) -> None:
-        self._review, self.places = review, places
+        self._review, self._data, self._places = review, review.data, places
+        known = known_settings(self._data.config).robot
+        self._tool_m, self._radius_m = known.tool_width_m, known.radius_m
+        self._number, self._x, self._y = 0, 0.0, 0.0
 
     @cached_property
-    def seen_s(self) -> NDArray[np.float64]:
+    def _seen_s(self) -> NDArray[np.float64]:
         """Beginning of the last period in which each position is free on the map [s]; else NaN."""
-        record, footprint = self._review.record, self._review.data.footprint
+        footprint = self._data.footprint
         free_at_most = footprint.free_at_most if footprint else -1
-        since = np.full(len(self.places), np.nan)
-        for at_s, grid in maps_of(RecordedSamples((), record.batches), record.clock):
+        since = np.full(len(self._places), np.nan)
+        for at_s, grid in maps_of(self._review.record):
             free = (grid.cells >= FREE) & (grid.cells <= free_at_most)
-            is_free = grid.geometry.values_at(free, self.places)
+            is_free = grid.geometry.values_at(free, self._places)
             since = np.where(is_free, np.fmin(since, at_s), np.nan)
         return since
 
     @cached_property
-    def paths(self) -> list[DrawnLine]:
+    def _paths(self) -> list[DrawnLine]:
         """The drawn paths, in order of time."""
         record = self._review.record
         places = record.drawn.get(entities.PATH, ())
         return [one for one in read_drawings(places, lines_in, record.anchor) if len(one.xy)]
 
-
-class _Judge:
-    """Finds the reason for one spot."""
-
-    def __init__(self, review: Review, recorded: _Recorded, number: int) -> None:
-        self._review, self._recorded, self._number = review, recorded, number
-        self._x, self._y = recorded.places[number].tolist()
-        self._data = review.data
-        known = known_settings(self._data.config).robot
-        self._tool_m, self._radius_m = known.tool_width_m, known.radius_m
-
     def _spot(self, why: str, words: str, *, swept: bool | None = False) -> Spot:
         return Spot(round(self._x, 3), round(self._y, 3), swept, why, words)
 
-    def spot(self) -> Spot:
+    def spot(self, number: int) -> Spot:
+        """Return a spot with its reason."""
+        self._number, (self._x, self._y) = number, self._places[number].tolist()
         grid, floor, footprint = self._data.grid, self._review.all_floor, self._data.footprint
         if grid is None or footprint is None:
             why = self._review.no_lattice or "there is no map"
@@ -242,7 +235,6 @@ class _Judge:
         return spot
 
     def _missed(self, missed_m: float, nearest_s: float) -> Spot:
-        """Return why the tool missed it."""
         by = f"the tool's edge passed {100 * missed_m:.0f} cm from it at {clock(nearest_s)}"
         if self._data.zones and not self._is_within(self._data.zones):
             return self._spot("not ordered", f"in no zone of the last order; {by}")
@@ -253,8 +245,8 @@ class _Judge:
             )
             return self._spot("poses missing", f"{words}; {by}", swept=None)
         over = self._last_path_over()
-        seen_s = float(self._recorded.seen_s[self._number])
-        if over is not None and over is self._recorded.paths[-1] and not self._review.complete:
+        seen_s = float(self._seen_s[self._number])
+        if over is not None and over is self._paths[-1] and not self._review.complete:
             words = f"the last path, {over.revision}, leads over it; the robot did not get there"
             why = "still to come"
         elif over is not None:
@@ -292,7 +284,7 @@ class _Judge:
     def _last_path_over(self) -> DrawnLine | None:
         """Return the last path that would have swept the spot; None for none."""
         reach_m, place = self._tool_m / 2 - NEAR_M, (self._x, self._y)
-        paths = reversed(self._recorded.paths)
+        paths = reversed(self._paths)
         return next((one for one in paths if _distances(one.xy, place).min() <= reach_m), None)
 
     def _left_by(self, over: DrawnLine) -> tuple[str, str]:

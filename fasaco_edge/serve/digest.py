@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from fasaco_edge.client import phrases
-from fasaco_edge.client.events import EventLog
+from fasaco_edge.client.phrases import EventLog
 from fasaco_edge.client.robot_state import RobotState
 from fasaco_edge.grid.geometry import Bounds, Polygon
 from fasaco_edge.grid.label_place import label_place

@@ -15,8 +15,8 @@ from fasaco_edge.client.robot_state import SILENCE_S
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import DrawnLine, Place
-from fasaco_edge.recording.read.timeline import Timeline
+from fasaco_edge.recording.read.run import DrawingPlace
+from fasaco_edge.recording.read.timeline import DrawnLine, Timeline
 from fasaco_edge.serve.messages import framed, message_text
 from fasaco_edge.serve.served_view import MOST_POINTS, PERIODS_S, ServedView
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -45,8 +45,8 @@ class RecordedView(ServedView):
     def __init__(self, robot: str) -> None:
         super().__init__(Keys())
         self.robot, self.robots = robot, {robot}
-        # Place in the recording of each grid shown.
-        self._drawn: dict[str, Place] = {}
+        # DrawingPlace in the recording of each grid shown.
+        self._drawn: dict[str, DrawingPlace] = {}
 
     def silent_s(self, now: float) -> float:
         """Return the age of the newest status [s]; 0 if the next one is not yet overdue."""
@@ -63,7 +63,7 @@ class RecordedView(ServedView):
         made = {"path": self._path, "pose": self.pose} | self._grids
         return [kind for kind, content in made.items() if content is not None]
 
-    def draw(self, kind: str, place: Place, timeline: Timeline) -> None:
+    def draw(self, kind: str, place: DrawingPlace, timeline: Timeline) -> None:
         """Take in a drawn grid unless it is shown already; errors as for ``Timeline.grid``."""
         if self._drawn.get(kind) == place:
             return
@@ -110,7 +110,7 @@ class Playback:
         """Go back to the beginning of the recording."""
         self._view = RecordedView(self._robot)
         self._at_ns = 0
-        self._path: Place | None = None
+        self._path: DrawingPlace | None = None
         self._abouts: dict[int, bytes] = {}
 
     def newest(self) -> list[tuple[str, int, str | bytes]]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.client.robot_state import PathProgress, RobotState
+from fasaco_edge.client.robot_state import RobotState, WatchedPath
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.serve.digest import areas, lately, rooms, shares, state
 from fasaco_edge.serve.messages import (
@@ -220,7 +220,7 @@ class ServedView(RobotState):
         except FasacoError as error:
             self.note_unreadable("path", error, now)
             return None
-        self.walk = PathProgress(xy, about.revision)
+        self.walk = WatchedPath(xy, about.revision)
         if self.pose is not None:
             self.walk.join(self.pose)
         # Relative to the first point, as float32 does not resolve centimetres far from 0.

@@ -119,7 +119,7 @@ def run_simulation(
         if joined is None:
             return None
         bus = stack.enter_context(joined)
-        robot = RobotOnBus(world, keys, bus, driver)
+        robot = SimulatedRobot(world, keys, bus, driver)
         if meets_others:
             bus.subscribe(keys.of_all(topics.POSE), robot.meet)
         robot.drive(speed, lambda: stop.is_set() or should_stop(), report)
@@ -128,7 +128,7 @@ def run_simulation(
     return last
 
 
-class RobotOnBus:
+class SimulatedRobot:
     """The robot of a world on a bus: publishes its messages, and follows the newest path, or the
     newest velocity."""
 

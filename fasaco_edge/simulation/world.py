@@ -181,7 +181,11 @@ class World:
         """Let one time step pass; return the messages published after it."""
         self._move()
         self._ticks += 1
-        self._count_stand()
+        if self.drive.moving:
+            stood_s = self._stands * self.config.tick_s
+            self._stands, self.longest_stand_s = 0, max(self.longest_stand_s, stood_s)
+        elif self.distance_m > 0.0:
+            self._stands += 1
         self._drain()
         if self._is_due(self.config.scan_hz):
             self.mapper.scan(self.pose)
@@ -223,7 +227,6 @@ class World:
         self._corners, self.activity = [], Activity.NO_WAY
 
     def _may_try_again(self) -> bool:
-        """Return whether the robot has come to rest after its first stop on its path."""
         is_first = self.stops == self._stopped_at + 1
         return self.activity is Activity.STOPPED and is_first and not self.drive.moving
 
@@ -237,7 +240,6 @@ class World:
         return np.array([self._on_map((x, y)) for x, y in track], np.float64)
 
     def _on_map(self, place: Point) -> Point:
-        """Return the position of a true point on the robot's map [m]."""
         pose = self.mapper.believed(Pose2D(*place))
         return pose.x, pose.y
 
@@ -258,7 +260,6 @@ class World:
             self._go_on(driven(self.drive, goal, self.config))
 
     def _goal(self) -> Point:
-        """Return the true position of the next corner."""
         return self.mapper.true_place(*self._corners[-1])
 
     def _may_drive_on(self) -> bool:
@@ -292,7 +293,6 @@ class World:
             self._go_on(ahead)
 
     def _slid(self, ahead: DriveState) -> DriveState | None:
-        """Return the state of a base that slides along a wall; None if it cannot."""
         here, pose = self.pose, ahead.pose
         way = math.dist((here.x, here.y), (pose.x, pose.y))
         for off in map(math.radians, SLIDES_DEG):
@@ -330,14 +330,6 @@ class World:
                 self._track.append(here)
             self.distance_m += abs(ahead.speed) * self.config.tick_s
             self.drive = ahead
-
-    def _count_stand(self) -> None:
-        """Count how long the robot stands, once it has moved."""
-        if self.drive.moving:
-            stood_s = self._stands * self.config.tick_s
-            self._stands, self.longest_stand_s = 0, max(self.longest_stand_s, stood_s)
-        elif self.distance_m > 0.0:
-            self._stands += 1
 
 
 def _fits(truth: OccupancyGrid, pose: Pose2D, config: SimulationConfig) -> bool:

@@ -16,8 +16,7 @@ from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
 
-from fasaco_edge.client.events import BAD, GOOD, ORDER, PLAIN, Event, EventLog
-from fasaco_edge.client.phrases import clock
+from fasaco_edge.client.phrases import BAD, GOOD, ORDER, PLAIN, Event, EventLog, clock
 from fasaco_edge.drawing.palette import Colour
 from fasaco_edge.watch import picture
 
@@ -32,7 +31,7 @@ _LOOKS: dict[int, tuple[Colour, str]] = {
     picture.FLOOR: ((46, 50, 58), "."),
     picture.TO_COVER: ((98, 104, 116), "-"),
     picture.COVERED: ((24, 112, 82), "o"),
-    picture.RECOVERED: ((176, 122, 40), "8"),
+    picture.REVISITED: ((176, 122, 40), "8"),
     picture.WALL: ((214, 218, 226), "#"),
     picture.AHEAD: ((72, 128, 240), "+"),
     picture.NEXT: ((255, 240, 110), "*"),
@@ -102,21 +101,17 @@ def _line(glyphs: GlyphSet, upper: bytes, lower: bytes) -> str:
     for end in range(1, len(upper) + 1):
         ends = end == len(upper)
         if ends or upper[end] != upper[begin] or lower[end] != lower[begin]:
-            runs.append(_run(glyphs, upper[begin], lower[begin], end - begin))
+            text, above, below = _glyph(glyphs, upper[begin], lower[begin])
+            run = text * (end - begin)
+            if glyphs.colours is not None:
+                style = _style(glyphs.colours, above, below)
+                run = style.render(run, color_system=glyphs.colours)
+            runs.append(run)
             begin = end
     return "".join(runs)
 
 
-def _run(glyphs: GlyphSet, upper: int, lower: int, length: int) -> str:
-    text, above, below = _glyph(glyphs, upper, lower)
-    if glyphs.colours is None:
-        return text * length
-    style = _style(glyphs.colours, above, below)
-    return style.render(text * length, color_system=glyphs.colours)
-
-
 def _glyph(glyphs: GlyphSet, upper: int, lower: int) -> tuple[str, int, int]:
-    """Return a character, and the kinds that its foreground and background show."""
     shown = max(upper, lower)
     if shown >= picture.LETTER:
         return picture.LETTERS[shown - picture.LETTER], picture.WALL, picture.UNKNOWN
@@ -138,7 +133,7 @@ FAINT = "bright_black"
 TONES = {PLAIN: "", GOOD: "green", BAD: "red", ORDER: "yellow"}
 
 
-class Blocks:
+class ScreenBlocks:
     """Draws rich's renderables as lines of a given width; unchanged blocks are cached.
 
     Attributes:

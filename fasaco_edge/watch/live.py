@@ -16,7 +16,7 @@ from types import FrameType
 from typing import Any, Protocol, Self, TextIO
 
 from fasaco_edge.client import phrases
-from fasaco_edge.client.events import EventLog
+from fasaco_edge.client.phrases import EventLog
 from fasaco_edge.host.processes import stop_event
 from fasaco_edge.text import json_line
 
@@ -28,7 +28,7 @@ LINE_EVERY_S = 1.0
 MOST_COLUMNS, MOST_LINES = 800, 400
 
 
-class View(Protocol):
+class WatchedView(Protocol):
     """The newest data of a robot or a fleet.
 
     Attributes:
@@ -49,7 +49,7 @@ class Watched(ABC):
     """
 
     rest_s: float
-    view: View
+    view: WatchedView
 
     @abstractmethod
     def take(self, timeout_s: float) -> bool:

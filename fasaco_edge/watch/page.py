@@ -10,13 +10,12 @@ from rich.text import Text
 
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client import phrases
-from fasaco_edge.client.events import TROUBLED
 from fasaco_edge.client.feed import Feed
-from fasaco_edge.client.phrases import age, clock
+from fasaco_edge.client.phrases import TROUBLED, age, clock
 from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.text import one_line, percent
 from fasaco_edge.watch import picture
-from fasaco_edge.watch.glyphs import FAINT, Blocks, with_keys
+from fasaco_edge.watch.glyphs import FAINT, ScreenBlocks, with_keys
 from fasaco_edge.watch.live import Watched
 from fasaco_edge.watch.picture import MissionPicture, RobotView
 from fasaco_edge.watch.status_table import figures, state_colour
@@ -24,7 +23,7 @@ from fasaco_edge.wire.documents.json_text import decode_json
 
 LEGEND = (
     (picture.COVERED, "covered"),
-    (picture.RECOVERED, "twice"),
+    (picture.REVISITED, "twice"),
     (picture.TO_COVER, "to cover"),
     (picture.FLOOR, "not to cover"),
     (picture.WALL, "wall"),
@@ -63,7 +62,7 @@ class Page:
     """Drawing of a robot's view as lines of text, with a cache for unchanged parts."""
 
     def __init__(self, console: Console) -> None:
-        self._blocks = Blocks(console)
+        self._blocks = ScreenBlocks(console)
         self._picture = MissionPicture()
 
     def lines(self, view: RobotView, now: float, width: int, height: int) -> list[str]:

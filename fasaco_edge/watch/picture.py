@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.client.robot_state import PathProgress, RobotState
+from fasaco_edge.client.robot_state import RobotState, WatchedPath
 from fasaco_edge.grid.geometry import Bounds, Pose2D, union_bounds
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
@@ -68,7 +68,7 @@ class RobotView(RobotState):
 
     def _read_path(self, sample: Sample, now: float) -> None:
         about = decode_document(sample.attachment or b"{}", PathAttachment)
-        self.walk = PathProgress(decode_path(sample.payload).xy, about.revision)
+        self.walk = WatchedPath(decode_path(sample.payload).xy, about.revision)
         steps = f"{about.steps} steps" if len(self.walk.xy) else "stop"
         self.events.add(now, f"path {about.revision}, {steps}: {about.reason}")
 
@@ -121,13 +121,10 @@ class Frame:
         beyond = 2.0**31
         return np.stack([rows, cols], axis=-1).clip(-beyond, beyond).astype(np.int64)
 
-    def sampled(self, grid: OccupancyGrid, per_pixel: int, beyond: int) -> NDArray[np.int8]:
+    def sampled(self, grid: OccupancyGrid, per_pixel: int = 1) -> NDArray[np.int8]:
         """Return a grid's values on this raster, int8 (rows * per_pixel, cols * per_pixel).
 
-        Args:
-            grid: a map or a coverage.
-            per_pixel: samples per pixel and axis.
-            beyond: value outside the grid.
+        There are ``per_pixel`` samples per pixel and axis; outside the grid the value is -1.
         """
         rows, cols = (size * per_pixel for size in self.shape)
         step, origin = self.pixel_m / per_pixel, grid.geometry.origin
@@ -144,12 +141,12 @@ class Frame:
         height, width = grid.cells.shape
         inside = (row >= 0) & (row < height) & (col >= 0) & (col < width)
         values = grid.cells[row.clip(0, height - 1), col.clip(0, width - 1)]
-        sampled: NDArray[np.int8] = np.where(inside, values, np.int8(beyond))
+        sampled: NDArray[np.int8] = np.where(inside, values, np.int8(-1))
         return sampled
 
 
 # If several kinds share a character of a terminal without colours, the largest number is shown.
-UNKNOWN, FLOOR, TO_COVER, COVERED, RECOVERED, WALL, AHEAD, NEXT, ROBOT = range(9)
+UNKNOWN, FLOOR, TO_COVER, COVERED, REVISITED, WALL, AHEAD, NEXT, ROBOT = range(9)
 HEADING = ROBOT + 1
 """The character of the robot's centre: this plus its heading in eighths of a turn."""
 EIGHTHS = 8
@@ -175,12 +172,15 @@ def ground(frame: Frame, grid: OccupancyGrid | None, coverage: OccupancyGrid | N
 
     A pixel that contains an occupied pixel of the map is wall; without a map, a blocked cell is.
     """
-    cells = None if coverage is None else _coverage(frame, coverage, blocked=grid is None)
+    cells: Kinds | None = None
+    if coverage is not None:
+        table = _COVERAGE_AND_BLOCKED_KINDS if grid is None else _COVERAGE_KINDS
+        cells = table[frame.sampled(coverage).view(np.uint8)]
     if grid is None:
         return np.full(frame.shape, UNKNOWN, np.uint8) if cells is None else cells
     finer = math.ceil(frame.pixel_m / grid.geometry.resolution)
     samples = min(max(finer, 1), MOST_SAMPLES)
-    sampled = _MAP_KINDS[frame.sampled(grid, samples, -1).view(np.uint8)]
+    sampled = _MAP_KINDS[frame.sampled(grid, samples).view(np.uint8)]
     rows, cols = frame.shape
     kinds: Kinds = sampled.reshape(rows, samples, cols, samples).max(axis=(1, 3))
     if cells is not None:
@@ -239,12 +239,6 @@ def draw_names(kinds: Kinds, frame: Frame, rooms: Rooms) -> None:
             _put(kinds, both, LETTER + LETTERS.index(letter))
 
 
-def _coverage(frame: Frame, coverage: OccupancyGrid, *, blocked: bool) -> Kinds:
-    table = _COVERAGE_AND_BLOCKED_KINDS if blocked else _COVERAGE_KINDS
-    kinds: Kinds = table[frame.sampled(coverage, 1, CoverageValue.UNKNOWN).view(np.uint8)]
-    return kinds
-
-
 def _put(kinds: Kinds, pixels: NDArray[np.int64], kind: int) -> None:
     rows, cols = kinds.shape
     row, col = pixels.T
@@ -259,7 +253,7 @@ _MAP_KINDS[OCCUPIED_AT_LEAST : 100 + 1] = WALL
 _COVERAGE_KINDS = np.full(256, UNKNOWN, np.uint8)
 _COVERAGE_KINDS[CoverageValue.TO_COVER] = TO_COVER
 _COVERAGE_KINDS[CoverageValue.COVERED] = COVERED
-_COVERAGE_KINDS[CoverageValue.RECOVERED] = RECOVERED
+_COVERAGE_KINDS[CoverageValue.RECOVERED] = REVISITED
 _COVERAGE_AND_BLOCKED_KINDS = _COVERAGE_KINDS.copy()
 _COVERAGE_AND_BLOCKED_KINDS[CoverageValue.BLOCKED] = WALL
 

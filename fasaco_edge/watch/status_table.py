@@ -9,7 +9,7 @@ from fasaco_edge.client import phrases
 from fasaco_edge.text import duration, one_line, percent
 from fasaco_edge.watch.glyphs import GlyphSet
 from fasaco_edge.wire.documents.path_documents import PathReport
-from fasaco_edge.wire.documents.replies import CoverageReport, FloorReport, MissionReport
+from fasaco_edge.wire.documents.replies import FloorReport, MissionReport
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.status import BatteryReport, FleetReport, Status, SupervisedRecorder
 from fasaco_edge.wire.reasons import plain
@@ -57,7 +57,10 @@ def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet
     ]
     if status.coverage is not None:
         bar = glyphs.bar(status.coverage.fraction, min(width, LONGEST_BAR))
-        rows += _coverage(status.coverage, bar, " of all floor" if status.mission.zones else "")
+        coverage, of_all = status.coverage, " of all floor" if status.mission.zones else ""
+        share = Text(percent(coverage.fraction), "bold")
+        share.append(f", {coverage.covered} of {coverage.coverable} cells{of_all}", "not bold")
+        rows += [("covered", share), ("", bar)]
     if status.path is not None:
         rows += _path(status.path, to_go)
     if status.coverage is not None and status.coverage.recovered:
@@ -74,12 +77,6 @@ def _rows(status: Status, rooms: Rooms, to_go: str, width: int, glyphs: GlyphSet
 def state_colour(state: str) -> str:
     """Return the colour of a state."""
     return STATE_COLOURS.get(state, "bright_black")
-
-
-def _coverage(coverage: CoverageReport, bar: Text, of_all: str) -> list[Row]:
-    share = Text(percent(coverage.fraction), "bold")
-    share.append(f", {coverage.covered} of {coverage.coverable} cells{of_all}", "not bold")
-    return [("covered", share), ("", bar)]
 
 
 def _floor(floor: FloorReport) -> list[Row]:

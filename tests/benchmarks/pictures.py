@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.floor import draw_visits, visits_of
 from fasaco_edge.drawing.pictures import draw_driven
-from fasaco_edge.drawing.plot import Plot, View
+from fasaco_edge.drawing.plot import Plot, PlotView
 from fasaco_edge.drawing.sheet import LINE_PX, TEXT_PX, KeyEntry, Sheet, font_of, wrapped
+from fasaco_edge.drawing.tints import draw_visits, visits_of
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.planners.planner import ColonySnapshot
@@ -48,7 +48,7 @@ def draw_walks(
     """
     cell_m = walks[0].lattice.cell_m
     centres = np.concatenate([walk.lattice.centres(walk.cells) for walk in walks])
-    view = View.over(bounds_around(centres, cell_m), cell_m, PANEL_PX, PANEL_PX)
+    view = PlotView.over(bounds_around(centres, cell_m), cell_m, PANEL_PX, PANEL_PX)
     panels = _arranged([_panel(view, walk) for walk in walks], columns)
     scale = view.scale * cell_m
     sheet = Sheet(title, lines, _key(walks), ("start", "end"), scale, unit="cells")
@@ -63,12 +63,12 @@ def _key(walks: Sequence[LabelledWalk]) -> tuple[KeyEntry, ...]:
         KeyEntry("tile", palette.COVERED, "covered once"),
         *(
             KeyEntry("tile", colour, times)
-            for colour, times in zip(palette.RECOVERED, TIMES, strict=True)
+            for colour, times in zip(palette.REVISITED, TIMES, strict=True)
         ),
     )
 
 
-def _panel(view: View, walk: LabelledWalk) -> Image.Image:
+def _panel(view: PlotView, walk: LabelledWalk) -> Image.Image:
     plot = Plot(view)
     plot.ground(walk.lattice)
     lattice, cells = walk.lattice, walk.cells
@@ -127,7 +127,7 @@ def draw_pheromone(
     corner = np.array((snapshot.window.row0, snapshot.window.col0))
     centres = lattice.centres((np.argwhere(walked) + corner).astype(np.int32))
     bounds = bounds_around(centres, lattice.cell_m)
-    plot = Plot(View.over(bounds, lattice.cell_m, FIELD_PX, FIELD_PX))
+    plot = Plot(PlotView.over(bounds, lattice.cell_m, FIELD_PX, FIELD_PX))
     plot.ground(lattice)
     plot.tint(lattice, colours)
     bar = (f"{low:.3f}", f"{high:.3f}")

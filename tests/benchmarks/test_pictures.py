@@ -25,7 +25,7 @@ def test_each_walk_has_its_place():
     lattice = CoverageLattice.from_free(np.ones((8, 8), bool))
     walks = [there_and_back(str(row), lattice, row) for row in (0, 7, 7)]
     picture = draw_walks(walks, title="three", lines=LINES)
-    again = places(picture, palette.RECOVERED[0])
+    again = places(picture, palette.REVISITED[0])
     middle = np.array(picture.size) / 2
     left, top = again[:, 0] < middle[0], again[:, 1] < middle[1]
     for part in (left & top, ~left & top, left & ~top):

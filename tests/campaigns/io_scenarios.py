@@ -21,7 +21,7 @@ from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import LedgerFileError, UnreadableRecording
 from fasaco_edge.planners.compiling import WARNING
-from fasaco_edge.recording.read.repair import repair_folder
+from fasaco_edge.recording.read.torn import repair_folder
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from tests.campaigns.kill_recorder import driving

@@ -24,8 +24,8 @@ from pathlib import Path
 
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import repair_folder
 from fasaco_edge.recording.read.run import RecordedSamples
+from fasaco_edge.recording.read.torn import repair_folder
 from tests.support.recordings import begun_parts, bus_on_free_port, read_column, recorder_process
 from tests.support.scripted_mission import Mission
 

@@ -34,7 +34,7 @@ import yaml
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import LedgerFileError, UnreadableRecording
-from fasaco_edge.recording.read.repair import repair_folder
+from fasaco_edge.recording.read.torn import repair_folder
 from tests.campaigns.file_calls import Call, Kind, Watch, why_not
 from tests.campaigns.power_states import Cut, Disk, Spread, cuts_of
 from tests.campaigns.roaming import entries, roaming_robot

@@ -37,7 +37,7 @@ from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.quota import budget_of
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire.documents.json_text import decode_tolerant, encode_json
-from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.status import Recorder, Status
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path, encode_path
@@ -186,8 +186,8 @@ class Desk:
     """What a recorder does with a sample, at any speed."""
 
     def __init__(self, folder: Path) -> None:
-        room = budget_of(DaemonConfig())
-        self.writer = RecordingWriter(folder, "run", room, build_blueprint(None))
+        budget = budget_of(DaemonConfig(), folder)
+        self.writer = RecordingWriter("run", budget, build_blueprint(None))
         self.writer.at(BEGAN_NS)
         self._inputs = InputLog(self.writer, BEGAN_NS)
         self._scene = Scene(self.writer, RunDescription("robot", "now"))
@@ -198,10 +198,7 @@ class Desk:
             "path": lambda sample: scene.add_path(
                 decode_path(sample.payload), decode_tolerant(sample.attachment, PathAttachment)
             ),
-            "pheromone": lambda sample: scene.add_pheromone(
-                decode_pheromone(sample.payload),
-                decode_tolerant(sample.attachment, TrailAttachment),
-            ),
+            "pheromone": lambda sample: scene.add_pheromone(decode_pheromone(sample.payload)),
             "status": lambda sample: scene.add_status(decode_tolerant(sample.payload, Status)),
         }
 

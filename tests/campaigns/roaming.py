@@ -14,7 +14,7 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
-from fasaco_edge.simulation.node import RobotOnBus
+from fasaco_edge.simulation.node import SimulatedRobot
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Emission, World
 from fasaco_edge.wire.keys import Keys
@@ -47,7 +47,7 @@ class Trail:
             return [point for point in self.points if start_s <= point[0] <= end_s]
 
 
-class Robot(RobotOnBus):
+class Robot(SimulatedRobot):
     """A robot on a thread of its own, on a bus that outlives every daemon: it drives on."""
 
     def __init__(self, bus: Bus, world: World) -> None:

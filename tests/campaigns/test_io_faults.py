@@ -17,9 +17,9 @@ pytestmark = pytest.mark.skipif(bool(why_not()), reason=why_not())
 ENDS_A_PART = """
 import logging, pathlib, sys
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.part import Flush, Part
+from fasaco_edge.recording.write.part import Flush, RecordingPart
 logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stdout)
-part = Part(pathlib.Path(sys.argv[1], "run-part1.rrd"), "run")
+part = RecordingPart(pathlib.Path(sys.argv[1], "run-part1.rrd"), "run")
 part.stream.log("text", rr.TextLog("hello"))
 assert part.flush(60.0) is Flush.DONE
 part.close()
@@ -89,8 +89,8 @@ def test_an_io_fault_is_reported_and_loses_nothing(fault):
 def test_an_unreadable_recording_does_not_stop_the_recorder(tmp_path):
     old = tmp_path / "old.rrd"
     old.write_bytes(b"RRF2 and so on")
-    script = "import sys; from pathlib import Path; from fasaco_edge.recording.read import repair; "
-    script += "print(*repair.repair_folder(Path(sys.argv[1])))"
+    script = "import sys; from pathlib import Path; from fasaco_edge.recording.read import torn; "
+    script += "print(*torn.repair_folder(Path(sys.argv[1])))"
     with Watch([tmp_path], Failure(Kind.READ, 1, "EIO")) as watch:
         command = [sys.executable, "-c", script, str(tmp_path)]
         environment = ENVIRONMENT | watch.environment

@@ -441,7 +441,7 @@ def test_the_recorder_gets_its_settings_from_the_configuration(tmp_path):
     config = load_config(file)
     handed = decode_config(msgspec.json.encode(config))
     assert handed == config
-    budget = budget_of(handed)
+    budget = budget_of(handed, tmp_path)
     assert (budget.part_bytes, budget.part_s) == (10_000_000, 150.0)
     assert (budget.robot, budget.quota_bytes) == ("left", 100_000_000)
     assert budget.least_free_bytes == 7_000_000

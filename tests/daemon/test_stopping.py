@@ -13,7 +13,7 @@ import pytest
 
 from fasaco_edge.daemon.service import RECORDER_LONGEST_S, RECORDER_STOP_S
 from fasaco_edge.host.processes import cpu_seconds
-from fasaco_edge.recording.read.repair import scan_recording
+from fasaco_edge.recording.read.torn import scan_recording
 from tests.support.outsider import Outsider
 from tests.support.processes import daemon_process, is_running
 from tests.support.rooms import map_bytes, pillared_room, pose_bytes, room

@@ -16,14 +16,6 @@ def joined(starts, ends):
     return np.vstack([starts[:1], ends]).tolist()
 
 
-def test_east_is_shifted_south():
-    assert joined(*lanes(walk((0, 0), (1, 0), (2, 0)), 0.25)) == [
-        [0, -0.25],
-        [1, -0.25],
-        [2, -0.25],
-    ]
-
-
 @pytest.mark.parametrize(("north", "corner"), [(1, [1.25, -0.25]), (-1, [0.75, -0.25])])
 def test_lanes_meet_beside_a_corner(north, corner):
     line = joined(*lanes(walk((0, 0), (1, 0), (1, north)), 0.25))
@@ -35,24 +27,11 @@ def test_there_and_back_are_two_lanes_joined_beyond_the_end():
     assert line == [[0, -0.25], [1.25, -0.25], [1.25, 0.25], [0, 0.25]]
 
 
-def test_one_point_has_no_segments():
-    starts, ends = lanes(walk((3, 4)), 0.25)
-    assert len(starts) == len(ends) == 0
-    assert len(arrow_places(walk((3, 4)), 1.0)) == 0
-
-
-def test_directions_are_units():
-    assert directions(walk((0, 0), (0, 2), (-3, 2))).tolist() == [[0, 1], [-1, 0]]
-
-
 def test_arrows_stand_on_straight_stretches():
     points = walk(*[(x, 0) for x in range(10)], (9, 1), (8, 1), (8, 2))
     places = arrow_places(points, 4.0)
     assert len(places) == 2
     assert places.max() < 9
-
-
-def test_no_arrows_where_nothing_is_straight():
     assert len(arrow_places(walk((0, 0), (1, 0), (1, 1), (2, 1)), 0.5)) == 0
 
 

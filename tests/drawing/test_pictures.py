@@ -124,7 +124,7 @@ def test_revisited_missed_and_unreachable_cells_look_different():
     walk = line((0, 0), (0, 4), (0, 0), (2, 0))
     picture = draw_walk(lattice, walk, grid=None, title="", lines=[])
     area = drawing_area(picture)
-    again = relative(places(picture, palette.RECOVERED[0]), area)
+    again = relative(places(picture, palette.REVISITED[0]), area)
     left_out = relative(places(picture, palette.LEFT_OUT), area)
     unreachable = relative(places(picture, palette.UNREACHABLE), area)
     assert again[0] < left_out[0] + 0.1 < unreachable[0]
@@ -132,7 +132,9 @@ def test_revisited_missed_and_unreachable_cells_look_different():
     assert unreachable[0] > 0.75
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 400), (400, 1), (3, 5), (250, 250), (40, 2500)])
+@pytest.mark.parametrize(
+    "shape", [(1, 1), (1, 2), (1, 400), (400, 1), (3, 5), (250, 250), (40, 2500)]
+)
 def test_sizes_are_bounded(shape):
     lattice = CoverageLattice.from_free(np.ones(shape, bool), cell_m=0.3)
     walk = line((0, 0), (shape[0] - 1, 0), (shape[0] - 1, shape[1] - 1))
@@ -142,21 +144,6 @@ def test_sizes_are_bounded(shape):
     assert 100 < picture.height <= MAX_HEIGHT + 250
     assert len(picture.getcolors(maxcolors=2**24)) > 10
     assert len(places(picture, palette.START)) > 20
-
-
-@pytest.mark.parametrize("cells", [[(2, 3)], [(2, 3), (2, 3)], [(2, 3), (2, 4)]])
-def test_shortest_walks_and_empty_captions(cells):
-    lattice = CoverageLattice.from_free(np.ones((4, 6), bool))
-    picture = draw_walk(lattice, np.array(cells, np.int32), grid=None, title="", lines=[])
-    assert len(inside(places(picture, palette.START), drawing_area(picture))) > 20
-
-
-def test_walk_is_left_as_it_was(picture):
-    lattice = CoverageLattice.from_free(np.ones((4, 6), bool))
-    walk = line((0, 0), (0, 5))
-    walk.flags.writeable = False
-    draw_walk(lattice, walk, grid=None, title="", lines=[])
-    assert walk.tolist() == line((0, 0), (0, 5)).tolist()
 
 
 def test_a_mission_shows_visits_trail_start_and_end():
@@ -172,7 +159,7 @@ def test_a_mission_shows_visits_trail_start_and_end():
     assert (x, y) == pytest.approx((1.25 / 7, 1.25 / 5), abs=0.02)
     x, y = relative(places(picture, palette.END), area)
     assert (x, y) == pytest.approx((2.8 / 7, 3.7 / 5), abs=0.02)
-    x, y = relative(places(picture, palette.RECOVERED[-1]), area)
+    x, y = relative(places(picture, palette.REVISITED[-1]), area)
     assert (x, y) == pytest.approx((5.75 / 7, 3.75 / 5), abs=0.03)
     x, y = relative(places(picture, palette.COVERED, 1), area)
     assert (x, y) == pytest.approx((2.75 / 7, 1.25 / 5), abs=0.03)
@@ -262,9 +249,3 @@ def test_long_captions_are_wrapped():
         for words in (1, 100)
     ]
     assert heights[1] > heights[0] + 40
-
-
-def test_the_gradient_darkens_nowhere_it_should_brighten():
-    colours = palette.gradient(np.linspace(0, 1, 50)).astype(float)
-    luminance = colours @ [0.2126, 0.7152, 0.0722]
-    assert (np.diff(luminance) > 0).all()

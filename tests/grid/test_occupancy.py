@@ -5,7 +5,7 @@ import pytest
 
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
+from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, coarser
 from tests.support.grids import grid
 
 
@@ -61,3 +61,13 @@ def test_a_patch_that_reaches_beyond_the_map_is_refused(window):
 def test_a_patch_in_another_frame_is_refused():
     with pytest.raises(PatchWithoutBase, match="'odom'"):
         grid(np.zeros((4, 5))).patched(patch(Window(0, 0, 1, 1), frame="odom"))
+
+
+def test_a_coarser_map_shows_the_most_occupied_pixel_of_each():
+    cells = np.full((5, 7), -1, np.int8)
+    cells[0, 0], cells[1, 1], cells[4, 6] = 0, 100, 0
+    grid = OccupancyGrid(GridGeometry(5, 7, 0.1, Pose2D(1.0, 2.0)), cells)
+    assert coarser(grid, 35) is grid
+    coarse = coarser(grid, 10)
+    assert coarse.cells.tolist() == [[100, -1, -1, -1], [-1] * 4, [-1, -1, -1, 0]]
+    assert coarse.geometry == GridGeometry(3, 4, 0.2, Pose2D(1.0, 2.0))

@@ -22,10 +22,10 @@ from rerun.chunk import RrdReader
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import MOST_CHUNK_BYTES, chunks
-from fasaco_edge.recording.read.repair import FRAME, HEADER_BYTES, scan_recording
 from fasaco_edge.recording.read.run import RecordedSamples
+from fasaco_edge.recording.read.torn import FRAME, HEADER_BYTES, scan_recording
 from fasaco_edge.recording.sdk import rr
-from fasaco_edge.recording.write.part import Part
+from fasaco_edge.recording.write.part import RecordingPart
 from fasaco_edge.review.review import read_review
 from fasaco_edge.samples import _HEAD, WHOLE, SampleEncoder, _Lane
 from tests.samples.test_codec import arrival
@@ -37,7 +37,7 @@ BEGAN_NS = 1_767_225_600 * 10**9
 def recorded(folder, *batches):
     """Record some of all that a recorder does; return the file."""
     file = folder / f"{RUN_ID}-part1.rrd"
-    part = Part(file, RUN_ID)
+    part = RecordingPart(file, RUN_ID)
     for number in range(5):
         rr.set_time(
             entities.WALL_CLOCK, timestamp=np.datetime64(BEGAN_NS, "ns"), recording=part.stream
@@ -139,22 +139,10 @@ LIES = {
 }
 
 
-@pytest.fixture(scope="module")
-def refused_lies(tmp_path_factory):
-    folder = tmp_path_factory.mktemp
-    return limited({lie: recorded(folder("lie"), batch()) for lie, batch in LIES.items()})
-
-
-@pytest.mark.parametrize("lie", LIES)
-def test_a_batch_with_false_sizes_is_refused_in_little_memory(refused_lies, lie):
-    assert "UnreadableRecording" in refused_lies[lie]
-
-
-def repacked(recording, folder, change):
-    """Copy a recording, its first chunk's Arrow message changed; return the file."""
+def repacked(recording, folder, body):
+    """Copy a recording with another body of its first chunk; return the file."""
     content = bytearray(recording.read_bytes())
     at, _, length = next(frame for frame in frames_of(content) if frame[1] == 2)
-    body = change(bytes(content[at + FRAME.size : at + FRAME.size + length]))
     content[at : at + FRAME.size + length] = FRAME.pack(2, len(body)) + body
     file = folder / recording.name
     file.write_bytes(content)
@@ -221,26 +209,12 @@ LYING_CHUNKS = {
 
 
 @pytest.fixture(scope="module")
-def named_chunks(recording, tmp_path_factory):
-    return limited(
-        {
-            lie: repacked(recording, tmp_path_factory.mktemp("chunk"), lambda _, body=body: body())
-            for lie, (body, _) in LYING_CHUNKS.items()
-        }
-    )
-
-
-@pytest.mark.parametrize("lie", LYING_CHUNKS)
-def test_a_chunk_that_claims_what_it_cannot_be_is_named(named_chunks, lie):
-    assert named_chunks[lie].startswith("UnreadableRecording")
-    assert LYING_CHUNKS[lie][1] in named_chunks[lie]
-
-
-def limited(files):
-    """Read recordings in a process that may have 700 MB more than it has; return what it says.
-
-    One after the other: a second process would load Rerun and Arrow for each.
-    """
+def refused(recording, tmp_path_factory):
+    """Read all lies in a process that may take 700 MB more than it has; return what it says."""
+    folder = tmp_path_factory.mktemp
+    files = {lie: recorded(folder("lie"), batch()) for lie, batch in LIES.items()} | {
+        lie: repacked(recording, folder("chunk"), body()) for lie, (body, _) in LYING_CHUNKS.items()
+    }
     code = (
         "import json, resource, sys, pathlib\n"
         "from fasaco_edge.review.review import read_review\n"
@@ -253,11 +227,21 @@ def limited(files):
         "    except FasacoError as error:\n        told = f'{type(error).__name__} {error}'\n"
         "    print(json.dumps([name, told]), flush=True)\n"
     )
-    named = json.dumps({name: str(file) for name, file in files.items()})
-    words = [sys.executable, "-c", code, named]
+    words = [
+        sys.executable,
+        "-c",
+        code,
+        json.dumps({lie: str(file) for lie, file in files.items()}),
+    ]
     ended = subprocess.run(words, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stdout + ended.stderr
     return dict(map(json.loads, ended.stdout.splitlines()))
+
+
+@pytest.mark.parametrize("lie", [*LIES, *LYING_CHUNKS])
+def test_a_false_claim_is_refused_in_little_memory(refused, lie):
+    assert refused[lie].startswith("UnreadableRecording")
+    assert LYING_CHUNKS.get(lie, ("", ""))[1] in refused[lie]
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -15,34 +15,31 @@ pytest.importorskip("rerun")
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import UnreadableRecording
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, StampedPose
-from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.run import RecordedSamples
-from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.runcard import RunDescription
-from fasaco_edge.recording.scene.scene import Scene
 from fasaco_edge.recording.write import input_log, recorder
 from fasaco_edge.recording.write.input_log import InputLog
-from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.writer import RecordingWriter, WriterState
+from fasaco_edge.recording.write.writer import WriterState
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_document, encode_json
 from fasaco_edge.wire.documents.path_documents import DIGEST_BYTES, PATH_DIGEST, digest
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.keys import Keys
-from fasaco_edge.wire.messages.maps import decode_occupancy_grid, encode_occupancy_grid
 from fasaco_edge.wire.messages.paths import encode_path
-from fasaco_edge.wire.messages.poses import decode_pose, encode_pose_stamped
-from fasaco_edge.wire.schemas import POSE_STAMPED
-from tests.support.recordings import TEXT, bus_on_free_port, read_column, read_summary
+from fasaco_edge.wire.messages.poses import encode_pose_stamped
+from tests.support.recordings import (
+    TEXT,
+    bus_on_free_port,
+    read_column,
+    read_summary,
+    writer_in,
+)
 from tests.support.senders import Sender
 
 SECOND_NS = 1_000_000_000
 BEGAN_NS = 1_700_000_000 * SECOND_NS
-# What a recording may grow by in an hour of a mission [bytes].
-MOST_BYTES_H = 60e6
 
 
 @dataclass
@@ -55,8 +52,7 @@ class Desk:
     told: list[Arrival] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        room = DiskBudget(self.part_bytes, 0)
-        self.writer = RecordingWriter(self.folder, "run", room, build_blueprint(None))
+        self.writer = writer_in(self.folder, self.part_bytes)
         self.inputs = InputLog(self.writer, BEGAN_NS)
 
     def hear(self, topic: str, payload: bytes, attachment: bytes = b"", after_s: float = 0.1):
@@ -195,7 +191,7 @@ def test_changes_of_rooms_are_kept_and_shares_now_and_then(tmp_path):
 def test_inputs_queued_at_the_end_are_kept_and_drawn_if_in_time(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "LAST_DRAWN_NS", 0)
     with bus_on_free_port() as (bus, _):
-        one = recorder.Recorder(DaemonConfig(), bus, Output(tmp_path, DiskBudget(10**9, 0)))
+        one = recorder.RobotRecorder(DaemonConfig(), bus, DiskBudget(tmp_path, 10**9, 0))
         poses = hear(one, bus, 300)
         assert one.end()
     (path,) = parts(tmp_path)
@@ -212,7 +208,7 @@ def test_a_recorder_reports_while_it_catches_up(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "REPORT_PERIOD_NS", 0)
     reports = []
     with bus_on_free_port() as (bus, _):
-        one = recorder.Recorder(DaemonConfig(), bus, Output(tmp_path, DiskBudget(10**9, 0)))
+        one = recorder.RobotRecorder(DaemonConfig(), bus, DiskBudget(tmp_path, 10**9, 0))
         hear(one, bus, 50)
         bus.listen(Keys(), topics.RECORDER, lambda sample: reports.append(sample.payload))
         one.step(0.0)
@@ -230,7 +226,7 @@ def hear(one, bus, count):
     poses = [encode_pose_stamped(StampedPose(Pose2D(x, 0.0), "map", x)) for x in range(count)]
     for pose in poses:
         publisher.put(pose)
-    while len(one._inbox._waiting) < count:
+    while len(one._queue._waiting) < count:
         time.sleep(0.01)
     return poses
 
@@ -249,41 +245,3 @@ def test_a_part_that_had_just_begun_hides_no_samples_of_others(tmp_path):
     desk = Desk(tmp_path / "before")
     desk.hear("map", noise(0))
     assert list(RecordedSamples([*desk.close(), empty])) == desk.told
-
-
-def test_an_hour_takes_at_most_60_megabytes(tmp_path):
-    """A map of 1,024 x 1,024 at 1 Hz, poses at 20 Hz, as a robot in a large building gives them."""
-    desk = Desk(tmp_path)
-    scene = Scene(desk.writer, RunDescription("robot", "now"))
-    rng = np.random.default_rng(0)
-    grown = {}
-    for second in range(90):
-        grid = explored(second, rng)
-        payload = encode_occupancy_grid(grid)
-        desk.hear("map", payload, after_s=0.0)
-        scene.add_map(decode_occupancy_grid(payload))
-        for tick in range(20):
-            place = 0.0125 * (20 * second + tick) + rng.normal(0, 0.003, 3)
-            pose = StampedPose(Pose2D(*place.tolist()), "map", desk.now_ns)
-            payload = encode_pose_stamped(pose)
-            desk.hear("pose", payload, after_s=0.05)
-            desk.writer.at(BEGAN_NS + desk.now_ns)
-            scene.add_pose(decode_pose(payload, POSE_STAMPED))
-            scene.catch_up()
-        grown[second] = desk.writer.size
-    files = desk.close()
-    # What a recording begins with is no growth.
-    per_hour = (grown[89] - grown[40]) / 49 * 3600
-    print(f"{per_hour / 1e6:.1f} MB an hour, {files[0].stat().st_size / 1e6:.1f} MB in all")
-    assert per_hour < MOST_BYTES_H
-    assert [one.sample for one in RecordedSamples(files)] == [one.sample for one in desk.told]
-
-
-def explored(second: int, rng: np.random.Generator) -> OccupancyGrid:
-    """Return halls with walls that flicker, known from the left up to where the robot has come."""
-    cells = np.zeros((1024, 1024), np.int8)
-    cells[::128] = cells[:, ::128] = 100
-    cells[:, 1:][rng.random((1024, 1023)) < 1e-4] = 100
-    cells[:, 200 + 5 * second :] = -1
-    geometry = GridGeometry(1024, 1024, 0.05, Pose2D(0.0, 0.0))
-    return OccupancyGrid(geometry, cells, "map", second * SECOND_NS)

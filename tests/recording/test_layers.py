@@ -1,4 +1,4 @@
-"""Large things are drawn as often as the file may grow, and the newest is drawn in the end."""
+"""Layers, curves and paths are drawn as often as the file may grow, and as they were in the end."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from hypothesis import strategies as st
 pytest.importorskip("rerun")
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
-from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
+from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes
-from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.layers import BURST_S, RATES, Layers, size_in_file
-from fasaco_edge.recording.write.quota import DiskBudget
-from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.documents.path_documents import TrailAttachment
-from fasaco_edge.wire.messages.pheromone import PheromoneMessage
+from fasaco_edge.recording.scene.drawings import LOGGED_AGAIN_NS, PathDrawing
+from fasaco_edge.recording.scene.layers import BURST_S, RATES, Anchor, Layers, size_in_file
+from fasaco_edge.recording.scene.status_curves import PERIOD_NS, Curves
+from fasaco_edge.wire.documents.path_documents import PathAttachment
+from fasaco_edge.wire.messages.paths import PathMessage
+from tests.support.recordings import SCALAR, TEXT, read_column, writer_in
 
 SECOND_NS = 1_000_000_000
 RATE = RATES[entities.MAP]
@@ -34,16 +34,6 @@ class Canvas:
     def draw(self, name: str, size: int, at_s: float, layer: str = entities.MAP) -> None:
         now_ns = round(at_s * SECOND_NS)
         self.layers.draw(layer, size, lambda: self.drawn.append((name, size)), now_ns)
-
-
-def test_a_coarser_map_shows_the_most_occupied_pixel_of_each():
-    cells = np.full((5, 7), -1, np.int8)
-    cells[0, 0], cells[1, 1], cells[4, 6] = 0, 100, 0
-    grid = OccupancyGrid(GridGeometry(5, 7, 0.1, Pose2D(1.0, 2.0)), cells)
-    assert coarser(grid, 35) is grid
-    coarse = coarser(grid, 10)
-    assert coarse.cells.tolist() == [[100, -1, -1, -1], [-1] * 4, [-1, -1, -1, 0]]
-    assert coarse.geometry == GridGeometry(3, 4, 0.2, Pose2D(1.0, 2.0))
 
 
 def test_below_the_rate_everything_is_drawn_at_once():
@@ -91,7 +81,7 @@ def test_the_size_is_about_what_the_file_grows_by(tmp_path, share):
     cells[::50] = 100
     cells[:, 400:] = -1
     grid = OccupancyGrid(GridGeometry(600, 600, 0.05, Pose2D(0.0, 0.0)), cells)
-    writer = RecordingWriter(tmp_path, "run", DiskBudget(10**9, 0), build_blueprint(None))
+    writer = writer_in(tmp_path)
     sizes = []
     for second in range(10, 40, 10):
         writer.log(entities.MAP, archetypes.map_archetype(grid))
@@ -114,12 +104,59 @@ def test_a_line_keeps_its_corners_and_loses_the_rest():
         assert len(archetypes.corners(lanes[:count])) == count
 
 
-@pytest.mark.parametrize(
-    ("steps", "words"), [(9, "9 steps to drive"), (0, "nothing left to drive")]
-)
-def test_the_trail_s_label_leaves_out_what_says_nothing(steps, words):
-    geometry = GridGeometry(2, 2, 0.3, Pose2D(0.0, 0.0))
-    field = PheromoneMessage(geometry, np.ones((2, 2), np.uint8), 0.1, 0.2, 0, 1, 1, steps)
-    label = archetypes.trail_label(field, TrailAttachment(7, 4, 1.75))
-    assert label.labels is not None
-    assert label.labels.as_arrow_array().to_pylist() == [f"pheromone at path 7, {words}"]
+def test_constants_are_drawn_rarely_and_changes_at_once(tmp_path):
+    writer = writer_in(tmp_path)
+    curves = Curves(writer)
+    period_s = PERIOD_NS // SECOND_NS
+    for second in range(2 * period_s + 10):
+        writer.at(second * SECOND_NS)
+        curves.draw("steps", 1.0 if second < 5 else 2.0)
+        curves.draw("noisy", 100.0 + second % 2, noise=0.05)
+        curves.draw("last", 100.0 + (second > 2 * period_s + 5), noise=0.05)
+    curves.finish()
+    assert writer.close()
+    (part,) = tmp_path.glob("*.rrd")
+    steps = read_column(part, "steps", SCALAR)
+    assert (steps.wall_ns // SECOND_NS).tolist() == [0, 5, 5 + period_s, 5 + 2 * period_s]
+    assert steps.values == [[1.0], [2.0], [2.0], [2.0]]
+    noisy = read_column(part, "noisy", SCALAR)
+    assert len(noisy.values) == 4
+    assert read_column(part, "last", SCALAR).values[-1] == [101.0]
+
+
+def shown(folder, paths):
+    """Return the lines of paths that are not of level DEBUG: when [s], and the reason."""
+    writer = writer_in(folder)
+    drawing, empty = PathDrawing(writer, Layers()), np.zeros((0, 2))
+    for revision, (at_s, reason, planner) in enumerate(paths, 1):
+        writer.at(at_s * SECOND_NS)
+        about = PathAttachment(revision=revision, reason=reason, planner=planner)
+        drawing.add(PathMessage("map", 0, empty, empty[:, 0]), about, Anchor())
+    assert writer.close()
+    (part,) = folder.glob("*.rrd")
+    texts = read_column(part, entities.PATH_LOG, TEXT)
+    levels = read_column(part, entities.PATH_LOG, "TextLog:level").values
+    # Each path is in the recording.
+    assert len(texts.values) == len(paths)
+    return [
+        (at_ns // SECOND_NS, text.partition(": ")[2].partition(" (")[0])
+        for at_ns, (text,), (level,) in zip(texts.wall_ns, texts.values, levels, strict=True)
+        if level != "DEBUG"
+    ]
+
+
+def test_of_plans_of_one_kind_the_first_is_shown_and_one_a_minute(tmp_path):
+    minute = LOGGED_AGAIN_NS // SECOND_NS
+    paths = [
+        (0, "first plan", "aco"),
+        (1, "map: 3 cells more", "aco"),
+        (2, "line polished", None),
+        (3, "map: 1 cell more", "aco"),
+        (4, "first plan", "aco"),
+        (5, "map: 2 cells more", "aco"),
+        (6, "map: 4 cells more", "aco"),
+        (minute + 5, "map: 5 cells more", "aco"),
+    ]
+    assert shown(tmp_path, paths) == [
+        (at_s, paths[index][1]) for index in (0, 1, 4, 5, 7) for at_s in (paths[index][0],)
+    ]

@@ -36,12 +36,6 @@ def test_a_clock_that_goes_back_makes_no_newer_part_go(tmp_path):
     assert [path.name for path in deleted] == runs[0] + runs[1] + runs[2][:1]
 
 
-def test_runs_that_begin_in_the_same_second_do_not_meet(tmp_path):
-    names = [run(tmp_path, AT_BOOT)[0] for _ in range(12)]
-    assert len(set(names)) == 12
-    assert order(tmp_path) == names
-
-
 def test_runs_without_a_number_are_older_than_those_with_one(tmp_path):
     old = [
         "20261101T000012Z-maja-part1.rrd",

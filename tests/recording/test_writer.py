@@ -23,9 +23,7 @@ from fasaco_edge.recording.write.writer import (
     RecordingWriter,
     WriterState,
 )
-from tests.support.recordings import read_column, read_summary
-
-RUN = "run-1"
+from tests.support.recordings import read_column, read_static, read_summary, writer_in
 
 
 class Clock:
@@ -50,12 +48,6 @@ def noise(seed: int, size: int = 100_000) -> rr.GridMap:
     )
 
 
-def writer_in(folder, part_bytes: int = 10**9, least_free_bytes: int = 0) -> RecordingWriter:
-    return RecordingWriter(
-        folder, RUN, DiskBudget(part_bytes, least_free_bytes), build_blueprint(None)
-    )
-
-
 def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
     clock = Clock()
     writer = writer_in(tmp_path, part_bytes=250_000)
@@ -74,7 +66,7 @@ def test_parts_rotate_and_each_begins_with_what_is_in_force(tmp_path):
         summary = read_summary(part)
         assert summary.complete
         assert summary.rows[entities.PATH] == 1
-        assert list(read_cards(part)) == ["card"]
+        assert read_static(part, entities.RUN_CARD, "TextDocument:text") == [["card"]]
     assert sum(read_summary(part).rows.get("noise", 0) for part in parts) == 7
     assert writer.lost == 0
 
@@ -100,9 +92,9 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
     for path in (*others, *before):
         path.write_bytes(bytes(400_000))
     clock = Clock()
-    room = DiskBudget(300_000, 0, 3 * FLUSH_PERIOD_NS / 1e9, "robot", 1_000_000)
+    room = DiskBudget(tmp_path, 300_000, 0, 3 * FLUSH_PERIOD_NS / 1e9, "robot", 1_000_000)
     name = "20260101T000000Z-robot"
-    writer = RecordingWriter(tmp_path, name, room, build_blueprint(None))
+    writer = RecordingWriter(name, room, build_blueprint(None))
     writer.sync(clock.tick())
     # With the part that is coming, one of the two that there were is too much.
     assert not before[0].exists()
@@ -122,14 +114,14 @@ def test_an_old_part_gives_way_and_the_oldest_go_by_the_quota(tmp_path):
 
 
 def test_a_part_that_is_written_is_not_deleted_for_the_quota(tmp_path):
-    room = DiskBudget(10**6, 0)
-    writer = RecordingWriter(tmp_path, "20200101T000000Z-robot", room, build_blueprint(None))
+    room = DiskBudget(tmp_path, 10**6, 0)
+    writer = RecordingWriter("20200101T000000Z-robot", room, build_blueprint(None))
     assert not delete_oldest(tmp_path, "robot", 1)
     assert writer.close()
     assert delete_oldest(tmp_path, "robot", 1)
 
 
-def test_no_part_is_written_below_the_floor(tmp_path):
+def test_no_part_is_written_below_the_floor_and_its_samples_keep_their_times(tmp_path, monkeypatch):
     clock = Clock()
     # One more than there is: no room, though the disk is far from full.
     writer = writer_in(tmp_path, least_free_bytes=shutil.disk_usage(tmp_path).total)
@@ -141,23 +133,14 @@ def test_no_part_is_written_below_the_floor(tmp_path):
     assert writer.lost == 1
     (part,) = tmp_path.glob("*.rrd")
     assert read_summary(part).complete
-    assert writer.close()
-
-
-def test_samples_received_on_a_full_disk_keep_their_times(tmp_path, monkeypatch):
-    clock = Clock()
-    writer = writer_in(tmp_path)
-    with monkeypatch.context() as patch:
-        patch.setattr(DiskBudget, "is_full", lambda *_: True)
-        writer.sync(clock.tick())
-    assert writer.state is WriterState.DISK_FULL
     came_ns = clock.now_ns
     writer.at(came_ns)
     writer.log(entities.MISSION_STATE, rr.StateChange(state="blocked"), latched=True)
     writer.at(came_ns + 10**10)
+    monkeypatch.setattr(DiskBudget, "may_begin", lambda *_: True)
     writer.sync(clock.tick() + RETRY_PERIOD_NS)
     assert writer.close()
-    column = read_column(tmp_path / f"{RUN}-part2.rrd", entities.MISSION_STATE, "StateChange:state")
+    column = read_column(tmp_path / "run-part2.rrd", entities.MISSION_STATE, "StateChange:state")
     assert column.wall_ns.tolist() == [came_ns]
 
 
@@ -188,7 +171,7 @@ def test_a_deleted_part_is_reported_and_followed_by_another(tmp_path, caplog, le
 
 def test_a_stalled_disk_is_reported_and_used_again(tmp_path):
     # A pipe that nobody empties: to rerun's writer, a disk that hangs.
-    pipe = tmp_path / f"{RUN}-part1.rrd"
+    pipe = tmp_path / "run-part1.rrd"
     os.mkfifo(pipe)
     clock = Clock()
     writer = writer_in(tmp_path)
@@ -215,7 +198,7 @@ def test_a_stalled_disk_is_reported_and_used_again(tmp_path):
 
 def test_a_disk_that_pauses_loses_nothing(tmp_path):
     """As a memory card does for a second, or a flush on a slow computer."""
-    pipe = tmp_path / f"{RUN}-part1.rrd"
+    pipe = tmp_path / "run-part1.rrd"
     os.mkfifo(pipe)
     clock = Clock()
     writer = writer_in(tmp_path)
@@ -233,15 +216,6 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(BadConfiguration, match="cannot record into"):
         writer_in(tmp_path / "file" / "runs")
-
-
-def read_cards(part):
-    """Yield the texts of the run card, which is static."""
-    from rerun.chunk import RrdReader
-
-    for chunk in RrdReader(str(part)).stream().filter(content=f"/{entities.RUN_CARD}"):
-        for texts in chunk.to_record_batch().column("TextDocument:text").to_pylist():
-            yield texts[0]
 
 
 def drain(pipe, copy) -> None:

@@ -81,6 +81,8 @@ def test_a_recording_is_reviewed(recording, capsys):
     assert [review[name] for name in figures] == [63, 30, 27]
     assert review["driven_m"] == pytest.approx(15.23)
     assert (review["state"], review["complete"]) == ("done", True)
+    assert review["config"]["planner.name"] == "colony-search"
+    assert "planner.local_search" not in review["config"]
 
 
 def test_moments_and_spots_of_a_recording_are_reviewed(recording, capsys):
@@ -135,19 +137,6 @@ def test_a_recorded_planner_has_its_present_name(name, flag, now):
     config = {"robot": {"name": "r1"}, "planner": planner}
     assert renamed(config) == {"robot": {"name": "r1"}, "planner": {"name": now, "seed": 3}}
     assert RecordedRun(config).daemon_config().planner.name == now
-
-
-def test_a_recording_names_the_planner_of_its_mission(recording, capsys):
-    samples = RecordedSamples([Path(recording)])
-    run = read_run(samples)
-    assert (run.config["planner"]["name"], run.config["planner"]["local_search"]) == (
-        "fasaco",
-        True,
-    )
-    assert run.daemon_config().planner.name == "colony-search"
-    config = printed(capsys, "review", recording)["config"]
-    assert config["planner.name"] == "colony-search"
-    assert "planner.local_search" not in config
 
 
 def test_a_configuration_is_read_but_for_a_removed_key(tmp_path):

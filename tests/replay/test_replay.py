@@ -102,26 +102,18 @@ def test_twice_it_is_the_same_bit_for_bit(as_it_was, samples, config):
 @pytest.mark.parametrize("share", [0.0, 0.4, 0.8, 0.99])
 def test_an_update_is_lost(samples, config, share):
     updates = places(samples, "map_update")
-    story = played(scenarios.without(samples, [updates[int(share * len(updates))]]), config)
-    assert_told(story)
+    assert_told(played(scenarios.without(samples, [updates[int(share * len(updates))]]), config))
 
 
-def test_no_update_comes_at_all(samples, config, as_it_was):
-    """The robot drives on into what the map does not know."""
-    last_map = places(samples, "map")[-1]
-    gone = [place for place in places(samples, "map_update") if place > last_map]
-    story = played(scenarios.without(samples, gone), config)
-    known, known_then = (of.mission.lattice.coverable.sum() for of in (story, as_it_was))
-    assert 0 < known < known_then
-    if story.mission.state == "blocked":
-        assert story.mission.reason
+@pytest.mark.parametrize(("topic", "late_s"), [("pose", 0.1), ("pose", 2.0), ("plan", 1.0)])
+def test_poses_or_plans_come_late(samples, config, as_it_was, topic, late_s):
+    """Robot and map have changed until then."""
+    if topic == "pose":
+        samples = scenarios.late(samples, topic, round(late_s * 1e9))
     else:
-        assert_told(story)
-
-
-@pytest.mark.parametrize("late_s", [0.1, 0.5, 2.0])
-def test_poses_come_late(samples, config, as_it_was, late_s):
-    story = played(scenarios.late(samples, "pose", round(late_s * 1e9)), config)
+        planner = msgspec.structs.replace(config.planner, budget_s=late_s)
+        config = msgspec.structs.replace(config, planner=planner)
+    story = played(samples, config)
     assert_told(story)
     assert story.visited == as_it_was.visited
 
@@ -139,15 +131,6 @@ def test_a_gap_without_poses_is_survived(samples, config, as_it_was, share):
     assert_told(story)
     assert story.visited <= as_it_was.visited
     assert story.mission.ledger.total < as_it_was.mission.ledger.total
-
-
-@pytest.mark.parametrize("late_s", [0.2, 1.0])
-def test_plans_come_late(samples, config, late_s):
-    """Robot and map have changed until then."""
-    slow = msgspec.structs.replace(
-        config, planner=msgspec.structs.replace(config.planner, budget_s=late_s)
-    )
-    assert_told(played(samples, slow))
 
 
 def test_without_resume_it_stays_paused(samples, config):
@@ -169,13 +152,6 @@ def test_an_invalid_map_changes_nothing_else(samples, config):
     story = played(scenarios.changed(samples, last_map, lambda payload: payload[:-5]), config)
     assert story.faults[0] == "malformed_message"
     assert story.mission.reason
-
-
-def test_the_robot_says_only_once_where_it_is(samples, config):
-    poses = places(samples, "pose")
-    story = played(scenarios.without(samples, poses[1:]), config)
-    assert story.mission.state in ("covering", "planning")
-    assert story.visited <= {(2, 2)}
 
 
 def test_a_mission_that_begins_long_after_the_last_input_replays(samples, config):

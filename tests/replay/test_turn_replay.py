@@ -24,7 +24,7 @@ from fasaco_edge.mission.rooms.room_watch import update
 from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.replay.cycle_replay import CycleReplay, inflated_sample, read_turns
 from fasaco_edge.replay.replay import read_run
-from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.review import read_review
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.turns import EarlySample, decode_turns
@@ -102,11 +102,15 @@ def test_each_decision_equals_the_recorded_one(which, request):
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
 
 
-def test_cells_along_askew_walls_are_found_by_the_replay(tmp_path):
+def test_askew_walls_and_reported_obstacles_are_in_the_replay(tmp_path):
     """The angle follows from the maps and poses that a recording has."""
-    recording = record_mission(tmp_path, line="thorough", yaw_deg=25.0)
+    recording = record_mission(tmp_path, line="thorough", yaw_deg=25.0, blocked_s=(6.0, 12.0))
     assert recording.status["map"]["lattice_deg"] == pytest.approx(25.0, abs=1.0)
     samples = list(RecordedSamples(recording.paths))
+    assert sum(sample.topic == "blocked" for sample in samples) == 2
+    # Not the reason: on a busy machine a late pose may be the first of the troubles.
+    said = [one["text"] for _, status in recording.statuses for one in status["troubles"]]
+    assert any("the robot stands: obstacle ahead" in text for text in said)
     replay, record, steps = played(samples)
     assert (record.gap, replay.difference) == ("", None)
     assert replay.mission.rotation.deg == pytest.approx(
@@ -150,17 +154,6 @@ def test_keep_outs_rooms_and_refusals_are_repeated(tmp_path):
     ]
     assert replay.mission.order_state.order.zones[0].room == 1
     assert replay.mission.coverage().covered == recording.status["coverage"]["covered"]
-
-
-def test_a_reported_obstacle_blocks_the_replay_too(tmp_path):
-    recording = record_mission(tmp_path, line="thorough", yaw_deg=25.0, blocked_s=(6.0, 12.0))
-    samples = list(RecordedSamples(recording.paths))
-    assert sum(sample.topic == "blocked" for sample in samples) == 2
-    replay, record, _ = played(samples)
-    assert (record.gap, replay.difference) == ("", None)
-    # Not the reason: on a busy machine a late pose may be the first of the troubles.
-    said = [one["text"] for _, status in recording.statuses for one in status["troubles"]]
-    assert any("the robot stands: obstacle ahead" in text for text in said)
 
 
 def test_the_turn_log_on_the_bus_matches_its_schema(samples):
@@ -234,17 +227,10 @@ def test_a_gap_in_the_log_ends_the_comparison(samples):
     assert "not in the recording" in record.gap
     assert replay.difference is None
     assert replay.turns == record.turns > 0
-
-
-def test_without_its_beginning_there_is_no_log(samples):
-    assert read_turns(without(samples, places(samples, TURNS)[:1])) is None
-    assert read_turns(without(samples, places(samples, TURNS))) is None
-
-
-def test_an_invalid_log_ends_the_comparison(samples):
-    logs = places(samples, TURNS)
     _, record, _ = played(changed(samples, logs[2], lambda payload: payload[:-9]))
     assert record.gap.startswith("turn log")
+    # Without its beginning there is no log.
+    assert read_turns(without(samples, logs[:1])) is None
 
 
 def test_the_command_says_that_it_is_equal(recording, capsys):

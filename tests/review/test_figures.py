@@ -10,9 +10,9 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import RobotClock, clock
 from fasaco_edge.recording.read.run import RunRecord
 from fasaco_edge.review.moments import (
-    faults_of,
     kind_of,
     longest_stand,
+    refused_by_code,
     spans_of,
 )
 from fasaco_edge.review.review import review_of
@@ -37,7 +37,7 @@ def shares(drawn, counted):
         )
         for at_s, covered, cells in counted
     ]
-    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, {}, np.zeros(2), ())
+    record = RunRecord("", (), 0, 0, RobotClock(0), plots, {}, {}, np.zeros(2), ())
     return review_of(record, RunData(statuses=statuses), 0)
 
 
@@ -119,5 +119,4 @@ def test_counts_by_code_add_up_over_restarts():
         StatusSample(float(at_s), Status(errors=ErrorCounts(by_code=by_code)))
         for at_s, by_code in enumerate(counts)
     ]
-    record = RunRecord("", (), 0, 0, RobotClock(0), {}, {}, {}, {}, np.zeros(2), ())
-    assert faults_of(RunData(statuses=told), record).by_code == {"odd": 2, "wrong_frame": 4}
+    assert refused_by_code(RunData(statuses=told)) == {"odd": 2, "wrong_frame": 4}

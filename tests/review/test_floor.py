@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.orders.zones import with_kept_out
-from fasaco_edge.review.comparison import Figure, figures
+from fasaco_edge.review.comparison import figures
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.floor import swept_floor
+from fasaco_edge.review.floor_and_rooms import swept_floor
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import FloorLeft, FloorReport
-from fasaco_edge.wire.documents.status import LedgerReport, Status
+from fasaco_edge.wire.documents.status import Status
 from tests.support.rooms import RADIUS_M, RESOLUTION_M, TOOL_M, room
 
 DISC_M2 = math.pi * (TOOL_M / 2) ** 2
@@ -92,37 +90,17 @@ def test_a_keep_out_zone_counts_as_a_wall(yaw):
     assert behind.reachable_m2 == pytest.approx(reached(1.75, 2.9), rel=0.02)
 
 
-def test_a_map_without_zones_is_left_as_it_is():
-    grid = OccupancyGrid(GridGeometry(3, 4, 0.05, Pose2D(0, 0)), np.zeros((3, 4), np.int8))
-    assert with_kept_out(grid, ()) is grid
-    kept = with_kept_out(grid, (((0.05, -1.0), (0.1, -1.0), (0.1, 0.1), (0.05, 0.1)),))
-    assert np.argwhere(kept.cells).tolist() == [[0, 1], [1, 1]]
-    assert not grid.cells.any()
-
-
-def test_floor_swept_before_is_not_guessed_at():
-    before = StatusSample(0.0, Status(ledger=LedgerReport(restored_cells=7)))
-    assert told(LANE, statuses=[before]) is None
-
-
-def test_the_last_floor_of_the_ledger_is_reported():
-    told = [Status(floor=FloorReport(2.0)), Status(floor=FloorReport(3.5)), Status()]
-    samples = [StatusSample(float(at), status) for at, status in enumerate(told)]
-    assert RunData(statuses=samples).ledger_floor.swept_m2 == 3.5
-    assert RunData(statuses=samples[2:]).ledger_floor is None
-    assert Figure("floor swept, by the daemon", "3.5 m2", 3.5) in list(
-        figures(ReviewDocument(ledger_swept_m2=3.5))
-    )
-
-
-def test_floor_left_and_out_of_reach_has_reasons():
+def test_the_last_floor_of_the_daemon_is_reported_with_reasons():
     left = (FloorLeft(0.5, "beside the path"), FloorLeft(0.25, "on the path"))
-    status = Status(floor=FloorReport(3.5, 4.25, left, (FloorLeft(1.5, "too narrow"),)))
-    data = RunData(statuses=[StatusSample(0.0, status)])
-    assert data.ledger_floor == status.floor
+    statuses = [Status(floor=FloorReport(2.0)), Status(floor=FloorReport(3.5, 4.25, left, ()))]
+    samples = [StatusSample(float(at), one) for at, one in enumerate((*statuses, Status()))]
+    assert RunData(statuses=samples).ledger_floor == statuses[1].floor
+    assert RunData(statuses=samples[2:]).ledger_floor is None
+    by_reason = {part.reason: part.m2 for part in left}
     document = ReviewDocument(
-        left_by_reason={"beside the path": 0.5, "on the path": 0.25}, out_of_reach_by_reason={}
+        ledger_swept_m2=3.5, left_by_reason=by_reason, out_of_reach_by_reason={}
     )
     told = {figure.name: figure.text for figure in figures(document)}
+    assert told["floor swept, by the daemon"] == "3.5 m2"
     assert told["floor left"] == "0.50 m2 beside the path; 0.25 m2 on the path"
     assert told["floor out of reach"] == "none"

@@ -40,12 +40,6 @@ def told(*rows, commands=()):
     return chapters(data, states, 100.0)
 
 
-def test_a_mission_without_commands_is_one_order():
-    (order,) = told((0, "covering", 0, 60), (50, "done", 60, 60))
-    assert (order.ordered, order.at_s, order.until_s) == ("itself", 0.0, 100.0)
-    assert (order.covered_cells, order.coverable_cells, order.complete) == (60, 60, True)
-
-
 def test_three_orders_have_three_verdicts():
     orders = told(
         (0, "covering", 0, 60),
@@ -70,13 +64,6 @@ def test_three_orders_have_three_verdicts():
     ]
 
 
-def test_a_complete_mission_says_how_much_floor_it_swept():
-    """Cells alone read as if all the floor were swept."""
-    document = ReviewDocument(complete=True, swept_m2=47.7, reachable_m2=49.4)
-    words = "complete: every cell covered; 47.7 of 49.4 m2 (96.6 %) of floor swept"
-    assert verdicts(document) == [(True, words)]
-
-
 def test_an_order_of_zones_is_judged_by_these():
     (order,) = restarted(MissionReport("command", zones=(ZoneReport("kitchen", 2, 1, 9, 9),)))
     assert (order.ordered, order.complete) == ("command", True)
@@ -91,6 +78,7 @@ def test_an_order_of_zones_is_judged_by_these():
 def test_an_order_keeps_its_origin_over_a_restart(ordered):
     (order,) = restarted(MissionReport(ordered))
     assert (order.ordered, order.order) == (ordered or "itself", None)
+    assert (order.at_s, order.until_s) == (0.0, 100.0)
 
 
 def test_a_robot_that_waited_for_its_first_order_had_none_before():
@@ -107,13 +95,6 @@ def restarted(*missions, states=("done",), commands=()):
     ]
     spans = spans_of([(each.at_s, each.status.state, "") for each in statuses], 100.0)
     return chapters(RunData(statuses=statuses, commands=list(commands)), spans, 100.0)
-
-
-def test_a_mission_that_is_done_with_cells_left_says_how_many():
-    document = ReviewDocument(complete=False, state="done", covered_cells=549, coverable_cells=550)
-    assert verdicts(document) == [
-        (False, "not complete: the mission was done with 549 of 550 cells covered")
-    ]
 
 
 def test_an_equal_order_continues_unless_it_is_over():
@@ -193,3 +174,17 @@ def test_numbers_have_a_difference():
         "-4",
     )
     assert rows["complete"] == ""
+
+
+@pytest.mark.parametrize(
+    ("members", "words"),
+    [
+        # Cells alone read as if all the floor were swept.
+        ({"complete": True, "swept_m2": 47.7, "reachable_m2": 49.4},
+         "complete: every cell covered; 47.7 of 49.4 m2 (96.6 %) of floor swept"),
+        ({"complete": False, "state": "done", "covered_cells": 549, "coverable_cells": 550},
+         "not complete: the mission was done with 549 of 550 cells covered"),
+    ],
+)  # fmt: skip
+def test_one_order_has_a_verdict_in_words(members, words):
+    assert verdicts(ReviewDocument(**members)) == [(members["complete"], words)]

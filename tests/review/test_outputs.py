@@ -25,7 +25,7 @@ from fasaco_edge.cli.review.screen import print_review
 from fasaco_edge.drawing import palette
 from fasaco_edge.grid.geometry import FARTHEST_M, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.figures import FLOOR, document_of
+from fasaco_edge.review.conversion import FLOOR, document_of
 from fasaco_edge.review.moments import Span
 from fasaco_edge.review.output import pictures
 from fasaco_edge.review.output.export import export
@@ -54,19 +54,16 @@ def review(parts):
     return read_review(parts)
 
 
-def test_the_picture_shows_map_and_trail(review):
-    colours = {colour for _, colour in draw_review([review]).getcolors(maxcolors=1 << 20)}
-    assert {palette.OCCUPIED, palette.COVERED, palette.RECOVERED[0], palette.START} <= colours
-    assert palette.UNSWEPT in colours
-
-
 def test_a_line_over_the_floor_is_drawn_by_what_it_sweeps(review):
     """Its track passes beside the centres of cells that the daemon counts as covered."""
+    cells = {colour for _, colour in draw_review([review]).getcolors(maxcolors=1 << 20)}
+    assert {palette.OCCUPIED, palette.COVERED, palette.REVISITED[0], palette.START} <= cells
+    assert palette.UNSWEPT in cells
     config = {**review.data.config, "planner": {"line": "thorough"}}
     line = replace(review, data=replace(review.data, config=config))
     colours = {colour for _, colour in draw_review([line]).getcolors(maxcolors=1 << 20)}
     assert {palette.COVERED, palette.UNSWEPT} <= colours
-    assert not {palette.LEFT_OUT, *palette.RECOVERED} & colours
+    assert not {palette.LEFT_OUT, *palette.REVISITED} & colours
 
 
 def test_floor_that_others_of_its_fleet_swept_is_not_left(review):
@@ -109,20 +106,6 @@ def test_on_a_low_terminal_it_says_how_many_rows_are_left_out(review, monkeypatc
     assert missing == names[len(names) - (int(found[1]) if found else 0) :]
 
 
-def test_without_a_map_there_is_no_picture(review):
-    bare = replace(
-        review,
-        lattice=None,
-        no_lattice="there is no map",
-        visits=None,
-        floor=None,
-    )
-    assert draw_review([bare]) is None
-    told = document(bare)
-    assert told["swept_m2"] is None
-    assert told["not_recorded"][FLOOR] == "there is no map"
-
-
 @pytest.mark.parametrize(
     ("changes", "why"),
     [
@@ -141,7 +124,9 @@ def test_a_map_without_a_lattice_is_named(review, changes, why):
         data = replace(data, grid=OccupancyGrid(geometry, data.grid.cells))
     without = review_of(review.record, data, 0)
     assert without.lattice is None
+    assert draw_review([without]) is None
     told = document(without)
+    assert told["swept_m2"] is None
     assert why in told["not_recorded"][FLOOR]
 
 
@@ -271,24 +256,6 @@ def test_exported_files_hold_what_was_driven(parts, tmp_path):
         assert (arrays["swept"] <= arrays["reachable"]).all()
 
 
-def test_a_full_disk_is_named(parts, capsys):
-    assert main(["review", *map(str, parts), "--png", "/dev/full"]) == 1
-    assert "cannot write /dev/full: No space left on device" in capsys.readouterr().err
-
-
-def test_a_missing_folder_is_named_first(parts, tmp_path, capsys):
-    assert main(["review", *map(str, parts), "--png", str(tmp_path / "none" / "a.png")]) == 78
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert "there is no folder" in told.err
-
-
-def test_a_file_is_no_folder_to_export_to(parts, tmp_path, capsys):
-    (tmp_path / "file").touch()
-    assert main(["review", *map(str, parts), "--export", str(tmp_path / "file")]) == 78
-    assert "cannot write" in capsys.readouterr().err
-
-
 def test_each_time_it_charged_is_a_line(parts):
     review = read_review(parts)
     since = review.duration_s
@@ -299,3 +266,17 @@ def test_each_time_it_charged_is_a_line(parts):
     found = document_of(replace(review, states=(*review.states, *spans), data=data))
     assert [row[1:] for row in charge_rows(found)] == [("1:00.0", "14% to 90%")]
     assert "14% to 90%" in dict(screen_rows(review, found))["charges"]
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "code", "said"),
+    [
+        ("--png", "/dev/full", 1, "cannot write /dev/full: No space left on device"),
+        ("--png", "none/a.png", 78, "there is no folder"),
+        ("--export", "file", 78, "cannot write"),
+    ],
+)
+def test_a_file_that_cannot_be_written_is_named(parts, tmp_path, capsys, option, name, code, said):
+    (tmp_path / "file").touch()
+    assert main(["review", *map(str, parts), option, str(tmp_path / name)]) == code
+    assert said in capsys.readouterr().err

@@ -16,21 +16,14 @@ from fasaco_edge.cli import main
 from fasaco_edge.errors import DifferentRuns
 from fasaco_edge.recording.read.frames import recording_id
 from fasaco_edge.review.comparison import side_by_side
-from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
-from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.paths import encode_path
-from tests.support.recordings import (
-    TIMEOUT_S,
-    begun_parts,
-    bus_on_free_port,
-    recorder_process,
-)
+from tests.support.recordings import TIMEOUT_S, begun_parts, told_recorder
 from tests.support.reviews import document
 from tests.support.rooms import map_bytes, pose_bytes, room
-from tests.support.senders import Sender
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "mission": {"lost_pose_s": 3.0}}
 # Three cells to the right and back, in the lowest row of the room.
@@ -47,45 +40,28 @@ DEAD_DOCK = {"code": "no_current", "text": "the dock gives no current"}
 
 def run_told(folder, *, faults, silent=0, killed=False):
     """Record a run of known figures, in parts as small as can be; return its files."""
-    folder.mkdir()
-    with bus_on_free_port() as (bus, endpoint):
-        publishers = {
-            "map": Sender(bus, topics.MAP),
-            "pose": Sender(bus, topics.POSE),
-            "path": Sender(bus, topics.PATH),
-            "status": Sender(bus, topics.STATUS),
-        }
-        with recorder_process(bus, endpoint, folder, part_bytes=1) as recorder:
-            sent = 0
-
-            def put(topic, payload, note=None):
-                nonlocal sent
-                sent += 1
-                publishers[topic].put(payload, encode_json(note) if note else b"")
-                # Each is to come at a time of its own, and in this order.
-                time.sleep(0.03)
-
-            put("map", map_bytes(room(2.4, 1.8)))
-            put("status", _status("planning", "first plan", {}))
-            for revision, (planner, ms, why) in enumerate(PATHS):
-                note = {"revision": revision + 1, "reason": why, "planner": planner, "plan_ms": ms}
-                put("path", _path(), note)
-            put("status", _status("covering", "path 1", {}))
-            for x in WAY:
-                put("pose", pose_bytes(x, Y))
-            # A part ends with a flush, and these are seconds apart.
-            recorder.wait_until(lambda report: "-part1." not in report["file"])
-            put("status", _status("degraded", "no pose for 3 s", {}))
-            put("status", _status("paused", "paused by command", {}, troubles=[DEAD_DOCK]))
-            put("status", _status("covering", "path 1", faults))
-            for _ in range(silent):
-                put("status", _status("covering", "path 1", faults | {"late": 1}))
-            recorder.written(sent)
-            if killed:
-                kill_within_a_part(recorder, folder, faults)
-            else:
-                recorder.process.terminate()
-            recorder.process.wait(120)
+    with told_recorder(folder, part_bytes=1) as told:
+        told.tell("map", map_bytes(room(2.4, 1.8)))
+        told.tell("status", _status("planning", "first plan", {}))
+        for revision, (planner, ms, why) in enumerate(PATHS):
+            note = {"revision": revision + 1, "reason": why, "planner": planner, "plan_ms": ms}
+            told.tell("path", _path(), note)
+        told.tell("status", _status("covering", "path 1", {}))
+        for x in WAY:
+            told.tell("pose", pose_bytes(x, Y))
+        # A part ends with a flush, and these are seconds apart.
+        told.recorder.wait_until(lambda report: "-part1." not in report["file"])
+        told.tell("status", _status("degraded", "no pose for 3 s", {}))
+        told.tell("status", _status("paused", "paused by command", {}, troubles=[DEAD_DOCK]))
+        told.tell("status", _status("covering", "path 1", faults))
+        for _ in range(silent):
+            told.tell("status", _status("covering", "path 1", faults | {"late": 1}))
+        if killed:
+            told.recorder.written(told.sent)
+            kill_within_a_part(told.recorder, folder, faults)
+            told.recorder.process.wait(120)
+        else:
+            told.end()
     return sorted(folder.glob("*.rrd"))
 
 
@@ -136,6 +112,11 @@ def test_parts_are_one_run(parts):
     assert (told["covered_cells"], told["coverable_cells"]) == (4, 24)
     assert told["reached_s"]["50"] is None
     assert told["complete"] is False
+    # Each part begins with the state in force.
+    last = read_review(parts[-1:])
+    assert all(span.begin_s >= 0 for span in last.states)
+    assert last.lattice is not None
+    assert (document(last)["robot"], document(last)["samples_missing"]) == ("robot", 0)
 
 
 def test_progress_is_reported(parts):
@@ -173,23 +154,13 @@ def test_troubles_and_faults_are_reported(parts):
         ("degraded", "no pose for 3 s"),
         ("paused", "the dock gives no current"),
     ]
-    (log,) = [lines for entity, lines in review.record.log.items() if entity == "log/mission"]
-    texts = [line for _, line in log]
+    texts = [line for _, line in review.record.texts["log/mission"]]
     assert texts.index("trouble: the dock gives no current") < texts.index(
         "trouble is over: no_current"
     )
     assert told["recorder_lost"] == 2
     assert told["faults_by_code"] == {"wrong_frame": 2, "late": 1}
     assert told["faults"] == 3
-
-
-def test_each_part_begins_with_the_state_in_force(parts):
-    review = read_review(parts[-1:])
-    assert all(span.begin_s >= 0 for span in review.states)
-    assert review.lattice is not None
-    told = document(review)
-    assert told["robot"] == "robot"
-    assert told["samples_missing"] == 0
 
 
 def test_a_killed_recorder_loses_no_figures(tmp_path, parts):
@@ -231,11 +202,3 @@ def test_two_runs_side_by_side(parts, other, tmp_path, capsys):
         assert 1.5 * alone.width < drawn.width < 2.5 * alone.width
     assert "messages refused" in table
     assert "+3" in table
-
-
-def test_a_file_that_is_no_recording_is_named(tmp_path, capsys):
-    assert main(["review", str(tmp_path / "none.rrd")]) == 1
-    assert "No such file or directory" in capsys.readouterr().err
-    (tmp_path / "text.rrd").write_text("hello")
-    assert main(["review", str(tmp_path / "text.rrd")]) == 1
-    assert "this is no recording" in capsys.readouterr().err

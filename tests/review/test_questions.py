@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -18,21 +17,19 @@ from fasaco_edge.cli import main
 from fasaco_edge.drawing import palette
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.figures import document_of
-from fasaco_edge.review.floor import swept_floor
-from fasaco_edge.review.instant import direction, heading_from, scene_at
+from fasaco_edge.review.conversion import document_of
+from fasaco_edge.review.floor_and_rooms import swept_floor
+from fasaco_edge.review.instant import instant_at
 from fasaco_edge.review.output.answers import instant_rows
 from fasaco_edge.review.output.pictures import draw_spots
 from fasaco_edge.review.output.rows import screen_rows
 from fasaco_edge.review.review import read_review
-from fasaco_edge.review.spot import explain, spots_left
-from fasaco_edge.wire import topics
+from fasaco_edge.review.spot import explain
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import FloorReport
 from fasaco_edge.wire.messages.paths import encode_path
-from tests.support.recordings import bus_on_free_port, read_column, recorder_process
+from tests.support.recordings import read_column, told_recorder
 from tests.support.rooms import UNKNOWN, WALL, fill, map_bytes, pose_bytes, room
-from tests.support.senders import Sender
 
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "planner": {"line": "thorough"}}
 KEEP_OUT = [[2.6, 0.4], [3.4, 0.4], [3.4, 1.0], [2.6, 1.0]]
@@ -59,67 +56,44 @@ def seen_first():
 def parts(tmp_path_factory):
     """A robot drives east along a path, until the map grows and another leads back west."""
     folder = tmp_path_factory.mktemp("questions") / "runs"
-    folder.mkdir()
-    with bus_on_free_port() as (bus, endpoint):
-        names = ("map", "pose", "path", "status", "command")
-        put = {name: Sender(bus, getattr(topics, name.upper())) for name in names}
-        with recorder_process(bus, endpoint, folder) as recorder:
-            sent = 0
+    with told_recorder(folder, 0.04) as told:
 
-            def tell(name, payload, note=None):
-                nonlocal sent
-                sent += 1
-                put[name].put(payload, encode_json(note) if note else b"")
-                time.sleep(0.04)
+        def path(revision, reason, xs, y=Y, **more):
+            xy = np.array([(x, y) for x in xs])
+            note = {"revision": revision, "reason": reason, "planner": "aco", "steps": 3}
+            told.tell("path", encode_path(xy, np.zeros(len(xy)), "map", 1), note | more)
 
-            def path(revision, reason, xs, y=Y, **more):
-                xy = np.array([(x, y) for x in xs])
-                note = {"revision": revision, "reason": reason, "planner": "aco", "steps": 3}
-                tell("path", encode_path(xy, np.zeros(len(xy)), "map", 1), note | more)
+        def status(state, reason, **more):
+            said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
+            mission = {"zones": [{"name": "a", "polygon": ZONE}] if told.sent > 2 else []}
+            mission["keep_outs"] = [{"polygon": KEEP_OUT, "by": "order"}] if told.sent > 2 else []
+            told.tell("status", encode_json(said | {"mission": mission | more}))
 
-            def status(state, reason, **more):
-                said = {"robot": "robot", "state": state, "reason": reason, "config": CONFIG}
-                mission = {"zones": [{"name": "a", "polygon": ZONE}] if sent > 2 else []}
-                mission["keep_outs"] = [{"polygon": KEEP_OUT, "by": "order"}] if sent > 2 else []
-                tell("status", encode_json(said | {"mission": mission | more}))
-
-            tell("map", map_bytes(seen_first()))
-            status("idle", "waits for an order")
-            tell("command", encode_json({"command": "start", "order": ORDER}))
-            status("covering", "path 1")
-            saved = {"saved_by_velocity_s": {"6": 14.0}, "saved_by_local_search_s": 2.0}
-            path(1, "first plan", [0.45, 2.0], ants=32, **saved)
-            for x in np.arange(0.45, 1.4, 0.15):
-                tell("pose", pose_bytes(float(x), Y))
-            tell("map", map_bytes(ground()))
-            box = {"x_min": 1.0, "y_min": 1.2, "x_max": 2.0, "y_max": 1.6}
-            path(2, "map: 3 cells more", [1.35, 0.3], changed=box)
-            for yaw in np.linspace(0.0, math.pi, 6):
-                tell("pose", pose_bytes(1.35, Y, yaw=float(yaw)))
-            for x in np.arange(1.2, 0.4, -0.15):
-                tell("pose", pose_bytes(float(x), Y, yaw=math.pi))
-            tell("command", encode_json({"command": "pause"}))
-            area = {"cells": 4, "m2": 0.36, "x": 3.0, "y": 0.7, "reason": "in a keep-out zone"}
-            status("paused", "paused by command", unreached={"areas": [area]})
-            recorder.written(sent)
-            recorder.process.terminate()
-            recorder.process.wait(120)
+        told.tell("map", map_bytes(seen_first()))
+        status("idle", "waits for an order")
+        told.tell("command", encode_json({"command": "start", "order": ORDER}))
+        status("covering", "path 1")
+        saved = {"saved_by_velocity_s": {"6": 14.0}, "saved_by_local_search_s": 2.0}
+        path(1, "first plan", [0.45, 2.0], ants=32, **saved)
+        for x in np.arange(0.45, 1.4, 0.15):
+            told.tell("pose", pose_bytes(float(x), Y))
+        told.tell("map", map_bytes(ground()))
+        box = {"x_min": 1.0, "y_min": 1.2, "x_max": 2.0, "y_max": 1.6}
+        path(2, "map: 3 cells more", [1.35, 0.3], changed=box)
+        for yaw in np.linspace(0.0, math.pi, 6):
+            told.tell("pose", pose_bytes(1.35, Y, yaw=float(yaw)))
+        for x in np.arange(1.2, 0.4, -0.15):
+            told.tell("pose", pose_bytes(float(x), Y, yaw=math.pi))
+        told.tell("command", encode_json({"command": "pause"}))
+        area = {"cells": 4, "m2": 0.36, "x": 3.0, "y": 0.7, "reason": "in a keep-out zone"}
+        status("paused", "paused by command", unreached={"areas": [area]})
+        told.end()
     return sorted(folder.glob("*.rrd"))
 
 
 @pytest.fixture(scope="module")
 def review(parts):
     return read_review(parts)
-
-
-def test_floor_that_was_not_ordered_is_not_left(review):
-    """The standing zone ends at y = 2.3 m, the room at 3 m."""
-    free = (0.4, 2.6)
-    assert review.all_floor.geometry.values_at(review.all_floor.unswept, np.array([free]))[0]
-    assert not review.floor.geometry.values_at(review.floor.unswept, np.array([free]))[0]
-    assert (
-        " of a, by recorded poses" in dict(screen_rows(review, document_of(review)))["floor swept"]
-    )
 
 
 def turned_s(review):
@@ -129,7 +103,7 @@ def turned_s(review):
 
 
 def test_a_turn_of_the_robot_is_explained(review):
-    instant = scene_at(review, turned_s(review)).instant
+    instant = instant_at(review, turned_s(review)).instant
     assert (instant.state, instant.x, instant.y) == ("covering", 1.35, Y)
     assert instant.turn.degrees == pytest.approx(180.0, abs=1.0)
     assert instant.turn.why == (
@@ -142,7 +116,7 @@ def test_a_turn_of_the_robot_is_explained(review):
 
 
 def test_changes_of_the_map_and_commands_are_listed(review):
-    instant = scene_at(review, turned_s(review)).instant
+    instant = instant_at(review, turned_s(review)).instant
     # A band of 40 cm across the room, of which the box and two walls are no floor.
     assert instant.map.seen_m2 == pytest.approx(0.4 * 4.0, abs=0.05)
     assert instant.map.around.y_min == pytest.approx(1.2, abs=0.06)
@@ -152,10 +126,11 @@ def test_changes_of_the_map_and_commands_are_listed(review):
     told = dict(instant_rows(instant))
     assert told["order"].startswith("zone a, keep out of")
     assert "seen for the first time" in told["map"]
+    assert "facing" in told["robot"]
 
 
 def test_the_search_that_found_the_path_is_named(review):
-    instant = scene_at(review, review.data.paths[0].at_s).instant
+    instant = instant_at(review, review.data.paths[0].at_s).instant
     planned = dict(instant_rows(instant))["planned"]
     assert planned.startswith("1 at 0:0")
     found = "ants of velocity 6 saved 14.0 s, local search saved 2.0 s"
@@ -164,25 +139,16 @@ def test_the_search_that_found_the_path_is_named(review):
 
 def test_before_the_first_message_nothing_is_known(review):
     first = min(review.data.map_s[0], review.data.pose_s[0])
-    instant = scene_at(review, max(first - 0.01, 0.0)).instant
+    instant = instant_at(review, max(first - 0.01, 0.0)).instant
     assert instant.path is instant.x is instant.command is None
-
-
-def test_a_line_leads_on_from_its_nearest_point():
-    line = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)])
-    assert heading_from(line, (1.0, 0.1)) == pytest.approx(0.0)
-    assert heading_from(line, (1.9, 1.0)) == pytest.approx(90.0)
-    assert heading_from(line, (2.0, 5.0)) is None
-    assert heading_from(line[:1], (0.0, 0.0)) is None
-    assert [direction(deg) for deg in (0, 44, 91, 180, -180, -90)] == [
-        *("east", "north-east", "north", "west", "west", "south")
-    ]
 
 
 @pytest.mark.parametrize(
     ("place", "why", "words"),
     [
         ((0.9, Y), "swept", "first at 0:0"),
+        # Of the path back the robot drove all but the last 15 cm.
+        ((0.2, Y), "still to come", "the robot did not get there"),
         ((9.0, 1.0), "never seen", "unknown to the map"),
         ((5.5, 1.0), "never seen", "unknown to the map"),
         ((2.2, 2.2), "not floor", "an obstacle (100 %)"),
@@ -268,22 +234,10 @@ def test_by_how_much_it_was_missed(review):
     assert spot.seen_s == pytest.approx(review.data.map_s[0], abs=1e-3)
 
 
-def test_floor_on_the_last_path_is_still_to_come(review):
-    """Of the path back the robot drove all but the last 15 cm."""
-    (spot,) = explain(review, [(0.2, Y)])
-    assert spot.why == "still to come"
-
-
 def test_a_spot_without_a_map_is_not_known(review):
     bare = replace(review, data=replace(review.data, grid=None), no_lattice="there is no map")
     (spot,) = explain(bare, [(1.0, 1.0)])
     assert (spot.swept, spot.words) == (None, "there is no map")
-
-
-def test_the_largest_patches_come_with_reasons(review):
-    spots = spots_left(review)
-    assert spots
-    assert all(spot.swept is False for spot in spots)
 
 
 def test_zones_are_drawn_for_the_viewer(parts):
@@ -328,6 +282,8 @@ def test_a_review_fits_on_one_screen_and_cuts_nothing(parts, review, capsys, ter
     assert len(out.splitlines()) <= 24
     assert max(map(len, out.splitlines())) <= 80
     told = " ".join(out.split())
+    # Floor that was not ordered is not left: the zone ends at y = 2.3 m, the room at 3 m.
+    assert " of a, by recorded poses" in told
     for name, text in screen_rows(review, document_of(review)):
         assert f"{name} {text}" in told
     assert "start: zone a, keep out of (2.6, 0.4) (3.4, 0.4) (3.4, 1) (2.6, 1), return home" in told

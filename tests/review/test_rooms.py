@@ -12,7 +12,7 @@ pytest.importorskip("rerun")
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.review.floor import room_at, room_chapters, swept_floor
+from fasaco_edge.review.floor_and_rooms import room_at, room_chapters, swept_floor
 from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import MissionReport, ZoneReport

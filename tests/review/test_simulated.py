@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 
 import numpy as np
 import pytest
@@ -13,17 +12,15 @@ pytest.importorskip("rerun")
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.timeline import open_timeline
-from fasaco_edge.review.instant import scene_at
+from fasaco_edge.review.instant import instant_at
 from fasaco_edge.review.review import read_review
 from fasaco_edge.serve.recorded import Playback
-from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
 from tests.support.processes import fasaco_edge
-from tests.support.recordings import bus_on_free_port, recorder_process
+from tests.support.recordings import told_recorder
 from tests.support.reviews import document
 from tests.support.rooms import map_bytes, room
-from tests.support.senders import Sender
 
 SCALE, SPEED_M_S = 20.0, 0.25
 # The robot drives for 10 s by its own clock, with a pose every half second [s].
@@ -34,21 +31,15 @@ ROBOT = {"tool_width_m": 0.3, "radius_m": 0.18, "speed_m_s": SPEED_M_S, "time_sc
 
 def record(folder):
     """Record a robot on a straight line, which is faster than its clock says; return the files."""
-    folder.mkdir()
-    with bus_on_free_port() as (bus, endpoint), recorder_process(bus, endpoint, folder) as recorder:
-        names = ("map", "pose", "status")
-        put = {name: Sender(bus, getattr(topics, name.upper())) for name in names}
-        put["map"].put(map_bytes(room(4.0, 3.0)))
+    with told_recorder(folder, EVERY_S / SCALE) as told:
+        told.tell("map", map_bytes(room(4.0, 3.0)))
         status = {"robot": "one", "state": "covering", "config": {"robot": ROBOT}}
-        put["status"].put(encode_json(status))
-        ticks = np.arange(0.0, DRIVES_S + 0.1, EVERY_S).tolist()
-        for at_s in ticks:
+        told.tell("status", encode_json(status))
+        for at_s in np.arange(0.0, DRIVES_S + 0.1, EVERY_S).tolist():
             pose = Pose2D(0.5 + SPEED_M_S * at_s, 0.5)
-            put["pose"].put(encode_pose_stamped(StampedPose(pose, "map", round(1e9 * at_s))))
-            time.sleep(EVERY_S / SCALE)
-        recorder.written(len(ticks) + 2)
-        recorder.process.terminate()
-        recorder.process.wait(120)
+            stamped = StampedPose(pose, "map", round(1e9 * at_s))
+            told.tell("pose", encode_pose_stamped(stamped))
+        told.end()
     return sorted(folder.glob("*.rrd"))
 
 
@@ -62,7 +53,7 @@ def test_times_and_speeds_are_the_robots(parts):
     told = document(review)
     assert np.diff(review.data.times) == pytest.approx(EVERY_S)
     assert told["driven_m"] / np.ptp(review.data.times) == pytest.approx(SPEED_M_S, rel=0.01)
-    assert scene_at(review, review.data.pose_s[10]).instant.speed_m_s == SPEED_M_S
+    assert instant_at(review, review.data.pose_s[10]).instant.speed_m_s == SPEED_M_S
     assert told["time_scale"] == SCALE
     # Before and after the drive no simulated time passes.
     assert told["duration_s"] > DRIVES_S

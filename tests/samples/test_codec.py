@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -81,16 +78,6 @@ def test_a_map_that_changed_a_little_takes_a_little():
     assert decoded([first, second])[1][0].sample.payload == changed.tobytes()
 
 
-def test_poses_take_less_than_half():
-    rng = np.random.default_rng(0)
-    poses = [
-        arrival(struct.pack("<II7d", n, n * 1000, *rng.normal(size=2), 0, 0, 0, 0.6, 0.8), at_ns=n)
-        for n in range(50)
-    ]
-    (blob,) = encoded(poses)
-    assert len(blob) < 0.5 * sum(len(pose.sample.payload) for pose in poses)
-
-
 def test_without_earlier_batches_only_a_restart_can_be_read():
     first, second, third = encoded([arrival(b"aaaa")], [arrival(b"aaab")], None, [arrival(b"aaac")])
     with pytest.raises(MalformedMessage, match=r"sample 1 .* sample 0, which is missing"):
@@ -135,8 +122,3 @@ def test_a_flipped_byte_changes_no_sample_unseen(place, flip):
     except MalformedMessage:
         return
     assert told == samples
-
-
-def test_another_schema_is_another_lane():
-    samples = [arrival(b"same"), replace(arrival(b"same"), sample=Sample("k", b"same", "other"))]
-    assert decoded(encoded(samples)) == [samples]

@@ -1,16 +1,11 @@
 """The simulated robot on a real bus; a session in the test stands for the planner."""
 
 import itertools
-import json
-import os
 import signal
 import subprocess
-import sys
 import threading
 import time
-from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +14,7 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
 from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.node import run_simulation
+from fasaco_edge.simulation.node import Pace, run_simulation
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from fasaco_edge.wire import topics
@@ -32,21 +27,6 @@ from tests.simulation.rooms import building, centres, distances_to, serpentine
 from tests.support.forked import ENVIRONMENT
 from tests.support.processes import PROGRAM, free_endpoint
 from tests.support.waiting import until
-
-ROBOT = """
-import json, sys
-from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.grid.geometry import Pose2D
-from fasaco_edge.simulation.node import run_simulation
-from fasaco_edge.simulation.robot import SimulationConfig
-from fasaco_edge.simulation.world import World
-from fasaco_edge.wire.keys import Keys
-from tests.simulation.rooms import building
-
-world = World(building(6.0, 4.0), Pose2D(1.0, 1.0), SimulationConfig())
-run_simulation(world, Keys("r1"), BusSettings(connect=(sys.argv[1],)), speed=40.0)
-print(json.dumps([world.track.tolist(), world.stamp_ns, world.collisions]))
-"""
 
 
 def new_world():
@@ -97,41 +77,8 @@ def planner():
     planner.bus.close()
 
 
-def test_a_robot_in_another_process_maps_and_drives_until_ended(planner):
-    path = serpentine(range(2, 6), range(2, 10))
-    end = path[-1]
-    root = Path(__file__).parents[2]
-    robot = subprocess.Popen(
-        [sys.executable, "-c", ROBOT, planner.endpoint],
-        cwd=root,
-        env={**os.environ, "PYTHONPATH": str(root)},
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        until(lambda: planner.maps and planner.poses)
-        first = planner.map()
-        assert first.cells.shape < building(6.0, 4.0).cells.shape
-        planner.send(path)
-        until(lambda: np.hypot(*(end - (planner.pose().pose.x, planner.pose().pose.y))) < 2e-3)
-        robot.send_signal(signal.SIGTERM)
-        output, _ = robot.communicate(timeout=120)
-    finally:
-        robot.kill()
-        robot.wait()
-    assert robot.returncode == 0
-    track, stamp_ns, collisions = json.loads(output)
-    assert collisions == 0
-    assert distances_to(np.array(track), path).max() < 0.03
-    # Its last words are its final state.
-    until(lambda: planner.pose().stamp_ns == stamp_ns)
-    last = planner.map()
-    assert last.stamp_ns == stamp_ns
-    assert np.count_nonzero(last.cells != -1) > np.count_nonzero(first.cells != -1)
-
-
-def test_bad_paths_are_ignored(planner):
-    world, path = new_world(), centres((2, 2), (2, 5))
+def test_it_drives_along_a_path_and_ignores_bad_ones(planner):
+    world, path = new_world(), serpentine(range(2, 6), range(2, 10))
     stages = [
         (lambda: world.stamp_ns > 0, planner.send_rubbish),
         (lambda: planner.refused == 1, lambda: planner.send(path, frame="odom")),
@@ -147,6 +94,15 @@ def test_bad_paths_are_ignored(planner):
 
     planner.run(world, finished, speed=20.0)
     assert stages == []
+    # The last messages are the final state, and the map has grown.
+    until(lambda: planner.pose().stamp_ns == planner.map().stamp_ns == world.stamp_ns)
+    known = [
+        np.count_nonzero(decode_occupancy_grid(each.payload).cells != -1)
+        for each in (planner.maps[0], planner.maps[-1])
+    ]
+    assert known[0] < known[1]
+    assert world.collisions == 0
+    assert distances_to(world.track, np.vstack([world.track[:1], path])).max() < 0.03
     assert planner.refused == 2
     assert world.track[-1] == pytest.approx(path[-1], abs=2e-3)
     assert all(0.0 < report.speed < 40.0 for report in planner.reports[1:])
@@ -218,9 +174,10 @@ def test_an_impossible_simulation_is_an_error():
 
 def test_it_waits_for_a_bus_that_is_not_there_yet():
     """As the daemon and `follow` do: a bare base's manual starts the robot first."""
-    endpoint = free_endpoint()
-    with waiting_robot(endpoint) as robot:
-        heard = threading.Event()
+    endpoint, heard = free_endpoint(), threading.Event()
+    words = [*PROGRAM, "simulate", "office", "--connect", endpoint]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
+        assert b"waiting for the bus at " + endpoint.encode() in robot.stderr.readline()
         with open_bus(BusSettings(mode="router", connect=(), listen=(endpoint,))) as bus:
             bus.listen(Keys(), topics.MAP, lambda _: heard.set())
             assert heard.wait(30.0)
@@ -228,16 +185,24 @@ def test_it_waits_for_a_bus_that_is_not_there_yet():
             assert robot.wait(30.0) == 0
 
 
-def test_stopped_before_it_has_joined_it_ends_in_order():
-    with waiting_robot(free_endpoint()) as robot:
-        robot.terminate()
-        assert robot.wait(30.0) == 0
-        assert robot.stderr.read() == b""
+def ticks_until(pace, begin_s, end_s, cost_s):
+    """Run ticks that take ``cost_s`` each, as soon as they are due."""
+    now_s, count = begin_s, 0
+    while now_s < end_s:
+        if pace.behind_s(now_s) >= 0.0:
+            pace.ticked(now_s)
+            now_s += cost_s
+            count += 1
+        else:
+            now_s -= min(pace.behind_s(now_s), -1e-4)
+    return count
 
 
-@contextmanager
-def waiting_robot(endpoint):
-    words = [*PROGRAM, "simulate", "office", "--connect", endpoint]
-    with subprocess.Popen(words, stderr=subprocess.PIPE, env=ENVIRONMENT) as robot:
-        assert b"waiting for the bus at " + endpoint.encode() in robot.stderr.readline()
-        yield robot
+def test_a_fast_machine_keeps_the_speed_and_a_slow_one_falls_behind():
+    pace = Pace(20.0, 0.02, 100.0)
+    assert ticks_until(pace, 100.0, 110.0, 1e-4) * 0.02 == pytest.approx(200.0, rel=0.01)
+    pace = Pace(10.0, 0.02, 0.0)
+    assert ticks_until(pace, 0.0, 10.0, 0.01) == pytest.approx(1000, abs=2)
+    # 80 s of simulated time were lost; at most a tenth of a second's worth is made good.
+    after = ticks_until(pace, 10.0, 12.0, 1e-5)
+    assert after * 0.02 == pytest.approx(20.0 + 0.1 * 10.0, rel=0.02)

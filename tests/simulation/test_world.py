@@ -115,6 +115,13 @@ def test_a_new_path_along_the_old_one_is_joined_without_a_stop():
     world.follow(lane[3:])
     run(world, 100)
     assert world.distance_m - before == pytest.approx(100 * 0.02 * 0.25, rel=1e-6)
+    # An empty path halts it.
+    world.follow(np.empty((0, 2)))
+    assert world.activity is Activity.IDLE
+    ticks(world, 50)
+    halted = world.pose
+    ticks(world, 50)
+    assert world.pose == halted
 
 
 def test_a_new_path_that_turns_off_behind_is_fetched():
@@ -147,33 +154,17 @@ def test_a_path_that_starts_metres_behind_is_joined_at_the_robot():
     assert (world.pose.x, world.pose.y) == pytest.approx((7.0, 1.0), abs=0.01)
 
 
-def test_an_empty_path_halts():
-    world = started(building(8, 4), Pose2D(1.0, 1.0))
-    world.follow(centres(*[(2, col) for col in range(2, 18)]))
-    run(world, 300)
-    world.follow(np.empty((0, 2)))
-    assert world.activity is Activity.IDLE
-    ticks(world, 50)
-    halted = world.pose
-    ticks(world, 50)
-    assert world.pose == halted
-    assert world.pose.x < 3.0
-
-
 def test_without_a_clear_way_it_waits_with_that_activity():
-    world = started(building(8, 4, (3.0, 0.0, 3.1, 4.0)), Pose2D(1.0, 1.0))
-    world.follow(centres((2, 12), (2, 13)))
-    ticks(world, 100)
-    assert world.activity is Activity.NO_WAY
-    assert world.pose == Pose2D(1.0, 1.0)
-
-
-def test_a_path_given_before_the_first_scan_is_taken_up_after_it():
-    world = World(building(8, 4), Pose2D(1.0, 1.2), SimulationConfig())
-    world.follow(centres((2, 2), (2, 3), (2, 4)))
+    world = World(building(8, 4, (3.0, 0.0, 3.1, 4.0)), Pose2D(1.0, 1.0), SimulationConfig())
+    # Before the first scan nothing is clear.
+    world.follow(centres((2, 2), (2, 3)))
     assert world.activity is Activity.NO_WAY
     world.tick()
     assert world.activity is Activity.DRIVING
+    world.follow(centres((2, 12), (2, 13)))
+    ticks(world, 100)
+    assert world.activity is Activity.NO_WAY
+    assert world.pose.x == pytest.approx(1.0, abs=0.01)
 
 
 def test_map_and_pose_come_at_their_rates_with_simulated_stamps():

@@ -24,22 +24,26 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import scan_recording
+from fasaco_edge.recording.read.torn import scan_recording
+from fasaco_edge.recording.scene.blueprint import build_blueprint
+from fasaco_edge.recording.write.quota import DiskBudget
+from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.keys import Keys
+from tests.support.senders import Sender
 
 RUN = """
 import json, pathlib, sys
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.recording.write.recorder import run_recorder
 told = json.loads(sys.argv[1])
 bus = BusSettings(connect=(told.pop("endpoint"),))
 out = pathlib.Path(told.pop("out"))
-budget = DiskBudget(**{"part_bytes": 64_000_000, "least_free_bytes": 50_000_000} | told)
-sys.exit(run_recorder(DaemonConfig(), bus, Output(out, budget)))
+budget = DiskBudget(out, **{"part_bytes": 64_000_000, "least_free_bytes": 50_000_000} | told)
+sys.exit(run_recorder(DaemonConfig(), bus, budget))
 """
 TIMEOUT_S = 120.0
 
@@ -95,6 +99,48 @@ def recorder_process(bus: Bus, endpoint: str, out: Path, **settings: Any) -> Ite
     finally:
         process.kill()
         process.communicate()
+
+
+def writer_in(folder: Path, part_bytes: int = 10**9, least_free_bytes: int = 0) -> RecordingWriter:
+    """Begin a recording of a run ``run`` in ``folder``; without limits unless given."""
+    budget = DiskBudget(folder, part_bytes, least_free_bytes)
+    return RecordingWriter("run", budget, build_blueprint(None))
+
+
+@dataclass
+class ToldRecorder:
+    """A recorder process, and publishers of what it records."""
+
+    recorder: Recorder
+    senders: dict[str, Sender]
+    pause_s: float
+
+    @property
+    def sent(self) -> int:
+        """Number of samples sent."""
+        return sum(sender.sent for sender in self.senders.values())
+
+    def tell(self, topic: str, payload: bytes, note: dict[str, Any] | None = None) -> None:
+        """Publish a sample; each comes at a time of its own, and in this order."""
+        self.senders[topic].put(payload, encode_json(note) if note else b"")
+        time.sleep(self.pause_s)
+
+    def end(self) -> None:
+        """Wait until all samples are recorded, and end the recorder."""
+        self.recorder.written(self.sent)
+        self.recorder.process.terminate()
+        self.recorder.process.wait(TIMEOUT_S)
+
+
+@contextmanager
+def told_recorder(folder: Path, pause_s: float = 0.03, **settings: Any) -> Iterator[ToldRecorder]:
+    """Run a recorder on a bus of its own; it writes into ``folder``, which is made."""
+    folder.mkdir()
+    told = topics.MAP, topics.POSE, topics.PATH, topics.STATUS, topics.COMMAND
+    with bus_on_free_port() as (bus, endpoint):
+        senders = {topic.name: Sender(bus, topic) for topic in told}
+        with recorder_process(bus, endpoint, folder, **settings) as recorder:
+            yield ToldRecorder(recorder, senders, pause_s)
 
 
 SCALAR = "Scalars:scalars"
@@ -213,7 +259,7 @@ def read_summary(path: Path) -> RecordingSummary:
         ended_ns=int(np.max(spans)) if spans else 0,
         complete=scan is not None and scan.has_footer,
         covered=_last_scalar(path, entities.COVERED_FRACTION),
-        recovered=_last_scalar(path, entities.RECOVERED_FRACTION),
+        recovered=_last_scalar(path, entities.REVISITED_FRACTION),
         paths=_texts(path, entities.PATH_LOG, TEXT),
         states=_texts(path, entities.MISSION_STATE, STATE),
     )

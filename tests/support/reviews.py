@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 
-from fasaco_edge.review.figures import document_of
+from fasaco_edge.review.conversion import document_of
 from fasaco_edge.review.review import Review
 
 

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from fasaco_edge.client.robot_state import Token
-from fasaco_edge.watch.glyphs import Blocks, GlyphSet
+from fasaco_edge.watch.glyphs import GlyphSet, ScreenBlocks
 from fasaco_edge.watch.page import Page
 from fasaco_edge.watch.picture import COVERED, HEADING, TO_COVER, WALL, RobotView
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -41,23 +41,14 @@ def test_two_pixels_make_a_character():
     )
 
 
-def test_equal_characters_share_one_escape_sequence():
-    (line,) = GlyphSet(ColorSystem.TRUECOLOR).lines(np.full((2, 50), WALL, np.uint8))
-    assert line.count("\x1b") == 2
-    assert plain(line) == " " * 50
-
-
-def test_fewer_colours_will_do():
+def test_fewer_colours_or_none_will_do():
+    kinds = np.array([[WALL, 0, TO_COVER, HEADING + 2], [WALL, COVERED, 0, 0]], np.uint8)
+    assert GlyphSet(None).lines(kinds) == ["#o-↑"]
     glyphs = GlyphSet.of(console(colours="256"))
     (line,) = glyphs.lines(np.array([[WALL], [COVERED]], np.uint8))
     assert "38;5;" in line
     assert "38;2" not in line
     assert GlyphSet.of(console(colours="standard")).colours is None
-
-
-def test_no_colours_will_do():
-    kinds = np.array([[WALL, 0, TO_COVER, HEADING + 2], [WALL, COVERED, 0, 0]], np.uint8)
-    assert GlyphSet(None).lines(kinds) == ["#o-↑"]
 
 
 @pytest.mark.parametrize(("width", "height"), SIZES)
@@ -78,25 +69,69 @@ def test_the_robot_points_east_over_the_covered_lower_half():
     assert row > 8
 
 
-def test_it_says_how_it_stands():
-    page = page_of(mid_mission())
-    for said in (
-        "COVERING",
-        "25.0 %, 10 of 40 cells",
-        "25.0 % of cells",
-        "swept     1.4 m2",
-        "COVERING  25.0 % of cells  path 7, 63 s to go",
-        "to go     63 s, 30 steps",
-        "path 7    map: 2 cells more",
-        "everything reachable",
-        "drive     0.25 m/s, 90 deg 1.93 s",
-        "written 0.4 s ago",
-        "errors",
-        "the daemon is there",
-        "path 7, 11 steps: map: 2 cells more",
-        "┤ 1 m",
-    ):
-        assert said in page, page
+ZONES = [
+    {"name": "kitchen", "passes": 2, "pass": 1, "cells": 60, "covered": 15},
+    {"name": "hall", "passes": 1, "pass": 0},
+]
+ORDER = {
+    "ordered": "command", "stage": "covering", "zone": "kitchen", "pass": 1, "passes": 2,
+    "pass_kind": "cross", "zones": ZONES, "keep_out": 3, "return_home": True,
+    "unreached": {"cells": 5},
+}  # fmt: skip
+FLOOR = {
+    "swept_m2": 9.0,
+    "reachable_m2": 10.0,
+    "left": [{"m2": 1.5, "reason": "too narrow"}, {"m2": 0.5, "reason": "in a keep-out zone"}],
+    "out_of_reach": [{"m2": 2.5, "reason": "closed off"}],
+}
+MEMBERS = [
+    {"name": "r2", "state": "covering", "heard_s": 0.4, "away": None, "swept_cells": 12},
+    {"name": "r3", "state": "covering", "heard_s": 7.0, "away": "gone", "swept_cells": 1},
+]
+STOP = {"revision": 8, "reason": "paused by command"}
+SAID = [
+    (
+        {},
+        "25.0 %, 10 of 40 cells", "swept     1.4 m2", "to go     63 s, 30 steps",
+        "COVERING  25.0 % of cells  path 7, 63 s to go", "path 7    map: 2 cells more",
+        "everything reachable", "drive     0.25 m/s, 90 deg 1.93 s", "written 0.4 s ago", "errors",
+        "the daemon is there", "path 7, 11 steps: map: 2 cells more", "┤ 1 m",
+    ),
+    (
+        {"mission": ORDER},
+        "10 of 40 cells of all floor", "zone kitchen, pass 1 of 2, cross",
+        "kitchen   pass 1 of 2, 25.0 %: 15 of 60 cells", "hall      to come",
+        "keep-out zones: 3, returns home", "5 cells, 0.0 m2",
+    ),
+    (
+        {"floor": FLOOR},
+        "swept     80.0 %: 8.0 of 10.0 m2", "1.5 m2 left: too narrow",
+        "0.5 m2 left: in a keep-out zone", "2.5 m2 out of reach: closed off",
+    ),
+    (
+        {"fleet": {"name": "hall", "division": 2, "part_cells": 40, "members": MEMBERS}},
+        "hall: 40 cells are its part", "covering, 12 cells swept", "away (gone), 1 cell swept",
+    ),
+    (
+        {"state": "paused", "reason": "paused by command", "path": STOP},
+        "path 8    stop", "paused: paused by command",
+    ),
+    # While the map grows, the time to go is a minimum.
+    (
+        {"coverage": {"coverable": 60, "covered": 10}},
+        "path 7, at least 63 s to go", "to go     at least 63 s, 30 steps",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("members", "said"), [(members, said) for members, *said in SAID])
+def test_it_shows_what_a_status_says(members, said):
+    view = mid_mission()
+    if members:
+        tell(view, "status", status(**members))
+    page = page_of(view, 120, 40)
+    for text in said:
+        assert text in page, page
 
 
 @pytest.mark.parametrize(
@@ -111,14 +146,6 @@ def test_the_time_to_go_is_by_the_clock(line_s, scale, said):
     page = page_of(view)
     assert (f"path 7, {said} to go" in page) == bool(said)
     assert f"to go     {said}{', ' if said else ''}30 steps" in page
-
-
-def test_while_the_map_grows_the_time_to_go_is_a_minimum():
-    view = mid_mission()
-    tell(view, "status", status(coverage={"coverable": 60, "covered": 10}))
-    page = page_of(view)
-    assert "path 7, at least 63 s to go" in page
-    assert "to go     at least 63 s, 30 steps" in page
 
 
 def test_it_shows_rooms_with_their_swept_shares():
@@ -142,80 +169,6 @@ def test_it_shows_rooms_with_their_swept_shares():
     assert ", 8 more" in page
     # In a narrow picture names give way.
     assert " hall " not in page_of(view, 10, 8)
-
-
-def test_it_says_how_far_an_order_is():
-    view = mid_mission()
-    zones = [
-        {"name": "kitchen", "passes": 2, "pass": 1, "cells": 60, "covered": 15},
-        {"name": "hall", "passes": 1, "pass": 0},
-    ]
-    order = {"ordered": "command", "stage": "covering", "zone": "kitchen", "pass": 1, "passes": 2}
-    more = {
-        "pass_kind": "cross",
-        "zones": zones,
-        "keep_out": 3,
-        "return_home": True,
-        "unreached": {"cells": 5},
-    }
-    assert "of all floor" not in page_of(view, 120, 40)
-    tell(view, "status", status(mission=order | more))
-    page = page_of(view, 120, 40)
-    for said in (
-        "10 of 40 cells of all floor",
-        "zone kitchen, pass 1 of 2, cross",
-        "kitchen   pass 1 of 2, 25.0 %: 15 of 60 cells",
-        "hall      to come",
-        "keep-out zones: 3, returns home",
-        "5 cells, 0.0 m2",
-    ):
-        assert said in page, page
-
-
-def test_the_page_shows_swept_floor_and_the_reasons_for_the_rest():
-    view = mid_mission()
-    left = [{"m2": 1.5, "reason": "too narrow"}, {"m2": 0.5, "reason": "in a keep-out zone"}]
-    floor = {"swept_m2": 9.0, "reachable_m2": 10.0, "left": left}
-    floor["out_of_reach"] = [{"m2": 2.5, "reason": "closed off"}]
-    tell(view, "status", status(floor=floor))
-    page = page_of(view, 120, 40)
-    for said in (
-        "swept     80.0 %: 8.0 of 10.0 m2",
-        "1.5 m2 left: too narrow",
-        "0.5 m2 left: in a keep-out zone",
-        "2.5 m2 out of reach: closed off",
-    ):
-        assert said in page, page
-
-
-def test_it_names_the_robots_of_the_fleet():
-    members = [
-        {"name": "r2", "state": "covering", "heard_s": 0.4, "away": None, "swept_cells": 12},
-        {"name": "r3", "state": "covering", "heard_s": 7.0, "away": "gone", "swept_cells": 1},
-    ]
-    fleet = {"name": "hall", "division": 2, "part_cells": 40, "members": members}
-    view = mid_mission()
-    tell(view, "status", status(fleet=fleet))
-    page = page_of(view, 120, 40)
-    assert "hall: 40 cells are its part" in page
-    assert "covering, 12 cells swept" in page
-    assert "away (gone), 1 cell swept" in page
-
-
-def test_a_path_without_points_is_a_stop():
-    view = mid_mission()
-    path = {"revision": 8, "reason": "paused by command"}
-    tell(view, "status", status(state="paused", reason="paused by command", path=path))
-    page = page_of(view, 120, 40)
-    assert "path 8    stop" in page
-    assert "paused: paused by command" in page
-
-
-def test_a_narrow_terminal_keeps_picture_and_state():
-    page = page_of(mid_mission(), 40, 20)
-    assert "COVERING" in page
-    assert "→" in page
-    assert "10 of 40 cells" not in page
 
 
 def test_a_daemon_that_is_gone_or_silent_is_named_so():
@@ -272,7 +225,7 @@ def test_no_number_that_a_status_may_have_ends_the_page():
 
 
 def test_a_block_says_how_many_rows_have_no_place():
-    blocks = Blocks(Console(file=io.StringIO(), width=40))
+    blocks = ScreenBlocks(Console(file=io.StringIO(), width=40))
     lines = [line.strip() for line in blocks.block(Text("a\nb\nc\nd"), 40, 3)]
     assert lines == ["a", "b", "2 more rows: enlarge the terminal"]
     assert [line.strip() for line in blocks.block(Text("a\nb"), 40, 3)] == ["a", "b", ""]

@@ -15,7 +15,7 @@ from fasaco_edge.cli.console.streams import printed_by
 from fasaco_edge.cli.console.terminal import can_draw, err
 from fasaco_edge.cli.demo.robots import FLEET
 from fasaco_edge.client import phrases
-from fasaco_edge.client.events import ORDER
+from fasaco_edge.client.phrases import ORDER
 from fasaco_edge.text import percent
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys

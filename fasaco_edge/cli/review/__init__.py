@@ -18,7 +18,7 @@ from fasaco_edge.cli.console.arguments import (
 )
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.errors import BadConfiguration
-from fasaco_edge.recording.read.repair import open_part
+from fasaco_edge.recording.read.torn import open_part
 from fasaco_edge.review.document import explanations
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
 
     from fasaco_edge.cli.review.screen import print_comparison, print_review
     from fasaco_edge.review.comparison import side_by_side
-    from fasaco_edge.review.figures import document_of
+    from fasaco_edge.review.conversion import document_of
 
     review = _read(args.recordings, "recording")
     if args.at is not None or args.point:
@@ -182,9 +182,9 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
     import msgspec
 
     from fasaco_edge.recording.read.robot_clock import clock
-    from fasaco_edge.review.instant import scene_at
+    from fasaco_edge.review.instant import instant_at
     from fasaco_edge.review.output import answers
-    from fasaco_edge.review.output.pictures import draw_scene, draw_spots
+    from fasaco_edge.review.output.pictures import draw_instant, draw_spots
     from fasaco_edge.review.spot import explain
 
     if args.at is not None and args.at > review.duration_s:
@@ -193,22 +193,22 @@ def _answer(args: argparse.Namespace, review: Review) -> int:
             hint="times count from the beginning of the recording, as in its review",
         )
     console, clock_of_robot = terminal.out(), review.record.clock
-    scene = None if args.at is None else scene_at(review, args.at)
+    shown = None if args.at is None else instant_at(review, args.at)
     spots = explain(review, args.point or ())
     if args.json:
-        found: dict[str, object] = {"at": scene.instant if scene else None, "points": spots}
+        found: dict[str, object] = {"at": shown.instant if shown else None, "points": spots}
         found["time_scale"] = clock_of_robot.scale
         print_json(msgspec.to_builtins(found))
     else:
         if clock_of_robot.words:
             console.print(f"{clock_of_robot.words}: times are the robot's")
-        if scene is not None:
+        if shown is not None:
             console.print(f"at {clock(args.at)}", style="bold")
-            console.print(terminal.figures(answers.instant_rows(scene.instant)))
+            console.print(terminal.figures(answers.instant_rows(shown.instant)))
         for spot in spots:
             console.print(terminal.figures(answers.spot_rows(spot)))
     if args.png:
-        picture = draw_scene(review, scene) if scene else draw_spots(review, spots)
+        picture = draw_instant(review, shown) if shown else draw_spots(review, spots)
         _save(picture, review, args.png)
     return 0
 

@@ -15,13 +15,13 @@ from fasaco_edge.cli.console import terminal
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import (
     compared_rows,
+    figures,
     setup_differences,
     setup_words,
 )
 from fasaco_edge.review.document import ReviewDocument
 from fasaco_edge.review.output import rows
 from fasaco_edge.review.output.answers import verdicts
-from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import one_line
 
 if TYPE_CHECKING:
@@ -58,20 +58,9 @@ def print_review(review: Review, document: ReviewDocument, *, full: bool) -> Non
         console.print(f"{more}: --long; a time: --at MM:SS; a spot: --point X,Y; a page: serve")
         return
     console.print(terminal.summary([*found, *rows.card_rows(document)]))
-    console.print(terminal.figures(rows.figure_rows(document)))
-    _print_table(console, "Orders", rows.ORDERS, rows.order_rows(document))
-    _print_table(console, "Rooms", rows.ROOMS, rows.room_rows(document, review))
-    if commands := rows.command_rows(document):
-        console.print("Commands", style="bold")
-        console.print(terminal.figures(commands))
-    _print_table(console, "Not reached", rows.UNREACHED, rows.unreached_rows(document))
-    _print_table(console, "Floor left", rows.LEFT, rows.left_rows(document, spots_left(review)))
-    _print_table(console, "Reasons of replans", rows.REASONS, rows.reason_rows(document))
-    _print_table(console, "Replans", rows.REPLANS, rows.replan_rows(review))
-    troubles = rows.trouble_rows(review.troubles)
-    _print_table(console, "Troubles", ("state", "at", "for", "reason"), troubles)
-    _print_table(console, "Charges", rows.CHARGES, rows.charge_rows(document))
-    _print_table(console, "Refused messages", ("code", "messages"), rows.fault_rows(document))
+    console.print(terminal.figures([(each.name, each.text) for each in figures(document)]))
+    for title, columns, cells in rows.tables(review, document):
+        _print_table(console, title, columns, cells)
     _print_remarks(console, document)
 
 
@@ -141,6 +130,10 @@ def _print_table(
     console: Console, title: str, columns: Sequence[str], cells: Sequence[Sequence[str]]
 ) -> None:
     if not cells:
+        return
+    if not columns:
+        console.print(title, style="bold")
+        console.print(terminal.figures([(name, text) for name, text in cells]))
         return
     table = Table(title=title, title_justify="left", title_style="bold")
     for index, column in enumerate(columns):

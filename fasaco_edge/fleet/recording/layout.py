@@ -14,7 +14,6 @@ from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import (
     MAP_BACKGROUND,
-    MARGIN,
     eye_above,
     log_view,
     plot_view,
@@ -49,7 +48,7 @@ def build_layout(robots: Sequence[str], bounds: Bounds) -> rrb.Blueprint:
         origin="/",
         name="Robots, paths, swept floor, shares",
         contents=[*worlds, f"/{entities.FLEET_SHARES}", f"/{entities.FLEET_TWICE}"],
-        eye_controls=eye_above(bounds, MARGIN, MAP_ASPECT),
+        eye_controls=eye_above(bounds, MAP_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
         overrides=trails,

@@ -24,7 +24,7 @@ from fasaco_edge.fleet.observer.members import GONE, Member
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import chunks_in, column, pa
-from fasaco_edge.recording.read.repair import HINT
+from fasaco_edge.recording.read.torn import HINT
 from fasaco_edge.wire.documents.fleet import CellEdge, CellTile
 from fasaco_edge.wire.documents.settings import known_settings
 from fasaco_edge.wire.documents.status import Status

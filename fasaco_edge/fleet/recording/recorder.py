@@ -35,10 +35,11 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.blueprint import NO_MAP
 from fasaco_edge.recording.write.process import (
     BusRecorder,
-    Output,
     afforded_bytes,
+    begin_recording,
     record,
 )
+from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
 from fasaco_edge.wire.documents.json_text import decode_tolerant
@@ -60,7 +61,7 @@ TOO_WIDE = "its cells are too many or too far apart: some are left out"
 
 
 def run_fleet_recorder(
-    config: DaemonConfig, bus_settings: BusSettings, fleet: str, output: Output
+    config: DaemonConfig, bus_settings: BusSettings, fleet: str, budget: DiskBudget
 ) -> int:
     """Record a fleet until SIGTERM or SIGINT; return the process's exit code, see ``record``.
 
@@ -68,23 +69,24 @@ def run_fleet_recorder(
         config: for the prefix of all keys, and the type of poses whose samples do not name it.
         bus_settings: how to join the bus.
         fleet: name of the fleet.
-        output: where and how to write.
+        budget: where to write, and its limits.
     """
     return record(
-        output.folder, bus_settings, lambda bus: FleetRecorder(config, bus, fleet, output)
+        budget.folder, bus_settings, lambda bus: FleetRecorder(config, bus, fleet, budget)
     )
 
 
 class FleetRecorder(BusRecorder):
     """Connection of the bus to the writer: ``step`` takes samples, writes and draws them."""
 
-    def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, output: Output) -> None:
+    def __init__(self, config: DaemonConfig, bus: Bus, fleet: str, budget: DiskBudget) -> None:
         self._fleet = fleet
         self._schema = config.pose.schema
-        recording = output.begin(file_name(fleet), build_layout((), NO_MAP))
-        self.writer, self._clock = recording.writer, recording.clock
-        self._began_ns = recording.began_ns
-        self._title = f"fleet {fleet} {recording.began} UTC"
+        self.writer, self._clock = begin_recording(
+            budget, file_name(fleet), build_layout((), NO_MAP)
+        )
+        self._began_ns = self._clock.began_ns
+        self._title = f"fleet {fleet} {self._clock.began:%Y-%m-%d %H:%M:%S} UTC"
         self.writer.describe(self._title)
         self._members = Members()
         self._scene = FleetScene(self.writer, self._members)

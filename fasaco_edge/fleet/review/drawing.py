@@ -12,8 +12,8 @@ from PIL import Image
 
 from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.drawing import palette
-from fasaco_edge.drawing.pictures import draw_unswept
-from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
+from fasaco_edge.drawing.pictures import UNSWEPT, draw_floor
+from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.errors import UnreadableRecording
 from fasaco_edge.fleet.observer.cells import Cells, mask_of, together, window_of
@@ -54,7 +54,7 @@ def draw_fleet_mission(
         lines: caption below it.
     """
     plot = Plot(
-        View.over(bounds_of(grid, lattice, np.vstack(list(trails.values()))), lattice.cell_m)
+        PlotView.over(bounds_of(grid, lattice, np.vstack(list(trails.values()))), lattice.cell_m)
     )
     plot.ground(grid)
     key = [KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end")]
@@ -72,7 +72,7 @@ def draw_fleet_mission(
     twice = MapLayer(unswept.geometry, times > 1)
     plot.paint(twice, palette.RULE)
     key.append(KeyEntry("tile", palette.RULE, f"by two or more ({twice.area_m2:,.1f} m2)"))
-    key += draw_unswept(plot, unswept)
+    key += draw_floor(plot, unswept, *UNSWEPT)
     for name, trail in trails.items():
         plot.line(trail, _track_colour(numbers[name]), TRACK_PX)
         plot.end_mark(trail[-1])
@@ -103,7 +103,7 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
     def layer(cells: Cells) -> MapLayer:
         return MapLayer(geometry, mask_of(cells, window))
 
-    plot = Plot(View.over(geometry.bounds(), seat.cell_m))
+    plot = Plot(PlotView.over(geometry.bounds(), seat.cell_m))
     plot.paint(layer(review.ground), palette.FREE)
     key = [KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end")]
     for robot, track, cells in zip(figures.robots, review.tracks, swept, strict=True):

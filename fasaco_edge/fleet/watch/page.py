@@ -12,13 +12,13 @@ from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.client import phrases
-from fasaco_edge.client.feed import Joining
+from fasaco_edge.client.feed import BusJoining
 from fasaco_edge.client.phrases import clock, steady_now
 from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
 from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.fleet.watch.view import FleetRobot, FleetView, short
 from fasaco_edge.text import one_line, percent
-from fasaco_edge.watch.glyphs import FAINT, Blocks, GlyphSet, with_keys
+from fasaco_edge.watch.glyphs import FAINT, GlyphSet, ScreenBlocks, with_keys
 from fasaco_edge.watch.live import Watched
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
@@ -77,7 +77,7 @@ class FleetPage:
     """Drawing of a fleet's view as lines of text, with a cache for unchanged parts."""
 
     def __init__(self, console: Console) -> None:
-        self._blocks = Blocks(console)
+        self._blocks = ScreenBlocks(console)
 
     def lines(self, view: FleetView, now: float, width: int, height: int) -> list[str]:
         """Return ``height`` lines, each ``width`` characters wide.
@@ -128,7 +128,7 @@ def headline(view: FleetView, robots: Sequence[FleetRobot], now: float, width: i
 CAPACITY_BYTES = 128_000_000
 
 
-class FleetFeed(Joining):
+class FleetFeed(BusJoining):
     """The samples of the robots of a fleet; a context manager.
 
     The reader gets the fleet messages of all robots, and selects by ``attend`` the robots whose

@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.client.events import BAD, GOOD, PLAIN, TROUBLED, EventLog
+from fasaco_edge.client.phrases import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.fleet.observer.inbox import Received
 from fasaco_edge.fleet.observer.members import JOINED, MOST_MEMBERS, Member, Members

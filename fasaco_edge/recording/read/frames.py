@@ -1,6 +1,6 @@
 """The chunks of a recording, read without Rerun, whose import takes 0.3 s of processor time.
 
-A chunk is a compressed Arrow message in a Protobuf message in a frame (``recording.read.repair``).
+A chunk is a compressed Arrow message in a Protobuf message in a frame (``recording.read.torn``).
 Each message states the size of the message inside. This reader checks the size before it allocates
 memory; Rerun's allocates first, and aborts the process if memory is short or a message is
 malformed. The footer, an index, is not read.
@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from fasaco_edge.errors import MissingExtra
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, open_part
+from fasaco_edge.recording.read.torn import FOOTER_KIND, FRAME, HEADER_BYTES, Scan, open_part
 
 
 def missing_rerun(error: ImportError) -> MissingExtra:
@@ -30,19 +30,8 @@ try:
 except ImportError as error:
     raise missing_rerun(error) from error
 
-__all__ = [
-    "BROKEN",
-    "Chunk",
-    "chunk_at",
-    "chunks",
-    "chunks_in",
-    "column",
-    "is_fleet_recording",
-    "missing_rerun",
-    "pa",
-    "recording_id",
-    "wall_ns",
-]
+# Other modules import pyarrow from here.
+__all__ = ["pa"]
 
 # Arrow's own pool keeps about ten megabytes of freed memory.
 pa.set_memory_pool(pa.system_memory_pool())
@@ -194,7 +183,6 @@ def _unpacked(message: Fields) -> pa.Buffer:
 
 
 def _batch(content: pa.Buffer) -> pa.RecordBatch:
-    """Return the batch of rows in an Arrow stream."""
     messages = pa.ipc.MessageReader.open_stream(content)
     schema = pa.ipc.read_schema(messages.read_next_message())
     rows = messages.read_next_message()

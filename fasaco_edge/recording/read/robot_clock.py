@@ -27,8 +27,8 @@ from fasaco_edge.wire.messages.poses import PoseDecoder
 from fasaco_edge.wire.schemas import POSE_STAMPED
 
 Seconds = NDArray[np.float64]
-# The recorder's clock replaces two successive stamps (the simulation was restarted) if they go
-# back, or advance by more than this many times the expected time plus a second.
+# Between two stamps of which the second is earlier, or later by more than this many times the
+# expected time plus a second, the simulation was restarted: there the recorder's clock counts.
 MOST_TIMES = 10.0
 
 

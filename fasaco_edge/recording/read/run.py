@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from fasaco_edge.bus.arrival import Arrival
 from fasaco_edge.errors import DifferentRuns, MalformedMessage, UnreadableRecording
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import Place as DrawnPlace
-from fasaco_edge.recording.read.drawn import anchor_in
 from fasaco_edge.recording.read.frames import (
     Chunk,
     chunks,
@@ -30,18 +28,18 @@ from fasaco_edge.recording.read.frames import (
     recording_id,
     wall_ns,
 )
-from fasaco_edge.recording.read.repair import HINT, open_part
 from fasaco_edge.recording.read.robot_clock import RobotClock
-from fasaco_edge.samples import Place, SampleDecoder, place_of
+from fasaco_edge.recording.read.torn import HINT, open_part
+from fasaco_edge.samples import BatchPlace, SampleDecoder, place_of
 
 COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class SampleBatch:
     """A batch of samples, its position and its file."""
 
-    place: Place
+    place: BatchPlace
     body: bytes
     path: Path
 
@@ -62,7 +60,7 @@ class RecordedSamples:
     def __init__(
         self,
         paths: Sequence[Path],
-        batches: Sequence[Batch] | None = None,
+        batches: Sequence[SampleBatch] | None = None,
         topics: Container[str] | None = None,
     ) -> None:
         if batches is None:
@@ -109,7 +107,7 @@ class RecordedSamples:
                 yield numbered.arrival
 
 
-def _batches_of(chunk: Chunk, path: Path) -> list[Batch]:
+def _batches_of(chunk: Chunk, path: Path) -> list[SampleBatch]:
     """Return the batches of samples in a chunk of the entity ``inputs`` of the file ``path``.
 
     Raises:
@@ -118,11 +116,10 @@ def _batches_of(chunk: Chunk, path: Path) -> list[Batch]:
     """
     found = column(chunk.batch, COMPONENT, pa.list_(pa.uint8()))
     bodies = [np.asarray(blob.values, np.uint8).tobytes() for blob in found or ()]
-    return [Batch(place_of(body), body, path) for body in bodies]
+    return [SampleBatch(place_of(body), body, path) for body in bodies]
 
 
 def _no_samples(paths: Sequence[Path]) -> UnreadableRecording:
-    """Return the error of files that hold no samples."""
     files = ", ".join(str(path) for path in paths)
     if any(map(is_fleet_recording, paths)):
         return UnreadableRecording(
@@ -136,13 +133,29 @@ def _no_samples(paths: Sequence[Path]) -> UnreadableRecording:
 
 
 SCALAR, STATE, TEXT = "Scalars:scalars", "StateChange:state", "TextLog:text"
-READ = ("metrics/", "state/", "log/")
+PLOTTED = "metrics/"
+READ = (PLOTTED, "state/", "log/")
 DRAWN = (entities.MAP, entities.FLOOR, entities.PHEROMONE, entities.PATH)
 STATUSES, POSES = ("status",), ("pose", "tf_static")
 # Limit on the uncompressed data kept of a file: this many times its size, plus this many bytes.
 MOST_RATIO, LEAST_BYTES = 16, 16_000_000
 # Memory for the place of a drawing [bytes].
 PLACE_BYTES = 200
+
+# Types of a place in a drawing.
+POINT = pa.list_(pa.field("item", pa.float32(), nullable=False), 3)
+PLACE = pa.list_(POINT)
+
+
+@dataclass(frozen=True, slots=True)
+class DrawingPlace:
+    """Place of a drawing: its time [ns], file, offset of the frame [bytes], row."""
+
+    at_ns: int
+    path: Path
+    offset: int
+    row: int
+
 
 TimedText = tuple[int, str]
 """Time [ns] and text."""
@@ -169,8 +182,7 @@ class RunRecord:
         clock: converts times on that timeline to the robot's.
         plots: points of each plotted entity, float64 (n, 2): the robot's time since the beginning
             [s], and value.
-        states: times and names of the states of each state entity.
-        log: times and texts of each log entity.
+        texts: times and texts of each entity of states, or log.
         drawn: places of the drawings of each entity of DRAWN, in order of time. Each part repeats
             those in force at its beginning.
         anchor: origin of drawings (x, y) [m], float64 (2,).
@@ -183,11 +195,10 @@ class RunRecord:
     ended_ns: int
     clock: RobotClock
     plots: Mapping[str, NDArray[np.float64]]
-    states: Mapping[str, tuple[TimedText, ...]]
-    log: Mapping[str, tuple[TimedText, ...]]
-    drawn: Mapping[str, tuple[DrawnPlace, ...]]
+    texts: Mapping[str, Sequence[TimedText]]
+    drawn: Mapping[str, Sequence[DrawingPlace]]
     anchor: NDArray[np.float64]
-    batches: tuple[Batch, ...]
+    batches: Sequence[SampleBatch]
 
 
 Progress = Callable[[int, int], None]
@@ -229,8 +240,8 @@ class _RunReader:
     parts: list[PartFile] = field(default_factory=list)
     span: list[int] = field(default_factory=list)
     rows: dict[str, list[Row]] = field(default_factory=lambda: defaultdict(list))
-    batches: list[Batch] = field(default_factory=list)
-    drawn: dict[str, list[DrawnPlace]] = field(default_factory=lambda: defaultdict(list))
+    batches: list[SampleBatch] = field(default_factory=list)
+    drawn: dict[str, list[DrawingPlace]] = field(default_factory=lambda: defaultdict(list))
     anchor: NDArray[np.float64] = field(default_factory=lambda: np.zeros(2))
 
     def read(self, path: Path) -> Iterator[int]:
@@ -253,12 +264,13 @@ class _RunReader:
             self.batches += _batches_of(chunk, path)
         elif chunk.is_static or not batch.num_rows:
             if entity == entities.WORLD:
-                self.anchor = anchor_in(batch, self.anchor)
+                place = column(batch, "Transform3D:translation", PLACE)
+                self.anchor = self.anchor if place is None else np.array(place[0].as_py()[0][:2])
             return 0
         elif entity in DRAWN:
             times = wall_ns(batch)
             self.drawn[entity] += [
-                DrawnPlace(at, path, chunk.offset, row) for row, at in enumerate(times)
+                DrawingPlace(at, path, chunk.offset, row) for row, at in enumerate(times)
             ]
             return PLACE_BYTES * len(times)
         elif entity.startswith(READ):
@@ -282,42 +294,35 @@ class _RunReader:
             )
         if not self.batches:
             raise _no_samples([Path(part.path) for part in self.parts])
-        began = min(self.span, default=0)
-        for rows in self.rows.values():
-            rows.sort(key=lambda row: row[0])
+        began_ns = min(self.span, default=0)
         for places in self.drawn.values():
             places.sort(key=lambda place: place.at_ns)
         statuses, poses = (
             RecordedSamples((), self.batches, topics) for topics in (STATUSES, POSES)
         )
-        clock = RobotClock.of(statuses, poses, began)
+        clock = RobotClock.of(statuses, poses, began_ns)
+        plots: dict[str, NDArray[np.float64]] = {}
+        texts: dict[str, list[TimedText]] = {}
+        for entity, rows in self.rows.items():
+            rows.sort(key=lambda row: row[0])
+            if entity.startswith(PLOTTED):
+                at_ns = np.array([at for at, _ in rows], np.int64)
+                values = np.array([value for _, value in rows], np.float64)
+                plots[entity] = np.column_stack((clock.all_seconds(at_ns), values))
+            else:
+                texts[entity] = [(at, str(value)) for at, value in rows]
         return RunRecord(
             recording_id=next(iter(self.ids), ""),
             parts=tuple(self.parts),
-            began_ns=began,
+            began_ns=began_ns,
             ended_ns=max(self.span, default=0),
             clock=clock,
-            plots=dict(self._plots(clock)),
-            states=self._texts("state/"),
-            log=self._texts("log/"),
-            drawn={entity: tuple(places) for entity, places in self.drawn.items()},
+            plots=plots,
+            texts=texts,
+            drawn=self.drawn,
             anchor=self.anchor,
-            batches=tuple(self.batches),
+            batches=self.batches,
         )
-
-    def _plots(self, clock: RobotClock) -> Iterator[tuple[str, NDArray[np.float64]]]:
-        for entity, rows in self.rows.items():
-            if entity.startswith("metrics/"):
-                at_ns = np.array([at for at, _ in rows], np.int64)
-                values = np.array([value for _, value in rows], np.float64)
-                yield entity, np.column_stack((clock.all_seconds(at_ns), values))
-
-    def _texts(self, prefix: str) -> dict[str, tuple[TimedText, ...]]:
-        return {
-            entity: tuple((at, str(value)) for at, value in rows)
-            for entity, rows in self.rows.items()
-            if entity.startswith(prefix)
-        }
 
 
 def _values(batch: pa.RecordBatch) -> list[list[float | str] | None]:

@@ -18,7 +18,6 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.documents.path_documents import TrailAttachment
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 Colour = tuple[int, int, int]
@@ -26,7 +25,7 @@ Colour = tuple[int, int, int]
 ROBOT_COLOUR: Colour = (220, 38, 38)
 HEADING_COLOUR: Colour = (250, 204, 21)
 COVERED_COLOUR: Colour = (56, 152, 222)
-RECOVERED_COLOUR: Colour = (245, 140, 40)
+REVISITED_COLOUR: Colour = (245, 140, 40)
 SWEPT_COLOUR: Colour = (45, 212, 191)
 LABEL_COLOUR: Colour = (255, 255, 255)
 # Bright colours: the labels have them, too, on a dark background.
@@ -38,8 +37,6 @@ ROBOT_Z, LABEL_Z = 0.06, 0.1
 # Size on the screen [points].
 MARK_RADIUS = 5.0
 MAP_ORDER, FLOOR_ORDER = 0.0, 0.5
-# Distance of a label above its field, as a share of the field's height.
-LABEL_ABOVE = 0.1
 
 # Largest tangent of a bend that counts as straight.
 STRAIGHT = 1e-6
@@ -95,13 +92,6 @@ def pheromone_archetype(message: PheromoneMessage) -> rr.GridMap:
     )
 
 
-def trail_label(message: PheromoneMessage, about: TrailAttachment) -> rr.Points3D:
-    """Return the label over the living trail: the path at that time."""
-    left = f"{message.best_steps} steps" if message.best_steps else "nothing left"
-    text = f"pheromone at path {about.revision}, {left} to drive"
-    return label_archetype(message.geometry.bounds(), text, LABEL_ABOVE)
-
-
 def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D:
     """Return points [m], float64 (n, 2), as a line; an empty one for fewer than two points.
 
@@ -111,13 +101,9 @@ def line_archetype(xy: NDArray[np.float64], style: LineStyle) -> rr.LineStrips3D
     return rr.LineStrips3D.from_fields(strips=[points] if len(points) >= 2 else [])
 
 
-def label_archetype(bounds: Bounds, text: str, above: float = 0.0) -> rr.Points3D:
-    """Return text over the upper edge of a rectangle (x_min, y_min, x_max, y_max) [m].
-
-    ``above``: distance to the edge, as a share of the rectangle's height.
-    """
-    x0, y0, x1, y1 = bounds
-    place = ((x0 + x1) / 2, y1 + above * (y1 - y0), LABEL_Z)
+def label_archetype(bounds: Bounds, text: str) -> rr.Points3D:
+    """Return text at the upper edge of a rectangle (x_min, y_min, x_max, y_max) [m]."""
+    place = ((bounds[0] + bounds[2]) / 2, bounds[3], LABEL_Z)
     return rr.Points3D([place], radii=0.0, labels=[text], colors=LABEL_COLOUR, show_labels=True)
 
 
@@ -125,11 +111,6 @@ def mark_archetype(pose: Pose2D, text: str, colour: Colour) -> rr.Points3D:
     """Return a point with a name."""
     place = (pose.x, pose.y, LABEL_Z)
     return rr.Points3D([place], radii=-MARK_RADIUS, labels=[text], colors=colour, show_labels=True)
-
-
-def no_label_archetype() -> rr.Points3D:
-    """Return no text."""
-    return rr.Points3D(np.zeros((0, 3)))
 
 
 def style_archetype(style: LineStyle) -> rr.LineStrips3D:
@@ -216,14 +197,8 @@ def grid_archetype(
     )
 
 
-GREEN, AMBER, RED, BLUE, VIOLET, GREY = (
-    0x059669FF,
-    0xD97706FF,
-    0xDC2626FF,
-    0x2563EBFF,
-    0x7C3AEDFF,
-    0x6B7280FF,
-)
+GREEN, AMBER, RED = 0x059669FF, 0xD97706FF, 0xDC2626FF
+BLUE, VIOLET, GREY = 0x2563EBFF, 0x7C3AEDFF, 0x6B7280FF
 
 STATES: dict[str, dict[str, int]] = {
     entities.MISSION_STATE: {

@@ -11,8 +11,8 @@ from fasaco_edge.recording.sdk import rr, rrb
 
 # Bounds of the view without a map [m].
 NO_MAP: Bounds = (-5.0, -5.0, 5.0, 5.0)
-# Space for the map to grow a little without a new view, and for a label above the field.
-MARGIN, PHEROMONE_MARGIN = 1.1, 1.3
+# Space for the map to grow a little without a new view.
+MARGIN = 1.1
 # Rerun's vertical field of view, and the aspect ratios (width / height) of the spatial views in
 # this layout at 1280 x 720.
 FIELD_OF_VIEW_RAD = math.radians(55.0)
@@ -29,14 +29,18 @@ PATH_ON_FIELD, PATH_WIDTH = [255, 255, 255], 0.8
 def build_blueprint(bounds: Bounds | None) -> rrb.Blueprint:
     """Return the layout; its spatial views show ``bounds`` (x_min, y_min, x_max, y_max) [m]."""
     bounds = bounds or NO_MAP
+    states = rrb.StateTimelineView(origin="/state", name="States")
+    card = rrb.TextDocumentView(origin=f"/{entities.RUN_CARD}", name="Run")
+    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
+    coverage = plot_view("Cells covered [share]", "metrics/coverage", legend, 1.1)
     return rrb.Blueprint(
         rrb.Tabs(
             rrb.Horizontal(
-                rrb.Vertical(_map_view(bounds), _states(), row_shares=[9, 2]),
+                rrb.Vertical(_map_view(bounds), states, row_shares=[9, 2]),
                 rrb.Vertical(
                     _pheromone_view(bounds),
                     log_view(),
-                    rrb.Horizontal(_card(), _coverage(), column_shares=[3, 2]),
+                    rrb.Horizontal(card, coverage, column_shares=[3, 2]),
                     row_shares=[6, 3, 4],
                 ),
                 name="Mission",
@@ -57,7 +61,7 @@ def _map_view(bounds: Bounds) -> rrb.Spatial3DView:
         origin=f"/{entities.WORLD}",
         name="Map, swept floor, track and path",
         contents=["/world/**", f"- /{entities.PHEROMONE}/**"],
-        eye_controls=eye_above(bounds, MARGIN, VIEW_ASPECT),
+        eye_controls=eye_above(bounds, VIEW_ASPECT),
         line_grid=False,
         background=MAP_BACKGROUND,
         overrides={entities.DRIVEN_PATH: up_to_cursor()},
@@ -74,7 +78,7 @@ def _pheromone_view(bounds: Bounds) -> rrb.Spatial3DView:
             f"/{entities.PATH}",
             f"/{entities.ROBOT}/**",
         ],
-        eye_controls=eye_above(bounds, PHEROMONE_MARGIN, PHEROMONE_ASPECT),
+        eye_controls=eye_above(bounds, PHEROMONE_ASPECT),
         line_grid=False,
         background=PHEROMONE_BACKGROUND,
         overrides={entities.PATH: thin_path},
@@ -106,11 +110,6 @@ def plot_view(
     )
 
 
-def _coverage() -> rrb.TimeSeriesView:
-    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop)
-    return plot_view("Cells covered [share]", "metrics/coverage", legend, 1.1)
-
-
 def _details() -> list[rrb.TimeSeriesView]:
     left, right = (rrb.PlotLegend(c) for c in (rrb.Corner2D.LeftTop, rrb.Corner2D.RightTop))
     gaps = tuple(f"/{gap}" for gap in (entities.GAP, entities.LINE_GAP))
@@ -128,10 +127,6 @@ def _details() -> list[rrb.TimeSeriesView]:
     ]
 
 
-def _states() -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(origin="/state", name="States")
-
-
 def log_view() -> rrb.TextLogView:
     """Return a view of all logs, without the lines of level DEBUG."""
     # The view is too narrow for a column of times; the cursor shows the time.
@@ -143,16 +138,12 @@ def log_view() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/log", name="Log", columns=columns, rows=rows)
 
 
-def _card() -> rrb.TextDocumentView:
-    return rrb.TextDocumentView(origin=f"/{entities.RUN_CARD}", name="Run")
-
-
-def eye_above(bounds: Bounds, margin: float, aspect: float) -> rrb.EyeControls3D:
+def eye_above(bounds: Bounds, aspect: float) -> rrb.EyeControls3D:
     """Return a camera that looks down on ``bounds``, in a view of width / height ``aspect``."""
     x0, y0, x1, y1 = bounds
     x, y = (x0 + x1) / 2, (y0 + y1) / 2
     reach = max((y1 - y0) / 2, (x1 - x0) / 2 / aspect, 0.5)
-    height = margin * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
+    height = MARGIN * reach / math.tan(FIELD_OF_VIEW_RAD / 2)
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         # Exactly straight down, the camera's up axis would be undefined.

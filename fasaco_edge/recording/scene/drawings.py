@@ -9,14 +9,14 @@ import numpy as np
 from msgspec.structs import astuple
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.geometry import Bounds, Polygon, Pose2D
+from fasaco_edge.grid.geometry import Polygon, Pose2D
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.layers import Anchor, Layers
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
 from fasaco_edge.text import one_line
-from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
+from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.replies import MissionReport
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.reasons import plain
@@ -43,15 +43,15 @@ class PathDrawing:
         # Revision and line of the path drawn last.
         self._drawn: tuple[int, Line | None] = (-1, None)
 
-    def add(self, message: PathMessage, about: PathAttachment) -> None:
-        """Draw a path, and log it unless it was published before."""
+    def add(self, message: PathMessage, about: PathAttachment, anchor: Anchor) -> None:
+        """Draw a path relative to the anchor, and log it unless it was published before."""
         revision = about.revision
         if revision:
             self._writer.sequence(entities.REPLAN, revision)
         if self._revision != revision:
             self._log(about, _path_line(message, about))
-            self._draw_window(about.changed, about.reason)
-        self._revision, line = revision, draw.corners(message.xy)
+            self._draw_window(about, anchor)
+        self._revision, line = revision, draw.corners(message.xy - anchor.xy)
 
         def draw_path() -> None:
             (before, old), self._drawn = self._drawn, (revision, line)
@@ -75,18 +75,17 @@ class PathDrawing:
         log_line = rr.TextLog(line, level="INFO" if is_new else "DEBUG")
         self._writer.log(entities.PATH_LOG, log_line)
 
-    def _draw_window(self, changed: Rectangle | None, reason: str) -> None:
-        """Draw the changed part of the map that caused the path, if any."""
-        if changed is not None:
-            bounds: Bounds = astuple(changed)
-            box = draw.box_archetype(bounds, draw.WINDOW)
-            label = draw.label_archetype(bounds, reason)
+    def _draw_window(self, about: PathAttachment, anchor: Anchor) -> None:
+        if about.changed is not None:
+            x0, y0, x1, y1 = np.subtract(astuple(about.changed), anchor.xy * 2).tolist()
+            box = draw.box_archetype((x0, y0, x1, y1), draw.WINDOW)
+            label = draw.label_archetype((x0, y0, x1, y1), about.reason)
         elif self._has_window:
             box = draw.line_archetype(np.zeros((0, 2)), draw.WINDOW)
-            label = draw.no_label_archetype()
+            label = rr.Points3D(np.zeros((0, 3)))
         else:
             return
-        self._has_window = changed is not None
+        self._has_window = about.changed is not None
         self._writer.log(entities.REPLAN_WINDOW, box, latched=True)
         self._writer.log(entities.REPLAN_REASON, label, latched=True)
 

@@ -15,15 +15,11 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from msgspec.structs import astuple
-from msgspec.structs import replace as replace_members
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Bounds, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording import entities
-from fasaco_edge.wire.documents.path_documents import PathAttachment, Rectangle
-from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 
 # Up to this distance from 0, float32 resolves a millimetre, and nothing is shifted [m].
@@ -60,25 +56,8 @@ class Anchor:
 
     def grid(self, grid: Grid) -> Grid:
         """Return a grid relative to the anchor."""
-        if not self:
-            return grid
         geometry = grid.geometry
         return replace(grid, geometry=replace(geometry, origin=self.pose(geometry.origin)))
-
-    def path(self, message: PathMessage) -> PathMessage:
-        """Return a path relative to the anchor."""
-        if not self:
-            return message
-        return replace(message, xy=message.xy - np.array((self.x, self.y)), yaw=message.yaw)
-
-    def attachment(self, about: PathAttachment) -> PathAttachment:
-        """Return a path's attachment, its rectangle relative to the anchor."""
-        changed = about.changed
-        if not self or changed is None:
-            return about
-        x0, y0, x1, y1 = astuple(changed)
-        moved = Rectangle(x0 - self.x, y0 - self.y, x1 - self.x, y1 - self.y)
-        return replace_members(about, changed=moved)
 
 
 def is_far_from(framed: Bounds, bounds: Bounds, share: float) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from fasaco_edge.client.phrases import BAD, trouble_changes
 from fasaco_edge.errors import PatchWithoutBase
 from fasaco_edge.grid.geometry import Bounds, Pose2D, StampedPose, union_bounds
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, known_bounds
@@ -16,27 +17,16 @@ from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene import archetypes as draw
 from fasaco_edge.recording.scene.archetypes import log_styles
 from fasaco_edge.recording.scene.blueprint import build_blueprint
-from fasaco_edge.recording.scene.curves import (
-    COUNT_SPACING_NS,
-    NOISE,
-    Curves,
-    StatusFigures,
-)
 from fasaco_edge.recording.scene.drawings import AreaDrawing, DrivenPathDrawing, PathDrawing
-from fasaco_edge.recording.scene.layers import (
-    Anchor,
-    Layers,
-    is_far_from,
-    size_in_file,
-)
+from fasaco_edge.recording.scene.layers import Anchor, Layers, is_far_from, size_in_file
 from fasaco_edge.recording.scene.runcard import Outcome, RunDescription
+from fasaco_edge.recording.scene.status_curves import COUNT_SPACING_NS, NOISE, Curves
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
-from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
-from fasaco_edge.wire.documents.replies import TROUBLES
+from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.documents.settings import known_settings
-from fasaco_edge.wire.documents.status import ErrorCounts, Recorder, Status
+from fasaco_edge.wire.documents.status import Recorder, Status
 from fasaco_edge.wire.messages.paths import PathMessage
 from fasaco_edge.wire.messages.pheromone import PheromoneMessage
 from fasaco_edge.wire.reasons import plain
@@ -61,14 +51,13 @@ class Scene:
         self._errors = self._restored = 0
         self._robot: Pose2D | None = None
         self._states: dict[str, str] = {}
-        self._troubles: set[str] = set()
+        self._status: Status | None = None
         # The last drawn content of each grid: a daemon publishes unchanged grids again.
         self._drawn: dict[str, object] = {}
         self._outcome = Outcome()
         self._layers = Layers()
         self._curves = Curves(writer)
         self._driven = DrivenPathDrawing(writer)
-        self._figures = StatusFigures(self._curves)
         self._paths = PathDrawing(writer, self._layers)
         self._areas = AreaDrawing(writer, self._layers, self._anchored)
         log_styles(writer)
@@ -129,9 +118,8 @@ class Scene:
         anchor = self._anchor
         if anchor is None and len(message.xy):
             anchor = self._anchored(Pose2D(*message.xy[0].tolist()))
-        anchor = anchor or Anchor()
-        self._paths.add(anchor.path(message), anchor.attachment(about))
-        self._figures.add_path(about)
+        self._paths.add(message, about, anchor or Anchor())
+        self._curves.add_path(about)
 
     def add_floor(self, grid: OccupancyGrid) -> None:
         """Tint the swept floor."""
@@ -142,33 +130,37 @@ class Scene:
         size, drawn = 2 * size_in_file(grid.cells), 4 * grid.cells.size
         self._draw(entities.FLOOR, size, lambda: draw.floor_archetype(grid), drawn)
 
-    def add_pheromone(self, message: PheromoneMessage, about: TrailAttachment) -> None:
+    def add_pheromone(self, message: PheromoneMessage) -> None:
         """Draw the living trail."""
-        if self._comes_again(entities.PHEROMONE, (message.geometry, about), message.levels):
+        about = message.geometry, message.trail_min, message.trail_max
+        if self._comes_again(entities.PHEROMONE, about, message.levels):
             return
         message = self._anchored(message.geometry.origin).grid(message)
-
-        def draw_pheromone() -> rr.GridMap:
-            label = draw.trail_label(message, about)
-            self._writer.log(entities.TRAIL_LABEL, label, latched=True)
-            return draw.pheromone_archetype(message)
-
-        size = size_in_file(message.levels)
-        self._draw(entities.PHEROMONE, size, draw_pheromone, message.levels.size)
+        in_file, size = size_in_file(message.levels), message.levels.size
+        self._draw(entities.PHEROMONE, in_file, lambda: draw.pheromone_archetype(message), size)
         # These limits are needed to convert levels to pheromone.
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/min", message.trail_min)
         self._curves.draw(f"{entities.PHEROMONE_RANGE}/max", message.trail_max)
 
     def add_status(self, status: Status) -> None:
         """Plot the planner's figures, show its states, log its errors."""
-        self._figures.add(status)
+        self._curves.add_status(status)
         self._outcome.add_status(status)
         self._add_configuration(status)
-        self._add_restored(status.ledger.restored_cells)
+        if (restored := status.ledger.restored_cells) != self._restored:
+            self._restored = restored
+            self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
         self._areas.add_report(status.mission)
         self.enter(entities.MISSION_STATE, status.state, plain(status.reason))
-        self._add_troubles(status)
-        self._add_errors(status.errors)
+        for text, tone in trouble_changes(self._status, status):
+            self.add_line(entities.MISSION_LOG, text, "WARN" if tone == BAD else "INFO")
+        self._status = status
+        errors = status.errors
+        # The count falls when the planner restarts.
+        if errors.total > self._errors:
+            last = errors.last or "no text"
+            self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
+        self._errors = errors.total
 
     def add_report(self, report: Recorder) -> None:
         """Show the recorder's own state and memory."""
@@ -218,7 +210,6 @@ class Scene:
         self._layers.draw(entity, in_file, log, self._writer.wall_ns)
 
     def _comes_again(self, entity: str, about: object, pixels: NDArray[np.generic]) -> bool:
-        """Return whether the newest grid of an entity equals the grid before it."""
         before, newest = self._drawn.get(entity), (about, hash(pixels.tobytes()))
         self._drawn[entity] = newest
         return before == newest
@@ -267,25 +258,3 @@ class Scene:
         body, heading = draw.body_archetypes(radius_m)
         self._writer.log_static(entities.ROBOT_BODY, body)
         self._writer.log_static(entities.ROBOT_HEADING, heading)
-
-    def _add_restored(self, restored: int) -> None:
-        if restored != self._restored:
-            self._restored = restored
-            self.add_line(entities.MISSION_LOG, f"{restored} cells were covered before a restart")
-
-    def _add_troubles(self, status: Status) -> None:
-        """Log troubles that began or ended, except a trouble that is the reason of the state."""
-        present = {each.code: each.text for each in status.troubles[: len(TROUBLES)]}
-        for code, text in present.items():
-            if code not in self._troubles and text != status.reason:
-                self.add_line(entities.MISSION_LOG, f"trouble: {text}", "WARN")
-        for code in sorted(self._troubles - present.keys()):
-            self.add_line(entities.MISSION_LOG, f"trouble is over: {code}")
-        self._troubles = set(present)
-
-    def _add_errors(self, errors: ErrorCounts) -> None:
-        # The count falls when the planner restarts.
-        if errors.total > self._errors:
-            last = errors.last or "no text"
-            self.add_line(entities.MISSION_LOG, f"error {errors.total}: {last}", "ERROR")
-        self._errors = errors.total

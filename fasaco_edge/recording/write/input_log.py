@@ -85,13 +85,10 @@ class InputLog:
             # The times of samples have to increase.
             self._in_force.note(self._encoder.add(replace(late, at_ns=at_ns, wall_ns=wall_ns)))
         part = self._writer.part_number
-        self._write(in_any_case=part > 1 and part != self._part)
+        self.write(in_any_case=part > 1 and part != self._part)
 
-    def write(self) -> None:
-        """Write the gathered samples."""
-        self._write(in_any_case=False)
-
-    def _write(self, *, in_any_case: bool) -> None:
+    def write(self, *, in_any_case: bool = False) -> None:
+        """Write the gathered samples; ``in_any_case``: a batch even without samples."""
         if self._part != self._writer.part_number:
             self._part = self._writer.part_number
             self._encoder.restart(self._in_force.samples())
@@ -168,15 +165,12 @@ class _InForce:
         elif topic != "map_update":
             self._newest[topic] = numbered
         elif "map" in self._newest:
-            self._note_update(numbered)
-
-    def _note_update(self, numbered: Numbered) -> None:
-        self._updates.append(numbered)
-        self._updates_bytes += len(numbered.arrival.sample.payload)
-        if self._updates_bytes > IN_FORCE_BYTES:
-            # Without its updates the map would be wrong.
-            del self._newest["map"]
-            self._updates, self._updates_bytes = [], 0
+            self._updates.append(numbered)
+            self._updates_bytes += len(numbered.arrival.sample.payload)
+            if self._updates_bytes > IN_FORCE_BYTES:
+                # Without its updates the map would be wrong.
+                del self._newest["map"]
+                self._updates, self._updates_bytes = [], 0
 
     def samples(self) -> list[Numbered]:
         newest = [numbered for topic, numbered in self._newest.items() if topic not in TRANSIENT]

@@ -22,7 +22,7 @@ import rerun_bindings as bindings
 
 from fasaco_edge.host.files import open_own
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.repair import repair_recording, scan_recording
+from fasaco_edge.recording.read.torn import repair_recording, scan_recording
 from fasaco_edge.recording.sdk import rr, rrb
 
 LOG = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ class Flush(enum.Enum):
     """Rerun's writer has closed the file after an error."""
 
 
-class Part:
+class RecordingPart:
     """A file being written.
 
     Rerun's logging calls never fail: only ``flush`` shows whether the data were written.
@@ -61,7 +61,8 @@ class Part:
         self.refused = ""
         self._flushed_bytes = 0
         # The lock keeps other recorders from repairing the part.
-        self._lock = _locked(path)
+        self._lock = open_own(path, os.O_RDONLY | os.O_NONBLOCK)
+        fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self.stream = rr.RecordingStream(
             entities.APPLICATION,
             recording_id=recording_id,
@@ -192,60 +193,6 @@ def _is_same_file(descriptor: int, file: os.stat_result) -> bool:
         return os.path.samestat(os.fstat(descriptor), file)
     except OSError:
         return False  # closed since it was listed
-
-
-def _locked(path: Path) -> int:
-    lock = open_own(path, os.O_RDONLY | os.O_NONBLOCK)
-    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    return lock
-
-
-class LatchedState:
-    """Initial data of each part: static data, newest latched data, name, blueprint, times.
-
-    Attributes:
-        wall_ns: the time of the next log call [ns].
-    """
-
-    def __init__(self, name: str, blueprint: rrb.Blueprint) -> None:
-        self.wall_ns = 0
-        self.blueprint = blueprint
-        self.name = name
-        self.static: dict[str, tuple[rr.AsComponents, ...]] = {}
-        self.sequences: dict[str, int] = {}
-        self._latched: dict[str, rr.AsComponents] = {}
-        self._missed_ns: dict[str, int] = {}
-
-    def latch(self, entity: str, archetype: rr.AsComponents, *, missed: bool) -> None:
-        """Set the data in force of an entity; ``missed``: whether they could not be written."""
-        self._latched[entity] = archetype
-        if missed:
-            self._missed_ns[entity] = self.wall_ns
-
-    def begin(self, stream: rr.RecordingStream) -> None:
-        """Write all data in force to a new part."""
-        send_blueprint(stream, self.blueprint)
-        stream.send_recording_name(self.name)
-        for entity, archetypes in self.static.items():
-            stream.log(entity, *archetypes, static=True)
-        self.send_latched(stream)
-
-    def send_latched(self, stream: rr.RecordingStream) -> None:
-        """Write latched data; those that could not be written before, at their time of arrival."""
-        for entity, archetype in self._latched.items():
-            self._set_times(stream, self._missed_ns.get(entity, self.wall_ns))
-            stream.log(entity, archetype)
-        self._missed_ns.clear()
-        self.set_times(stream)
-
-    def set_times(self, stream: rr.RecordingStream) -> None:
-        """Set the times of the next log calls in a stream."""
-        self._set_times(stream, self.wall_ns)
-
-    def _set_times(self, stream: rr.RecordingStream, wall_ns: int) -> None:
-        stream.set_time(entities.WALL_CLOCK, timestamp=np.datetime64(wall_ns, "ns"))
-        for timeline, number in self.sequences.items():
-            stream.set_time(timeline, sequence=number)
 
 
 def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:

@@ -20,7 +20,6 @@ import time
 from abc import ABC, abstractmethod
 from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.host.processes import release_unused, return_soon, stop_event
-from fasaco_edge.recording.read.repair import repair_folder
+from fasaco_edge.recording.read.torn import repair_folder
 from fasaco_edge.recording.sdk import rrb
 from fasaco_edge.recording.write.quota import DiskBudget, cannot_record, next_run
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -40,10 +39,16 @@ EXIT_STALLED = 1
 
 
 class RunClock:
-    """Monotonic UTC [ns]: the timeline continues if the system clock is set during a run."""
+    """Monotonic UTC [ns]: the timeline continues if the system clock is set during a run.
+
+    Attributes:
+        began_ns, began: beginning of the run: since the epoch [ns], and as a date, UTC.
+    """
 
     def __init__(self) -> None:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
+        self.began_ns = self.now_ns()
+        self.began = datetime.fromtimestamp(self.began_ns / 1e9, UTC)
 
     def now_ns(self) -> int:
         """Return the time since the epoch [ns]; later settings of the system clock are ignored."""
@@ -82,7 +87,7 @@ SUPERSEDED = {
 SUPERSEDED["map"] |= {"map_update"}
 
 
-class Inbox:
+class SampleQueue:
     """A queue of samples in order of arrival, of at most ``capacity_bytes``.
 
     While the writer is behind, a sample replaces older ones (``SUPERSEDED``). While the queue is
@@ -104,7 +109,10 @@ class Inbox:
             # The lock is held: samples of several threads get increasing times.
             arrival = self._stamp(topic, sample)
             if len(self._waiting) >= BEHIND_SAMPLES or 2 * (self._bytes + size) > self._capacity:
-                self._drop(SUPERSEDED.get(arrival.topic, frozenset()))
+                topics = SUPERSEDED.get(arrival.topic, frozenset())
+                self._lost.update(one.topic for one in self._waiting if one.topic in topics)
+                self._waiting = deque(one for one in self._waiting if one.topic not in topics)
+                self._bytes = sum(one.sample.size for one in self._waiting)
             if self._bytes + size > self._capacity:
                 self._lost[arrival.topic] += 1
                 return
@@ -127,12 +135,6 @@ class Inbox:
         """Number of lost samples of each topic."""
         with self._changed:
             return self._lost.copy()
-
-    def _drop(self, topics: frozenset[str]) -> None:
-        self._lost.update(arrival.topic for arrival in self._waiting if arrival.topic in topics)
-        kept = deque(arrival for arrival in self._waiting if arrival.topic not in topics)
-        self._bytes = sum(arrival.sample.size for arrival in kept)
-        self._waiting = kept
 
 
 class BusRecorder(ABC):
@@ -157,43 +159,15 @@ class BusRecorder(ABC):
         """Write waiting samples and the footer; False if the disk fails."""
 
 
-@dataclass(frozen=True, slots=True)
-class Output:
-    """Where and how a recorder writes.
-
-    Attributes:
-        folder: folder of the recordings; created if missing.
-        budget: limits of disk space.
-    """
-
-    folder: Path
-    budget: DiskBudget
-
-    def begin(self, name: str, blueprint: rrb.Blueprint) -> Recording:
-        """Begin a recording of a robot or fleet; ``name``: its name."""
-        clock = RunClock()
-        began_ns = clock.now_ns()
-        began = datetime.fromtimestamp(began_ns / 1e9, UTC)
-        run = next_run(self.folder, name, began)
-        writer = RecordingWriter(self.folder, run, self.budget, blueprint)
-        writer.at(began_ns)
-        return Recording(writer, clock, began_ns, f"{began:%Y-%m-%d %H:%M:%S}")
-
-
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """A recording that has begun.
-
-    Attributes:
-        writer: writer of its parts.
-        clock: clock of its timeline.
-        began_ns, began: its beginning: since the epoch [ns], and as text, UTC.
-    """
-
-    writer: RecordingWriter
-    clock: RunClock
-    began_ns: int
-    began: str
+def begin_recording(
+    budget: DiskBudget, name: str, blueprint: rrb.Blueprint
+) -> tuple[RecordingWriter, RunClock]:
+    """Begin a recording of the robot or fleet ``name``; return its writer and its clock."""
+    clock = RunClock()
+    run = next_run(budget.folder, name, clock.began)
+    writer = RecordingWriter(run, budget, blueprint)
+    writer.at(clock.began_ns)
+    return writer, clock
 
 
 def record(
@@ -213,11 +187,14 @@ def record(
         BadConfiguration: the folder cannot be made or written to.
     """
     return_soon()
-    repairs = _repaired(folder)
+    try:
+        repairs = repair_folder(folder)
+    except OSError as error:
+        raise cannot_record(folder, error) from error
     with stop_event() as stop, open_bus(bus_settings) as bus:
         recorder = recorder_on(bus)
-        for line in repairs:
-            recorder.note(line)
+        for repair in repairs:
+            recorder.note(str(repair))
         recorder.listen()
         release_unused()
         while not stop.is_set():
@@ -227,12 +204,3 @@ def record(
         # All recoverable data are saved.
         os._exit(code)
     return code
-
-
-def _repaired(folder: Path) -> list[str]:
-    """Repair the recordings in a folder; return a line of text for each repair."""
-    try:
-        repairs = repair_folder(folder)
-    except OSError as error:
-        raise cannot_record(folder, error) from error
-    return [str(repair) for repair in repairs]

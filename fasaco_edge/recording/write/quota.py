@@ -102,9 +102,10 @@ def _delete(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class DiskBudget:
-    """Limits of parts, of free space and of all recordings.
+    """A folder of recordings: limits of parts, of free space and of all recordings.
 
     Attributes:
+        folder: created if missing.
         part_bytes: size at which the next part begins.
         least_free_bytes: space that must stay free on the disk.
         part_s: age at which the next part begins [s]; 0 for never. Rerun's index of a part grows by
@@ -113,27 +114,36 @@ class DiskBudget:
         quota_bytes: limit of all its recordings; 0 for none.
     """
 
+    folder: Path
     part_bytes: int
     least_free_bytes: int
     part_s: float = 0.0
     robot: str = ""
     quota_bytes: int = 0
 
-    def is_full(self, folder: Path) -> bool:
-        """Return whether ``folder`` has less free space than required."""
-        return _free_bytes(folder) < self.least_free_bytes
+    @property
+    def _free_bytes(self) -> int:
+        try:
+            return shutil.disk_usage(self.folder).free
+        except OSError:
+            # The folder or its disk is gone: no free space until it is back.
+            return 0
 
-    def may_begin(self, folder: Path) -> bool:
+    def is_full(self) -> bool:
+        """Return whether there is less free space than required."""
+        return self._free_bytes < self.least_free_bytes
+
+    def may_begin(self) -> bool:
         """Return whether there is enough space to resume."""
-        return _free_bytes(folder) >= self.least_free_bytes + RESUME_BYTES
+        return self._free_bytes >= self.least_free_bytes + RESUME_BYTES
 
-    def keep_quota(self, folder: Path) -> None:
-        """Delete the oldest parts in ``folder`` that exceed the quota."""
+    def keep_quota(self) -> None:
+        """Delete the oldest parts that exceed the quota."""
         if not self.quota_bytes:
             return
         try:
             # Leave space for the part being written.
-            deleted = delete_oldest(folder, self.robot, self.quota_bytes - self.part_bytes)
+            deleted = delete_oldest(self.folder, self.robot, self.quota_bytes - self.part_bytes)
         except OSError as error:
             LOG.warning("recordings above their quota stay: %s", error)
             return
@@ -141,7 +151,7 @@ class DiskBudget:
             LOG.info("deleted for the quota: %s", ", ".join(path.name for path in deleted))
 
 
-def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
+def budget_of(config: DaemonConfig, folder: Path, name: str = "") -> DiskBudget:
     """Return the budget of a configuration for recordings of ``name``, by default its robot.
 
     Raises:
@@ -154,17 +164,10 @@ def budget_of(config: DaemonConfig, name: str = "") -> DiskBudget:
             f"got {limits.quota_mb} MB"
         )
     return DiskBudget(
+        folder,
         limits.part_mb * MEGABYTE,
         limits.least_free_mb * MEGABYTE,
         60.0 * limits.part_min,
         robot,
         limits.quota_mb * MEGABYTE,
     )
-
-
-def _free_bytes(folder: Path) -> int:
-    try:
-        return shutil.disk_usage(folder).free
-    except OSError:
-        # The folder or its disk is gone: no free space until it is back.
-        return 0

@@ -18,7 +18,6 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError, MalformedMessage
-from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import memory_limit, resident_mb
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.recording import entities
@@ -29,18 +28,18 @@ from fasaco_edge.recording.write.input_log import InputLog
 from fasaco_edge.recording.write.process import (
     QUEUE_BYTES,
     BusRecorder,
-    Inbox,
-    Output,
+    SampleQueue,
     afforded_bytes,
+    begin_recording,
     record,
 )
+from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.text import is_reported
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant, encode_json
-from fasaco_edge.wire.documents.path_documents import PathAttachment, TrailAttachment
+from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.rooms import Rooms
-from fasaco_edge.wire.documents.status import Recorder as RecorderReport
-from fasaco_edge.wire.documents.status import Status
+from fasaco_edge.wire.documents.status import Recorder, Status
 from fasaco_edge.wire.messages.maps import decode_map_update, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
@@ -54,39 +53,38 @@ SILENCE_NS = 3_500_000_000
 LAST_DRAWN_NS = 300_000_000
 
 
-def run_recorder(config: DaemonConfig, bus_settings: BusSettings, output: Output) -> int:
+def run_recorder(config: DaemonConfig, bus_settings: BusSettings, budget: DiskBudget) -> int:
     """Record a robot until SIGTERM or SIGINT; return the exit code. Errors as for ``record``.
 
     Importing this module raises MissingExtra if Rerun is not installed.
     """
-    return record(output.folder, bus_settings, lambda bus: Recorder(config, bus, output))
+    return record(budget.folder, bus_settings, lambda bus: RobotRecorder(config, bus, budget))
 
 
-class Recorder(BusRecorder):
+class RobotRecorder(BusRecorder):
     """Connects the bus to the writer: ``step`` takes samples, writes them, and reports."""
 
-    def __init__(self, config: DaemonConfig, bus: Bus, output: Output) -> None:
+    def __init__(self, config: DaemonConfig, bus: Bus, budget: DiskBudget) -> None:
         self._config = config
         self._bus = bus
-        recording = output.begin(config.robot.name, build_blueprint(None))
-        self.writer, self._clock = recording.writer, recording.clock
-        self._inputs = InputLog(self.writer, recording.began_ns)
-        description = RunDescription(config.robot.name, f"{recording.began} UTC")
-        self._scene = Scene(self.writer, description)
+        self.writer, self._clock = begin_recording(budget, config.robot.name, build_blueprint(None))
+        self._inputs = InputLog(self.writer, self._clock.began_ns)
+        began = f"{self._clock.began:%Y-%m-%d %H:%M:%S} UTC"
+        self._scene = Scene(self.writer, RunDescription(config.robot.name, began))
         capacity = afforded_bytes(memory_limit())
-        self._inbox = Inbox(capacity, self._clock.arrival)
+        self._queue = SampleQueue(capacity, self._clock.arrival)
         if capacity < QUEUE_BYTES:
             self.note(f"memory is limited: samples above {capacity / 1e6:.1f} MB are not recorded")
         scene = self._scene
-        grids = {"map": scene.add_map, "floor": scene.add_floor}
         self._drawers: dict[str, Callable[[Sample], None]] = {
-            **{topic: partial(_draw_grid, draw) for topic, draw in grids.items()},
+            "map": lambda s: scene.add_map(decode_occupancy_grid(s.payload)),
+            "floor": lambda s: scene.add_floor(decode_occupancy_grid(s.payload)),
             "map_update": lambda sample: scene.add_map_update(decode_map_update(sample.payload)),
             "pose": self._draw_pose,
             "tf_static": partial(self._draw_pose, is_static=True),
             "command": lambda s: scene.add_command(read_command(decode_json(s.payload))),
             "path": self._draw_path,
-            "pheromone": self._draw_pheromone,
+            "pheromone": lambda s: scene.add_pheromone(decode_pheromone(s.payload)),
             "rooms": lambda sample: scene.add_rooms(decode_tolerant(sample.payload, Rooms)),
             "status": lambda sample: scene.add_status(decode_tolerant(sample.payload, Status)),
         }
@@ -95,7 +93,7 @@ class Recorder(BusRecorder):
         self._messages = 0
         self._malformed = 0
         self._last_status_ns: int | None = None
-        self._report: RecorderReport | None = None
+        self._report: Recorder | None = None
         self._next_report_ns = 0
         self._reporter: Publisher = bus.advertise(config.keys(), topics.RECORDER)
 
@@ -113,14 +111,14 @@ class Recorder(BusRecorder):
 
     def step(self, timeout_s: float) -> None:
         """Write samples that arrive within ``timeout_s`` [s], check the writer, report."""
-        arrivals = deque(self._inbox.take(timeout_s))
+        arrivals = deque(self._queue.take(timeout_s))
         heard_ns = arrivals[-1].at_ns if arrivals else time.monotonic_ns()
         while arrivals:  # popleft frees the memory of written samples
             self._write(arrivals.popleft())
             self._sync()
             # Report during a long backlog, too.
             self._report_writing()
-        self._inputs.note_lost(self._inbox.lost)
+        self._inputs.note_lost(self._queue.lost)
         self.writer.at(self._clock.now_ns())
         self._sync()
         self._scene.catch_up()
@@ -129,11 +127,11 @@ class Recorder(BusRecorder):
 
     def end(self) -> bool:
         deadline_ns, undrawn = time.monotonic_ns() + LAST_DRAWN_NS, 0
-        for arrival in self._inbox.take(0.0):
+        for arrival in self._queue.take(0.0):
             is_late = time.monotonic_ns() >= deadline_ns
             self._write(arrival, is_drawn=not is_late)
             undrawn += is_late
-        self._inputs.note_lost(self._inbox.lost)
+        self._inputs.note_lost(self._queue.lost)
         self.writer.at(self._clock.now_ns())
         self._inputs.finish()
         if undrawn:
@@ -150,7 +148,7 @@ class Recorder(BusRecorder):
     ) -> None:
         def post(sample: Sample) -> None:
             # ROS sends no type with a sample: it comes from the configuration.
-            self._inbox.post(topic, sample.as_type(schema) if schema else sample)
+            self._queue.post(topic, sample.as_type(schema) if schema else sample)
 
         in_order = topic in topics.IN_ORDER
         self._bus.subscribe(key, post, latched, depth, in_order=in_order)
@@ -161,7 +159,6 @@ class Recorder(BusRecorder):
         self.writer.sync(now_ns)
 
     def _write(self, arrival: Arrival, *, is_drawn: bool = True) -> None:
-        """Write a sample as an input for a replay; draw it if ``is_drawn``."""
         self._messages += 1
         self.writer.message(arrival.wall_ns)
         if arrival.topic == "status" and _is_rival(arrival.sample.payload):
@@ -193,10 +190,6 @@ class Recorder(BusRecorder):
         about = decode_tolerant(sample.attachment, PathAttachment)
         self._scene.add_path(decode_path(sample.payload), about)
 
-    def _draw_pheromone(self, sample: Sample) -> None:
-        about = decode_tolerant(sample.attachment or b"{}", TrailAttachment)
-        self._scene.add_pheromone(decode_pheromone(sample.payload), about)
-
     def _watch_planner(self, heard_ns: int) -> None:
         """Report a planner that has been silent for too long at ``heard_ns`` [ns]."""
         last = self._last_status_ns
@@ -214,13 +207,13 @@ class Recorder(BusRecorder):
             return
         self._next_report_ns = now_ns + REPORT_PERIOD_NS
         path = self.writer.path
-        self._report = RecorderReport(
+        self._report = Recorder(
             state=state,
             reason=reason,
             file=str(path) if path else "",
             bytes=self.writer.size,
             messages=self._messages,
-            lost=self.writer.lost + self._inbox.lost.total(),
+            lost=self.writer.lost + self._queue.lost.total(),
             malformed=self._malformed,
             rss_mb=resident_mb(),
             cpu_s=round(time.process_time(), 3),
@@ -228,10 +221,6 @@ class Recorder(BusRecorder):
         )
         self._scene.add_report(self._report)
         self._reporter.put(encode_json(self._report))
-
-
-def _draw_grid(draw: Callable[[OccupancyGrid], None], sample: Sample) -> None:
-    draw(decode_occupancy_grid(sample.payload))
 
 
 def _is_rival(payload: bytes) -> bool:

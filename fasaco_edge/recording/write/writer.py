@@ -10,9 +10,11 @@ import enum
 import logging
 from pathlib import Path
 
+import numpy as np
+
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.sdk import rr, rrb
-from fasaco_edge.recording.write.part import Flush, LatchedState, Part, send_blueprint, sweep
+from fasaco_edge.recording.write.part import Flush, RecordingPart, send_blueprint, sweep
 from fasaco_edge.recording.write.quota import DiskBudget, cannot_record
 
 LOG = logging.getLogger(__name__)
@@ -44,24 +46,33 @@ class WriterState(enum.Enum):
 
 
 class RecordingWriter:
-    """Writes to the parts ``<recording_id>-part<n>.rrd`` in ``folder``; for one thread only.
+    """Writes to the parts ``<recording_id>-part<n>.rrd`` in a folder; for one thread only.
 
     Rerun keeps times per thread, and logs data of a thread without a time as static.
+
+    Attributes:
+        wall_ns: the time of the next log call [ns].
+        lost: number of messages that were not written.
+        state, reason: whether it writes, and why it does not.
 
     Raises:
         BadConfiguration: the folder cannot be made or written to.
     """
 
-    def __init__(
-        self, folder: Path, recording_id: str, budget: DiskBudget, blueprint: rrb.Blueprint
-    ) -> None:
-        self._folder = folder
+    def __init__(self, recording_id: str, budget: DiskBudget, blueprint: rrb.Blueprint) -> None:
+        self._folder = budget.folder
         self._recording_id = recording_id
         self._budget = budget
-        self._latched = LatchedState(recording_id, blueprint)
-        self._part: Part | None = None
+        self._name, self._blueprint = recording_id, blueprint
+        self._static: dict[str, tuple[rr.AsComponents, ...]] = {}
+        self._sequences: dict[str, int] = {}
+        # Newest latched data, and the time of those that could not be written [ns].
+        self._latched: dict[str, rr.AsComponents] = {}
+        self._missed_ns: dict[str, int] = {}
+        self.wall_ns = 0
+        self._part: RecordingPart | None = None
         self._parts = 0
-        self._abandoned: list[Part] = []
+        self._abandoned: list[RecordingPart] = []
         self._next_flush_ns = 0
         self._part_until_ns: int | None = None
         self._unflushed_messages = 0
@@ -72,11 +83,11 @@ class RecordingWriter:
         self.state = WriterState.RECORDING
         self.reason = ""
         try:
-            folder.mkdir(parents=True, exist_ok=True)
+            self._folder.mkdir(parents=True, exist_ok=True)
             self._begin_part()
         except OSError as error:
             if not self._abandoned:
-                raise cannot_record(folder, error) from error
+                raise cannot_record(self._folder, error) from error
             self._enter(WriterState.STALLED, f"no part: {error}")
 
     @property
@@ -88,11 +99,6 @@ class RecordingWriter:
     def hangs(self) -> bool:
         """Whether Rerun would hang when the interpreter exits."""
         return bool(self._abandoned) or self.state is WriterState.STALLED
-
-    @property
-    def wall_ns(self) -> int:
-        """The time of the next log call [ns]."""
-        return self._latched.wall_ns
 
     @property
     def part_number(self) -> int:
@@ -118,15 +124,15 @@ class RecordingWriter:
 
     def at(self, wall_ns: int) -> None:
         """Set the time [ns] of the next log calls."""
-        self._latched.wall_ns = wall_ns
+        self.wall_ns = wall_ns
         if (stream := self._stream) is not None:
-            self._latched.set_times(stream)
+            self._set_times(stream, wall_ns)
 
     def sequence(self, timeline: str, number: int) -> None:
         """Set the position on another timeline for the next log calls."""
-        self._latched.sequences[timeline] = number
+        self._sequences[timeline] = number
         if (stream := self._stream) is not None:
-            self._latched.set_times(stream)
+            self._set_times(stream, self.wall_ns)
 
     def log(
         self, entity: str, archetype: rr.AsComponents, *, latched: bool = False, size: int = 0
@@ -139,9 +145,11 @@ class RecordingWriter:
             size: its uncompressed size; 0 if small [bytes].
         """
         if latched:
-            self._latched.latch(entity, archetype, missed=self._stream is None)
+            self._latched[entity] = archetype
         if (stream := self._stream) is not None:
             stream.log(entity, archetype)
+        elif latched:
+            self._missed_ns[entity] = self.wall_ns
         self._unflushed_bytes += size
 
     def write_blob(self, blob: bytes, entity: str = entities.INPUTS) -> bool:
@@ -154,19 +162,19 @@ class RecordingWriter:
 
     def log_static(self, entity: str, *archetypes: rr.AsComponents) -> None:
         """Log static data of an entity, in place of earlier ones."""
-        self._latched.static[entity] = archetypes
+        self._static[entity] = archetypes
         if (stream := self._stream) is not None:
             stream.log(entity, *archetypes, static=True)
 
     def describe(self, name: str) -> None:
         """Name the recording."""
-        self._latched.name = name
+        self._name = name
         if (stream := self._stream) is not None:
             stream.send_recording_name(name)
 
     def show(self, blueprint: rrb.Blueprint) -> None:
         """Make ``blueprint`` the active one: a viewer takes the last one of a file."""
-        self._latched.blueprint = blueprint
+        self._blueprint = blueprint
         if (stream := self._stream) is not None:
             send_blueprint(stream, blueprint)
 
@@ -212,7 +220,7 @@ class RecordingWriter:
             return None
         return self._part.stream
 
-    def _is_flushed(self, part: Part) -> bool:
+    def _is_flushed(self, part: RecordingPart) -> bool:
         stalled = self.state is WriterState.STALLED
         outcome = part.flush(PROBE_TIMEOUT_S if stalled else FLUSH_TIMEOUT_S)
         if outcome is Flush.STALLED:
@@ -224,13 +232,13 @@ class RecordingWriter:
         self._unflushed_messages = self._unflushed_bytes = 0
         if stalled:
             self._enter(WriterState.RECORDING, "the disk writes again")
-            self._latched.send_latched(part.stream)
+            self._send_latched(part.stream)
         return True
 
-    def _check_space(self, part: Part, now_ns: int) -> None:
+    def _check_space(self, part: RecordingPart, now_ns: int) -> None:
         if self._part_until_ns is None:
             # Once per part is enough, as the quota leaves space for a whole part.
-            self._budget.keep_quota(self._folder)
+            self._budget.keep_quota()
             self._part_until_ns = now_ns + round(1e9 * self._budget.part_s)
         is_old = self._budget.part_s > 0 and now_ns >= self._part_until_ns
         is_deleted = part.is_deleted
@@ -242,7 +250,7 @@ class RecordingWriter:
                 self._part_messages,
                 extra={"event": "part_deleted"},
             )
-        if self._budget.is_full(self._folder):
+        if self._budget.is_full():
             part.close()
             self._part = None
             floor_mb = self._budget.least_free_bytes / 1e6
@@ -260,20 +268,20 @@ class RecordingWriter:
             if not self._abandoned:
                 sweep()
 
-    def _give_up(self, part: Part) -> None:
+    def _give_up(self, part: RecordingPart) -> None:
         part.abandon()
         self._abandoned.append(part)
         self._part = None
         self.lost += self._unflushed_messages
         self._unflushed_messages = self._unflushed_bytes = 0
         reason = f"{part.path.name} can no longer be written"
-        if self._budget.may_begin(self._folder):
+        if self._budget.may_begin():
             self._enter(WriterState.STALLED, reason)
         else:
             self._enter(WriterState.DISK_FULL, f"{reason}: no space left")
 
     def _try_again(self) -> None:
-        if not self._budget.may_begin(self._folder):
+        if not self._budget.may_begin():
             return
         try:
             self._begin_part()
@@ -285,14 +293,31 @@ class RecordingWriter:
     def _begin_part(self) -> None:
         number = self._parts + 1
         path = self._folder / f"{self._recording_id}-part{number}.rrd"
-        part = Part(path, self._recording_id)
+        part = RecordingPart(path, self._recording_id)
         self._parts = number
         if part.refused:
             part.abandon()
             self._abandoned.append(part)
             raise OSError(f"{path.name}: {part.refused}")
         self._part, self._part_until_ns, self._part_messages = part, None, 0
-        self._latched.begin(part.stream)
+        send_blueprint(part.stream, self._blueprint)
+        part.stream.send_recording_name(self._name)
+        for entity, archetypes in self._static.items():
+            part.stream.log(entity, *archetypes, static=True)
+        self._send_latched(part.stream)
+
+    def _send_latched(self, stream: rr.RecordingStream) -> None:
+        """Write latched data; those that could not be written before, at their time of arrival."""
+        for entity, archetype in self._latched.items():
+            self._set_times(stream, self._missed_ns.get(entity, self.wall_ns))
+            stream.log(entity, archetype)
+        self._missed_ns.clear()
+        self._set_times(stream, self.wall_ns)
+
+    def _set_times(self, stream: rr.RecordingStream, wall_ns: int) -> None:
+        stream.set_time(entities.WALL_CLOCK, timestamp=np.datetime64(wall_ns, "ns"))
+        for timeline, number in self._sequences.items():
+            stream.set_time(timeline, sequence=number)
 
     def _enter(self, state: WriterState, reason: str) -> None:
         if state is WriterState.RECORDING:

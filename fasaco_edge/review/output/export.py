@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.host.durable import whole
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.read.drawn import grids_in, lines_in, read_drawings
+from fasaco_edge.recording.read.timeline import grids_in, lines_in, read_drawings
 from fasaco_edge.review.review import Review
 from fasaco_edge.text import one_line
 
@@ -65,18 +65,11 @@ def export(review: Review, folder: Path) -> list[tuple[Path, str]]:
     described, written = [], []
     for table in _tables(review):
         file = folder / f"{table.name}.csv"
-        _write_csv(table, file)
+        _write_csv(file, [column.name for column in table.columns], table.rows)
         written.append((file, f"a row is {table.about}"))
         described += [(file.name, table.about, *column) for column in table.columns]
-    columns = (
-        Column("file", "", "name of the file"),
-        Column("row", "", "meaning of a row"),
-        Column("column", "", "name of the column"),
-        Column("unit", "", "unit of its values"),
-        Column("description", "", "meaning of its values"),
-    )
     columns_of, arrays = folder / "columns.csv", folder / "end.npz"
-    _write_csv(Table("columns", "", columns, described), columns_of)
+    _write_csv(columns_of, ("file", "row", "column", "unit", "description"), described)
     _write_arrays(review, arrays)
     return [
         (columns_of, "meaning and unit of each table's columns: begin here"),
@@ -85,11 +78,11 @@ def export(review: Review, folder: Path) -> list[tuple[Path, str]]:
     ]
 
 
-def _write_csv(table: Table, file: Path) -> None:
+def _write_csv(file: Path, names: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     with whole(file) as new, new.open("w", encoding="utf-8", newline="") as target:
         writer = csv.writer(target)
-        writer.writerow(column.name for column in table.columns)
-        writer.writerows([_cell(value) for value in row] for row in table.rows)
+        writer.writerow(names)
+        writer.writerows([_cell(value) for value in row] for row in rows)
 
 
 def _cell(value: object) -> object:

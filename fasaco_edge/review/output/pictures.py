@@ -11,17 +11,19 @@ from PIL import Image
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.drawing.pictures import (
-    draw_by_others,
+    BY_OTHERS,
+    UNSWEPT,
+    draw_floor,
     draw_mission,
     draw_order,
-    draw_unswept,
 )
-from fasaco_edge.drawing.plot import MapLayer, Plot, View, bounds_of
+from fasaco_edge.drawing.plot import MapLayer, Plot, PlotView, bounds_of
 from fasaco_edge.drawing.sheet import KeyEntry, Sheet
 from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.review.floor import outlined
-from fasaco_edge.review.instant import Scene
+from fasaco_edge.review.floor_and_rooms import outlined
+from fasaco_edge.review.instant import InstantPicture
+from fasaco_edge.review.moments import refused_by_code
 from fasaco_edge.review.orders import ordered_words
 from fasaco_edge.review.output.answers import instant_rows, spot_rows
 from fasaco_edge.review.review import Review
@@ -30,7 +32,7 @@ from fasaco_edge.review.spot import Spot
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.settings import known_settings
 
-TRAIL_SPACING_M = 0.02
+TRACK_SPACING_M = 0.02
 # Width of a driven track drawn together with lines of paths [m].
 DRIVE_M = 0.04
 DONE = {True: "complete", False: "not complete", None: "recorded in part"}
@@ -82,20 +84,20 @@ AROUND_S = 10.0
 HEADING_M = 0.3
 
 
-def draw_scene(review: Review, scene: Scene) -> Image.Image | None:
+def draw_instant(review: Review, shown: InstantPicture) -> Image.Image | None:
     """Return the map at one moment with paths, driven track and robot; None without a map."""
-    grid, lattice, instant, data = scene.grid, review.lattice, scene.instant, review.data
+    grid, lattice, instant, data = shown.grid, review.lattice, shown.instant, review.data
     if grid is None or lattice is None:
         return None
     near = np.flatnonzero(np.abs(data.times - instant.at_s) <= AROUND_S)
     drive, driven = _thinned(data, slice(near[0], near[-1] + 1) if len(near) else slice(0))
-    plot = Plot(View.over(bounds_of(grid, lattice, drive), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(grid, lattice, drive), lattice.cell_m))
     plot.ground(grid)
     key = draw_order(plot, data.zones, data.keep_out)
     for line, colour, width, label in (
-        (scene.before, palette.RULE, 4.0, "path before"),
-        (scene.line, palette.PURPLE, 3.0, "path in force"),
-        (scene.after, palette.SKY, 1.5, "path after"),
+        (shown.before, palette.RULE, 4.0, "path before"),
+        (shown.line, palette.PURPLE, 3.0, "path in force"),
+        (shown.after, palette.SKY, 1.5, "path after"),
     ):
         if line is not None and len(line.xy):
             plot.line(line.xy, colour, width)
@@ -124,13 +126,14 @@ def draw_spots(review: Review, spots: Sequence[Spot]) -> Image.Image | None:
     if data.grid is None or lattice is None or not spots:
         return None
     drive, driven = _thinned(data)
-    plot = Plot(View.over(bounds_of(data.grid, lattice, drive), lattice.cell_m))
+    plot = Plot(PlotView.over(bounds_of(data.grid, lattice, drive), lattice.cell_m))
     plot.ground(data.grid)
     key = []
     if review.floor is not None:
-        key += draw_unswept(plot, MapLayer(review.floor.geometry, review.floor.unswept))
-        if review.by_others is not None:
-            key += draw_by_others(plot, MapLayer(review.floor.geometry, review.by_others))
+        geometry, others = review.floor.geometry, review.by_others
+        key += draw_floor(plot, MapLayer(geometry, review.floor.unswept), *UNSWEPT)
+        if others is not None:
+            key += draw_floor(plot, MapLayer(geometry, others), *BY_OTHERS)
     key += draw_order(plot, data.zones, data.keep_out)
     if driven.any():
         plot.track(drive[:-1][driven], drive[1:][driven], DRIVE_M)
@@ -170,9 +173,10 @@ def _caption(review: Review) -> list[str]:
         lines.append(f"floor swept{ordered_words(review.orders)}: {swept}, by recorded poses")
     median, slowest = replans.milliseconds(50), replans.milliseconds(100)
     if median is not None and slowest is not None:
+        refused = sum(refused_by_code(review.data).values())
         lines.append(
             f"{len(replans.later):,} replans, {median:.1f} ms in the median, "
-            f"{slowest:.0f} ms at worst; {review.faults.total:,} messages refused"
+            f"{slowest:.0f} ms at worst; {refused:,} messages refused"
         )
     return lines
 
@@ -186,7 +190,7 @@ def _thinned(
     if len(track) > 2:
         ways = np.hypot(*np.diff(track, axis=0).T)
         way = np.concatenate(([0.0], np.cumsum(ways)))
-        kept = np.diff(np.floor(way / TRAIL_SPACING_M), prepend=-1.0) > 0
+        kept = np.diff(np.floor(way / TRACK_SPACING_M), prepend=-1.0) > 0
         kept[-1] = True
         # Keep the point before each gap, too.
         kept[:-1] |= np.diff(gaps) > 0

@@ -12,39 +12,32 @@ from fasaco_edge.judge.floor import swept_words
 from fasaco_edge.recording.read.robot_clock import clock
 from fasaco_edge.review.comparison import NOT_KNOWN, amount, count, figures, floor_words
 from fasaco_edge.review.document import ReviewDocument
-from fasaco_edge.review.floor import MILESTONES, room_at
+from fasaco_edge.review.floor_and_rooms import MILESTONES, room_at
 from fasaco_edge.review.orders import order_words, ordered_words
+from fasaco_edge.review.spot import spots_left
 from fasaco_edge.text import percent
 from fasaco_edge.wire.documents.path_documents import Rectangle
 from fasaco_edge.wire.reasons import plain
 
 if TYPE_CHECKING:
-    from fasaco_edge.review.moments import Span
     from fasaco_edge.review.review import Review
     from fasaco_edge.review.run_data import PathSample
-    from fasaco_edge.review.spot import Spot
 
-REASONS = ("reason", "replans")
-REPLANS = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
-"""Columns of ``reason_rows`` and ``replan_rows``."""
 # Keys of the settings shown; the run card and the JSON document have all.
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
-
-ORDERS = ("order", "from", "to", "result", "driven", "replans", "paused", "asked for")
-UNREACHED = ("order", "m2", "at", "why")
-LEFT = ("m2", "at", "why")
-"""Columns of ``order_rows``, ``unreached_rows`` and ``left_rows``."""
-ROOMS = ("room", "m2", "time", "entered", "swept", "passes", "left")
-"""Columns of ``room_rows``."""
 MOST_PLACES = 2
 # Least distance without poses that is shown [m].
 LEAST_LOST_M = 1.0
-CHARGES = ("at", "for", "battery")
+
+Rows = Sequence[tuple[str, ...]]
 
 
-def order_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
-    """Return a row of each order: its period, its result and its content."""
-    return [
+def tables(review: Review, document: ReviewDocument) -> Iterator[tuple[str, tuple[str, ...], Rows]]:
+    """Yield title, names of the columns, and rows of each table of a full review.
+
+    A table without names of columns is a list of names and values.
+    """
+    orders = [
         (
             str(number),
             clock(order.at_s),
@@ -57,27 +50,45 @@ def order_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
         )
         for number, order in enumerate(document.orders, 1)
     ]
-
-
-def unreached_rows(document: ReviewDocument) -> list[tuple[str, ...]]:
-    """Return the areas that each order left uncovered: size, place, and the daemon's reason."""
-    return [
+    columns: tuple[str, ...] = (
+        "order",
+        "from",
+        "to",
+        "result",
+        "driven",
+        "replans",
+        "paused",
+        "asked for",
+    )
+    yield "Orders", columns, orders
+    columns = ("room", "m2", "time", "entered", "swept", "passes", "left")
+    yield "Rooms", columns, _room_rows(document, review)
+    yield "Commands", (), [(clock(each.at_s), each.command) for each in document.commands]
+    unreached = [
         (str(number), f"{area.m2:.2f}", f"({area.x:.2f}, {area.y:.2f})", area.reason)
         for number, order in enumerate(document.orders, 1)
         for area in order.unreached
     ]
-
-
-def left_rows(document: ReviewDocument, spots: Sequence[Spot]) -> list[tuple[str, ...]]:
-    """Return size, place and reason of unswept patches; ``spots``: a spot in each patch."""
-    return [
+    yield "Not reached", ("order", "m2", "at", "why"), unreached
+    left = [
         (f"{patch.m2:.2f}", f"({patch.x:.2f}, {patch.y:.2f})", f"{spot.why}: {spot.words}")
-        for patch, spot in zip(document.left, spots, strict=True)
+        for patch, spot in zip(document.left, spots_left(review), strict=True)
     ]
+    yield "Floor left", ("m2", "at", "why"), left
+    reasons = [(plain(kind), str(count)) for kind, count in document.replans_by_reason.items()]
+    yield "Reasons of replans", ("reason", "replans"), reasons
+    columns = ("at", "took", "steps planned", "gap", "to drive", "changed on the map", "why")
+    yield "Replans", columns, [_replan_row(path) for path in review.replans.later]
+    troubles = [
+        (s.name, clock(s.begin_s), f"{s.seconds:.1f} s", plain(s.reason)) for s in review.troubles
+    ]
+    yield "Troubles", ("state", "at", "for", "reason"), troubles
+    yield "Charges", ("at", "for", "battery"), charge_rows(document)
+    refused = [(code, str(count)) for code, count in document.faults_by_code.items()]
+    yield "Refused messages", ("code", "messages"), refused
 
 
-def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]:
-    """Return a row of each room: working time, swept share, and largest patches left."""
+def _room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]:
     at = {patch: room_at(review.data, (patch.x, patch.y)) for patch in document.left}
     found: list[tuple[str, ...]] = []
     for room in document.rooms:
@@ -99,11 +110,6 @@ def room_rows(document: ReviewDocument, review: Review) -> list[tuple[str, ...]]
             )
         )
     return found
-
-
-def command_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return the time and text of each command."""
-    return [(clock(each.at_s), each.command) for each in document.commands]
 
 
 def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str]]:
@@ -129,7 +135,7 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         f"{clock(t.at_s)} for {t.seconds:.1f} s: {plain(t.reason) or t.state}"
         for t in document.troubles
     ]
-    commands = [" ".join(row) for row in command_rows(document)]
+    commands = [f"{clock(each.at_s)} {each.command}" for each in document.commands]
     charges = [f"{at} for {seconds}, {levels}" for at, seconds, levels in charge_rows(document)]
     has_count = document.covered_cells is not None
     whose = "its tool, or another robot's," if in_fleet(document) else "the tool"
@@ -158,7 +164,6 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
 
 
 def _shares(document: ReviewDocument) -> str:
-    """Return the swept share of each room, in ascending order."""
     known = sorted((room.share, room.title) for room in document.rooms if room.share is not None)
     return ", ".join(f"{title} {percent(share)}" for share, title in known)
 
@@ -212,7 +217,6 @@ def _swept(review: Review, document: ReviewDocument) -> str:
 
 
 def _by_others(document: ReviewDocument) -> str:
-    """Return how much floor other robots of a fleet swept; "" for a robot alone."""
     if not in_fleet(document):
         return ""
     if document.swept_by_others_m2 is None:
@@ -248,21 +252,6 @@ def clock_rows(document: ReviewDocument) -> list[tuple[str, str]]:
     return [("clock", f"the robot's, {words}")] if words else []
 
 
-def figure_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return name and text of all figures."""
-    return [(figure.name, figure.text) for figure in figures(document)]
-
-
-def reason_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return each kind of reason for a replan, and the number of such replans."""
-    return [(plain(kind), str(count)) for kind, count in document.replans_by_reason.items()]
-
-
-def replan_rows(review: Review) -> list[tuple[str, ...]]:
-    """Return the replans: time, duration, plan, change of the map, reason."""
-    return [_replan_row(path) for path in review.replans.later]
-
-
 def _replan_row(path: PathSample) -> tuple[str, ...]:
     about = path.about
     return (
@@ -274,11 +263,6 @@ def _replan_row(path: PathSample) -> tuple[str, ...]:
         _place(about.changed),
         plain(about.reason),
     )
-
-
-def trouble_rows(troubles: list[Span]) -> list[tuple[str, ...]]:
-    """Return each trouble: the state, when, for how long, and why."""
-    return [(s.name, clock(s.begin_s), f"{s.seconds:.1f} s", plain(s.reason)) for s in troubles]
 
 
 def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
@@ -294,11 +278,6 @@ def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
         )
         for charge in document.charges
     ]
-
-
-def fault_rows(document: ReviewDocument) -> list[tuple[str, str]]:
-    """Return the number of refused messages for each code."""
-    return [(code, str(count)) for code, count in document.faults_by_code.items()]
 
 
 def unknown_lines(document: ReviewDocument) -> Iterator[str]:

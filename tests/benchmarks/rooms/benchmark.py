@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
-from fasaco_edge.drawing.floor import number_rooms, paint_rooms
-from fasaco_edge.drawing.plot import Plot, View
+from fasaco_edge.drawing.plot import Plot, PlotView
+from fasaco_edge.drawing.tints import number_rooms, paint_rooms
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
 from tests.benchmarks.harness import add_floors
 from tests.benchmarks.rooms.homes import KINDS, RESOLUTION_M, home, seen
@@ -63,7 +63,7 @@ def measure(kinds: Sequence[str], seeds: Sequence[int], pictures: Path | None) -
                 found[row : row + rows, col : col + cols] = rooms.labels
                 truth = np.where(grid.cells == 0, floor.rooms, 0)
                 if pictures:
-                    plot = Plot(View.over(grid.geometry.bounds(), MARGIN_M))
+                    plot = Plot(PlotView.over(grid.geometry.bounds(), MARGIN_M))
                     plot.ground(grid)
                     paint_rooms(plot, rooms)
                     number_rooms(plot, rooms)

@@ -24,7 +24,6 @@ from fasaco_edge.fleet.recording.recorder import FleetRecorder
 from fasaco_edge.fleet.review.report import FleetFigures, FleetRobotFigures, review_fleet
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import is_fleet_recording
-from fasaco_edge.recording.write.process import Output
 from fasaco_edge.recording.write.quota import DiskBudget
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.fleet import FleetPart
@@ -36,7 +35,6 @@ from tests.support.processes import fasaco_edge
 from tests.support.recordings import bus_on_free_port, read_column, read_summary
 from tests.support.rooms import room
 
-BUDGET = DiskBudget(10**9, 0)
 TEXT = "TextLog:text"
 
 
@@ -80,7 +78,9 @@ def studio(tmp_path):
         open_bus(BusSettings(connect=(endpoint,))) as heard,
         open_bus(BusSettings(connect=(endpoint,))) as told,
     ):
-        recorder = FleetRecorder(DaemonConfig(), heard, "house", Output(tmp_path / "out", BUDGET))
+        recorder = FleetRecorder(
+            DaemonConfig(), heard, "house", DiskBudget(tmp_path / "out", 10**9, 0)
+        )
         recorder.listen()
         time.sleep(0.3)
         yield Studio(told, recorder, tmp_path / "out")

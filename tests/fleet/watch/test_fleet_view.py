@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.client.events import KEPT
+from fasaco_edge.client.phrases import KEPT
 from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS
 from fasaco_edge.fleet.observer.survey import MOST_STEPS
 from fasaco_edge.fleet.watch import view as fleet_view

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -10,6 +11,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec import UNSET
 
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.scene.runcard import flat_settings
@@ -17,8 +19,9 @@ from fasaco_edge.review.document import (
     Charge,
     MapSize,
     ReviewDocument,
-    Trouble,
+    TroublePeriod,
 )
+from fasaco_edge.review.moments import RECORDER_IN_ORDER, refused_by_code
 from fasaco_edge.review.orders import commands_of
 from fasaco_edge.review.spot import left_patches
 from fasaco_edge.wire.documents.settings import known_settings
@@ -31,7 +34,12 @@ if TYPE_CHECKING:
 
 def document_of(review: Review) -> ReviewDocument:
     """Return all figures of a review."""
-    record, data, replans, faults = review.record, review.data, review.replans, review.faults
+    record, data, replans = review.record, review.data, review.replans
+    refused, recorders = refused_by_code(data), [each.status.recorder for each in data.statuses]
+    lost = [recorder.lost for recorder in recorders if recorder and recorder.lost is not UNSET]
+    states: dict[str, float] = defaultdict(float)
+    for span in review.states:
+        states[span.name] += span.seconds
     began = datetime.fromtimestamp(1e-9 * record.began_ns, UTC)
     document = ReviewDocument(
         recording=record.recording_id,
@@ -60,19 +68,24 @@ def document_of(review: Review) -> ReviewDocument:
         replan_ms_max=_rounded(replans.milliseconds(100)),
         replan_list=[_replan(path) for path in replans.later],
         restored_cells=data.restored_cells,
-        states={name: round(s, 3) for name, s in review.seconds_by_state.items()},
+        states={name: round(seconds, 3) for name, seconds in states.items()},
         troubles=[
-            Trouble(s.name, s.reason, round(s.begin_s, 3), round(s.seconds, 3))
+            TroublePeriod(s.name, s.reason, round(s.begin_s, 3), round(s.seconds, 3))
             for s in review.troubles
         ],
         charges=charges_of(review),
         longest_stand=review.longest_stand,
-        faults=faults.total,
-        faults_by_code=faults.by_code,
-        recorder_lost=faults.lost,
+        faults=sum(refused.values()),
+        faults_by_code=refused,
+        recorder_lost=max(lost, default=None),
         samples_missing=review.missing,
         unreadable=dict(data.undecodable),
-        remarks=list(faults.complaints),
+        remarks=[
+            line
+            for log in (entities.BUS_LOG, entities.RECORDER_LOG)
+            for _, line in record.texts.get(log, ())
+            if not line.startswith(tuple(f"{state}: " for state in RECORDER_IN_ORDER))
+        ],
         not_recorded=_not_recorded(review),
     )
     _add_coverage(document, review)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from msgspec.structs import asdict
 
 from fasaco_edge.recording import entities
-from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, RECOVERED_COLOUR, Colour
+from fasaco_edge.recording.scene.archetypes import COVERED_COLOUR, REVISITED_COLOUR, Colour
 from fasaco_edge.recording.scene.runcard import cells_of
 from fasaco_edge.recording.sdk import rr
 from fasaco_edge.recording.write.writer import RecordingWriter
@@ -28,7 +28,7 @@ BATTERY_NOISE = 0.02
 # Entity, name in the legend, colour of each curve in a plot.
 CURVES: tuple[tuple[str, str, Colour], ...] = (
     (entities.COVERED_FRACTION, "covered", COVERED_COLOUR),
-    (entities.RECOVERED_FRACTION, "again", RECOVERED_COLOUR),
+    (entities.REVISITED_FRACTION, "again", REVISITED_COLOUR),
     (f"{entities.LATENCY}/ingest", "map in", (56, 152, 222)),
     (f"{entities.LATENCY}/plan", "plan", (167, 139, 250)),
     (f"{entities.LATENCY}/map_to_path", "map to path", (245, 140, 40)),
@@ -42,6 +42,15 @@ CURVES: tuple[tuple[str, str, Colour], ...] = (
     (entities.BATTERY, "battery %", (52, 211, 153)),
 )
 
+# Least time between drawings of the covered share, which changes about once a second.
+SHARE_SPACING_NS = 2_000_000_000
+# Least time between drawings of counts that grow all the time.
+COUNT_SPACING_NS = 30_000_000_000
+# Shortest period over which processor time is averaged [s].
+LEAST_SHARE_S = 30.0
+
+SAVED = (entities.SAVED_BY_ANTS, entities.SAVED_BY_LOCAL_SEARCH)
+
 
 @dataclass(slots=True)
 class _Curve:
@@ -51,11 +60,15 @@ class _Curve:
 
 
 class Curves:
-    """Draws figures into a writer."""
+    """Draws figures into a writer, among them those of statuses and paths."""
 
     def __init__(self, writer: RecordingWriter) -> None:
         self._writer = writer
         self._curves: dict[str, _Curve] = {}
+        # Uptime and processor time [s] at the beginning of the current period.
+        self._since: tuple[float, float] | None = None
+        # Time saved by ants and by local search, over all plans [s].
+        self._saved = [0.0, 0.0]
         for entity, name, colour in CURVES:
             line = rr.SeriesLines(
                 names=name, colors=colour, widths=1.5, interpolation_mode="StepAfter"
@@ -92,61 +105,37 @@ class Curves:
         curve.drawn, curve.drawn_ns = curve.last, self._writer.wall_ns
         self._writer.log(entity, rr.Scalars(curve.last))
 
-
-# Least time between drawings of the covered share, which changes about once a second.
-SHARE_SPACING_NS = 2_000_000_000
-# Least time between drawings of counts that grow all the time.
-COUNT_SPACING_NS = 30_000_000_000
-# Shortest period over which processor time is averaged [s].
-LEAST_SHARE_S = 30.0
-
-SAVED = (entities.SAVED_BY_ANTS, entities.SAVED_BY_LOCAL_SEARCH)
-
-
-class StatusFigures:
-    """Draws the numbers of each status."""
-
-    def __init__(self, curves: Curves) -> None:
-        self._curves = curves
-        # Uptime and processor time [s] at the beginning of the current period.
-        self._since: tuple[float, float] | None = None
-        # Time saved by ants and by local search, over all plans [s].
-        self._saved = [0.0, 0.0]
-
-    def add(self, status: Status) -> None:
+    def add_status(self, status: Status) -> None:
         """Draw the numbers of a status."""
         for name, milliseconds in asdict(status.latency_ms).items():
             if milliseconds is not None:
-                self._curves.draw(f"{entities.LATENCY}/{name}", milliseconds, NOISE)
-        self._add_process(status)
+                self.draw(f"{entities.LATENCY}/{name}", milliseconds, NOISE)
+        # 0 means unknown.
+        if status.rss_mb:
+            self.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
+        if status.uptime_s:
+            self._add_processor(status.uptime_s, status.cpu_s)
         if status.battery is not None and status.battery.level is not None:
-            self._curves.draw(entities.BATTERY, 100 * status.battery.level, BATTERY_NOISE)
+            self.draw(entities.BATTERY, 100 * status.battery.level, BATTERY_NOISE)
         cells, counts = cells_of(status), status.coverage
         if cells is not None and cells[1]:
             share = cells[0] / cells[1]
-            self._curves.draw(entities.COVERED_FRACTION, share, spacing_ns=SHARE_SPACING_NS)
+            self.draw(entities.COVERED_FRACTION, share, spacing_ns=SHARE_SPACING_NS)
         if counts is not None and counts.coverable:
             again = counts.recovered / counts.coverable
-            self._curves.draw(entities.RECOVERED_FRACTION, again, spacing_ns=SHARE_SPACING_NS)
+            self.draw(entities.REVISITED_FRACTION, again, spacing_ns=SHARE_SPACING_NS)
         if status.path is not None and status.path.line_gap is not None:
-            self._curves.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
+            self.draw(entities.LINE_GAP, status.path.line_gap, NOISE)
 
     def add_path(self, about: PathAttachment) -> None:
         """Draw the quality of a planned path."""
         if about.gap is not None:
-            self._curves.draw(entities.GAP, about.gap)
+            self.draw(entities.GAP, about.gap)
         if about.saved_by_ants_s is not None and about.saved_by_local_search_s is not None:
             self._saved[0] += about.saved_by_ants_s
             self._saved[1] += about.saved_by_local_search_s
             for entity, seconds in zip(SAVED, self._saved, strict=True):
-                self._curves.draw(entity, seconds)
-
-    def _add_process(self, status: Status) -> None:
-        """Draw memory and processor time of the daemon; 0 means unknown."""
-        if status.rss_mb:
-            self._curves.draw(f"{entities.MEMORY}/planner", status.rss_mb, NOISE)
-        if status.uptime_s:
-            self._add_processor(status.uptime_s, status.cpu_s)
+                self.draw(entity, seconds)
 
     def _add_processor(self, uptime_s: float, cpu_s: float) -> None:
         since = self._since
@@ -155,4 +144,4 @@ class StatusFigures:
         elif uptime_s - since[0] >= LEAST_SHARE_S:
             percent = 100 * (cpu_s - since[1]) / (uptime_s - since[0])
             self._since = uptime_s, cpu_s
-            self._curves.draw(entities.PROCESSOR, percent, NOISE)
+            self.draw(entities.PROCESSOR, percent, NOISE)

@@ -38,7 +38,7 @@ def draw_visits(
     reachable = _reachable(lattice, start)
     left_out, unreachable = never & reachable, never & ~reachable
 
-    tints = np.array([palette.PAPER, palette.COVERED, *palette.RECOVERED], np.uint8)
+    tints = np.array([palette.PAPER, palette.COVERED, *palette.REVISITED], np.uint8)
     colours = tints[np.minimum(visits, len(tints) - 1)]
     colours[left_out] = palette.LEFT_OUT
     plot.tint(lattice, colours)
@@ -64,8 +64,8 @@ def _visit_key(visits: NDArray[np.integer]) -> list[KeyEntry]:
         *ENDS,
         _entry("tile", palette.COVERED, "covered once", visits == 1),
     ]
-    most = len(palette.RECOVERED) + 1
-    for times, colour in enumerate(palette.RECOVERED, start=2):
+    most = len(palette.REVISITED) + 1
+    for times, colour in enumerate(palette.REVISITED, start=2):
         cells = visits >= times if times == most else visits == times
         if cells.any():
             label = f"{times} times or more" if times == most else f"{times} times"

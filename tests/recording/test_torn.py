@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import io
 import struct
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.recording.read.repair import (
+from fasaco_edge.recording.read.torn import (
     HEADER_BYTES,
     MOST_ZEROS,
     Scan,
@@ -27,6 +26,8 @@ def frame(kind: int, body: bytes) -> bytes:
     return struct.pack("<QQ", kind, len(body)) + body
 
 
+# A frame of unknown kind ends the scan.
+NOISE = frame(7, b"noise")
 FRAMES = [frame(1, b"store"), frame(2, b"x" * 40), frame(2, b"y"), frame(3, b"blueprint")]
 WHOLE = HEADER + b"".join(FRAMES)
 ENDS = [HEADER_BYTES + sum(map(len, FRAMES[:count])) for count in range(len(FRAMES) + 1)]
@@ -67,21 +68,16 @@ def test_a_footer_that_is_followed_by_zeros_is_cut(tmp_path, kept):
     assert path.read_bytes() == WHOLE
 
 
-@pytest.mark.parametrize("content", [b"", b"RR", b"RRF2", b"RRF2" + bytes(40), bytes(40)])
-def test_a_part_cut_before_the_end_of_its_header_has_no_frames(tmp_path, content):
+@pytest.mark.parametrize(
+    ("content", "is_recording"),
+    [(b"", True), (b"RR", True), (b"RRF2", True), (b"RRF2" + bytes(40), True), (bytes(40), True),
+     (b"RX", False), (b"hello", False), (b"hello, this is a text of some length", False)],
+)  # fmt: skip
+def test_what_has_no_whole_header_has_no_frames_and_is_left_alone(tmp_path, content, is_recording):
     path = written(tmp_path, content)
     with path.open("rb") as recording:
         scan = scan_recording(recording)
-    assert scan == Scan(0, 0, len(content), has_footer=False)
-    assert repair_recording(path) is None
-    assert path.read_bytes() == content
-
-
-@pytest.mark.parametrize("content", [b"RX", b"hello", b"hello, this is a text of some length"])
-def test_a_file_that_is_no_recording_is_left_alone(tmp_path, content):
-    path = written(tmp_path, content)
-    with path.open("rb") as recording:
-        assert scan_recording(recording) is None
+    assert scan == (Scan(0, 0, len(content), has_footer=False) if is_recording else None)
     assert repair_recording(path) is None
     assert path.read_bytes() == content
 
@@ -99,11 +95,11 @@ def test_an_ended_recording_keeps_what_follows_its_footer(tmp_path):
 
 
 def test_a_recording_being_written_is_left_alone(tmp_path):
-    path = written(tmp_path, WHOLE + b"half a fra")
+    path = written(tmp_path, WHOLE + NOISE)
     with path.open("rb") as writer:
         fcntl.flock(writer, fcntl.LOCK_EX)
         assert repair_folder(tmp_path) == []
-    assert [repair.cut_bytes for repair in repair_folder(tmp_path)] == [10]
+    assert [repair.cut_bytes for repair in repair_folder(tmp_path)] == [len(NOISE)]
 
 
 def test_a_folder_is_repaired_in_order_and_may_be_missing(tmp_path):
@@ -111,12 +107,3 @@ def test_a_folder_is_repaired_in_order_and_may_be_missing(tmp_path):
         written(tmp_path, WHOLE + b"torn", name)
     assert [repair.path.name for repair in repair_folder(tmp_path)] == ["a.rrd", "b.rrd"]
     assert repair_folder(tmp_path / "missing") == []
-
-
-def test_a_frame_of_unknown_kind_ends_the_scan(tmp_path):
-    path = written(tmp_path, WHOLE + frame(7, b"noise"))
-    with path.open("rb") as recording:
-        scan = scan_recording(recording)
-    assert scan is not None
-    assert scan.whole_bytes == len(WHOLE)
-    assert isinstance(recording, io.BufferedReader)
