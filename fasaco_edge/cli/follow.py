@@ -67,11 +67,6 @@ piece, as goals of /follow_path (nav2_msgs/FollowPath). They are cancelled for t
 their results are reported here. If this program or its computer dies, Nav2 drives to the end of the
 present goal, at most 20 m.
 
-With `ros2.dock: nav2` Nav2's docking server drives the robot from a pose in front of the dock into
-it, and out again before the next path, by goals of /dock_robot and /undock_robot
-(nav2_msgs/DockRobot, UndockRobot). Until it has finished, this program does not drive; after an
-error it tries again, in 10 s to 5 min.
-
 examples:
   fasaco-edge follow --config /etc/fasaco-edge/config.yaml --dry-run
   fasaco-edge follow --config /etc/fasaco-edge/config.yaml --stamped
@@ -189,7 +184,6 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         cmd_key=ros.output_key(ros.velocities(schema)) if ros else here.keys.of(topics.CMD_VEL),
         ros=_ros_node(ros, schema) if ros else {},
         nav2=_nav2(config) if ros and ros.follow == "nav2" else {},
-        dock=_dock(config) if ros and ros.dock == "nav2" else {},
         scan=_scan(config) if config.scan and not (ros and ros.follow == "nav2") else {},
         radius_m=robot.radius_m,
         pace=args.speed,
@@ -262,21 +256,6 @@ def _nav2(config: DaemonConfig) -> dict[str, object]:
     names = (nav2.controller, nav2.goal_checker, nav2.progress_checker, nav2.path_handler)
     near_m = nav2.near_m if nav2.near_m is not None else NEAR_SHARE * config.robot.tool_width_m
     return {"action": ros.action, "release": nav2.release, "plugins": names, "near_m": near_m}
-
-
-def _dock(config: DaemonConfig) -> dict[str, object]:
-    assert config.ros2
-    assert config.mission.dock is not None  # checked when the configuration was read
-    ros, nav2, dock = config.ros2, config.ros2.nav2, config.mission.dock
-    return {
-        "dock_action": ros.dock_action,
-        "undock_action": ros.undock_action,
-        "id": nav2.dock_id,
-        "type": nav2.dock_type,
-        "frame": ros.frames.map,
-        "pose": (dock.x_m, dock.y_m, math.radians(dock.yaw_deg)),
-        "approach_m": dock.approach_m,
-    }
 
 
 COMMAND = Command(

@@ -49,7 +49,6 @@ class News:
     Attributes:
         planner: its id; "" without a daemon.
         status_at: arrival of its newest status [s]; None without a new status.
-        state: its state, by the newest status; "" before the first status.
         path: its newest path; None without a new path.
         revision: revision of its newest path; 0 if unknown.
         speed_m_s: speed limit on its newest path [m/s]; infinity without a limit.
@@ -57,7 +56,6 @@ class News:
 
     planner: str = ""
     status_at: float | None = None
-    state: str = ""
     path: Sample | None = None
     revision: int = 0
     speed_m_s: float = math.inf
@@ -89,15 +87,12 @@ class Daemons:
 
     def take_status(self, payload: bytes, now: float) -> None:
         """Take in a status; it is ignored if it is malformed, or its daemon does not plan."""
-        document = _object(payload)
-        claim = document.get("claim")
+        claim = _object(payload).get("claim")
         own = claim.get("id") if isinstance(claim, dict) and claim.get("stand") == PLANS else None
         if not _is_id(own):
             return
-        state = document.get("state")
         with self._lock:
-            daemon = self._daemon(own)
-            daemon.status_at, daemon.state = now, state if isinstance(state, str) else ""
+            self._daemon(own).status_at = now
 
     def take_path(self, sample: Sample) -> None:
         """Take in a path; one that does not name its daemon is ignored."""

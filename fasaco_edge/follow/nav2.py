@@ -15,7 +15,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, goal_error
 from fasaco_edge.follow.pieces import (
     COAST_M,
     LEAST_M,
@@ -69,18 +68,37 @@ NO_CODE = "without a code; does another program send goals, too?"
 
 
 @dataclass(frozen=True, slots=True)
-class SendPiece(SendGoal):
-    """A request to follow points [m] in a frame.
+class SendPiece:
+    """A request to begin a goal: to follow points [m] in a frame.
 
     Attributes:
+        id: of the goal.
         end_yaw: heading at the last point [rad]; None to keep the heading of arrival.
         is_back: whether it is driven backward: headings are opposite to the motion.
     """
 
+    id: bytes
     points: list[Point]
     frame: str
     end_yaw: float | None = None
     is_back: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AskResult:
+    """A query for the result of a goal; the reply arrives when the goal has ended."""
+
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoal:
+    """A request to cancel a goal; it is repeated until the server confirms it."""
+
+    id: bytes
+
+
+Request = SendPiece | AskResult | CancelGoal
 
 
 class Nav2Follower(Supervision):
@@ -186,7 +204,10 @@ class Nav2Follower(Supervision):
             else:
                 path.finish(goal)
         elif ending.status == ABORTED:
-            self._fail(State.GIVEN_UP, goal_error(ending, ERRORS, NO_CODE), now)
+            code = ending.code
+            error = f"{code} {ERRORS.get(code, 'no code')}" if code else NO_CODE
+            why = f"{error}: {ending.message}" if ending.message else error
+            self._fail(State.GIVEN_UP, why, now)
         elif ending.status == CANCELED:
             self._is_canceled = True
             self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)

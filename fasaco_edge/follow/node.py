@@ -8,7 +8,6 @@ import threading
 import time
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.publisher import Publisher, RosPublisher
 from fasaco_edge.bus.session import Bus, join
@@ -27,9 +26,6 @@ from fasaco_edge.wire.messages.base import Velocity, encode_velocity
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE
 
-if TYPE_CHECKING:
-    from fasaco_edge.follow.docking import DockingNode
-
 log = logging.getLogger(__name__)
 
 REPORT_EVERY_S = 1.0
@@ -38,7 +34,7 @@ LEAST_S = 1e-6
 
 
 class Node:
-    """A follower on the bus: its inputs, the claim on the base, docking by Nav2, and reports."""
+    """A follower on the bus: its inputs, the claim on the base, and reports."""
 
     def __init__(self, bus: Bus, settings: FollowSettings, follower: Supervision) -> None:
         self._settings, self._follower = settings, follower
@@ -47,7 +43,6 @@ class Node:
         self._claim = None if settings.dry_run else BaseClaim(bus, settings)
         self._blocked = None if settings.dry_run else bus.advertise(keys, topics.BLOCKED)
         follower.standby = (State.LOOKS, "") if self._claim else None
-        self._docking = docking_of(bus, settings)
         self._standstill = Standstill()
         self._logged: State | None = None
         self._due = -math.inf
@@ -60,11 +55,6 @@ class Node:
         if not self._is_due(now):
             return
         follower.standby = self._claim.standby(time.monotonic()) if self._claim else None
-        if self._docking is not None:
-            if follower.standby:
-                self._docking.end()
-            else:
-                self._docking.turn(inputs.news.state, follower)
         self._step(now)
         news = inputs.news
         report = self._standstill.report(follower, news.planner, news.revision, now)
@@ -72,10 +62,9 @@ class Node:
             self._blocked.put(report)
         self._log()
 
+    @abstractmethod
     def end(self) -> None:
         """Make the robot stand."""
-        if self._docking is not None:
-            self._docking.end()
 
     @abstractmethod
     def _step(self, now: float) -> None:
@@ -119,8 +108,6 @@ class FollowerNode(Node):
         self._report, self._reported_at = report, -math.inf
 
     def end(self) -> None:
-        """Make the robot stand."""
-        super().end()
         self._send(STAND)
 
     def _step(self, now: float) -> None:
@@ -163,16 +150,6 @@ def patience_of(settings: FollowSettings) -> Patience:
     """Return the timeouts of a follower's inputs."""
     link_s = max(settings.pose_age_s, LINK_S)
     return Patience(settings.pose_age_s, link_s, Patience().status_s * settings.pace)
-
-
-def docking_of(bus: Bus, settings: FollowSettings) -> DockingNode | None:
-    """Return the node for docking by Nav2; None if the base docks itself, or in a dry run."""
-    if not settings.dock or settings.dry_run:
-        return None
-    # A follower without a dock does not load it.
-    from fasaco_edge.follow.docking import DockingNode  # noqa: PLC0415
-
-    return DockingNode(bus, settings)
 
 
 def run_follower(

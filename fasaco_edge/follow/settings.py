@@ -48,8 +48,6 @@ class FollowSettings:
         ros: kind, domain, namespace, name of the node and topic, if ``cmd_key`` is ROS 2's.
         nav2: if Nav2's controller drives: name of its action, release, names of plugins, and the
             least distance between separate stretches of one goal's path [m].
-        dock: if Nav2's docking server docks: names of its actions, id, type, frame and pose (x, y
-            [m], yaw [rad]) of the dock, and the distance in front of it at which paths end [m].
         scan: if scans are used: pose of the lidar (``mount``), ``lost_s``, ``free_at_most``,
             ``most_pixels`` of a map, and further topics of scans, maps and updates: name, key,
             whether it is latched, depth.
@@ -71,7 +69,6 @@ class FollowSettings:
     frame: str = "base_link"
     ros: Mapping[str, Any] = field(default_factory=dict)
     nav2: Mapping[str, Any] = field(default_factory=dict)
-    dock: Mapping[str, Any] = field(default_factory=dict)
     scan: Mapping[str, Any] = field(default_factory=dict)
     secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
     radius_m: float = 0.0

@@ -36,7 +36,6 @@ class State(enum.Enum):
     OBSTACLE = "obstacle ahead"
     NO_SCAN = "no scan"
     BAD_SCAN = "scan refused"
-    DOCK = "left to the docking server"
     NOT_MOVING = "does not move as commanded"
     NO_POSE = "no pose"
     OLD_POSE = "pose too old"
@@ -87,14 +86,12 @@ class Supervision:
         pose_fault: fault of the newest pose; None if it is valid.
         has_path: whether there is a path to follow.
         path_frame: name of the frame of the newest path.
-        held: why the docking server controls the robot; "" if it does not.
         standby: why the follower must not command the robot, with details; None if it may.
     """
 
     def __init__(self, patience: Patience) -> None:
         self.ahead: tuple[Point, ...] = ()
         self.state, self.detail = State.NO_DAEMON, ""
-        self.held = ""
         self.standby: Reason | None = None
         self.newest_pose: Pose2D | None = None
         self.link: Link | None = None
@@ -192,8 +189,6 @@ class Supervision:
             return State.SILENT_DAEMON, f"for {silent_s:.1f} s" if sent_any else "no status yet"
         if not self.has_path:
             return self._no_path
-        if self.held:
-            return State.DOCK, self.held
         return self._trouble_of_poses(now)
 
     def _trouble_of_poses(self, now: float) -> Reason | None:

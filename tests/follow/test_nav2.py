@@ -6,13 +6,14 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.actions import AskResult, CancelGoal, SendGoal
 from fasaco_edge.follow.nav2 import (
     EARLY_M,
     GIVE_UP_S,
     NO_CODE,
     RETRY_S,
     STANDS_S,
+    AskResult,
+    CancelGoal,
     Nav2Follower,
     SendPiece,
 )
@@ -75,7 +76,7 @@ class Drive:
     def begun(self, x=0.0, y=0.0):
         """Return the first goal, which Nav2 has accepted."""
         (goal,) = self.step(x, y)
-        assert isinstance(goal, SendGoal)
+        assert isinstance(goal, SendPiece)
         self.accept(goal)
         assert self.step(x, y) == [AskResult(goal.id)]
         return goal
@@ -233,7 +234,7 @@ def test_a_goal_cancelled_by_others_stays_cancelled(goes_on):
     elif goes_on == "elsewhere":
         drive.path((0.0, 0.0), (0.0, 8.0))
     (goal,) = drive.step(0.6 if goes_on == "moved" else 0.0)
-    assert isinstance(goal, SendGoal)
+    assert isinstance(goal, SendPiece)
 
 
 def test_a_new_path_the_same_way_does_not_shorten_the_pause():
@@ -242,7 +243,7 @@ def test_a_new_path_the_same_way_does_not_shorten_the_pause():
     for number in range(300):
         drive.path((0.0, 0.0), (8.0, 0.001 * number))
         for request in drive.step(0.0):
-            if isinstance(request, SendGoal):
+            if isinstance(request, SendPiece):
                 sent.append(drive.now)
                 drive.accept(request)
                 drive.end(request, ABORTED, 105)
@@ -250,7 +251,7 @@ def test_a_new_path_the_same_way_does_not_shorten_the_pause():
     assert pauses == pytest.approx([1.0, 2.0, 4.0, 8.0], abs=0.15)
     drive.path((0.0, 0.0), (0.0, 8.0))
     (goal,) = drive.step(0.0)
-    assert isinstance(goal, SendGoal)
+    assert isinstance(goal, SendPiece)
 
 
 def test_replaced_goals_do_not_extend_a_blocked_robots_tries():
@@ -259,7 +260,7 @@ def test_replaced_goals_do_not_extend_a_blocked_robots_tries():
     while canceled_at is None and drive.now < 3 * GIVE_UP_S:
         drive.path((0.0, 0.0), (8.0, 0.5 * (round(drive.now / 2.0) % 2)))
         for request in drive.step(0.0):
-            if isinstance(request, SendGoal):
+            if isinstance(request, SendPiece):
                 drive.accept(request)
             elif isinstance(request, CancelGoal):
                 canceled_at = drive.now
@@ -288,7 +289,7 @@ def test_a_goal_that_is_not_taken_is_another_goal_later(answer, state, said, can
     assert drive.step(0.0) == ([CancelGoal(goal.id)] if cancels else [])
     assert (drive.state, drive.follower.detail) == (state, said)
     (again,) = drive.step(0.0, after=RETRY_S)
-    assert isinstance(again, SendGoal)
+    assert isinstance(again, SendPiece)
     assert again.id != goal.id
 
 
@@ -302,7 +303,7 @@ def test_a_restarted_server_gets_the_goal_again(ending):
     assert drive.step(1.0) == ([CancelGoal(goal.id)] if ending is NO_ANSWER else [])
     assert drive.state is State.NO_NAV2
     again = drive.step(1.0, after=RETRY_S)[0]
-    assert isinstance(again, SendGoal)
+    assert isinstance(again, SendPiece)
     assert again.points[0][0] == pytest.approx(1.0)
 
 
@@ -352,7 +353,7 @@ def test_a_path_that_is_another_one_ahead_replaces_the_goal(turn):
     drive.step(1.0)
     drive.path((0.9, 0.0), (turn, 0.0), (turn, 3.0))
     (goal,) = drive.step(1.1)
-    assert isinstance(goal, SendGoal)
+    assert isinstance(goal, SendPiece)
     assert goal.points[0] == (pytest.approx(1.1), 0.0)
     assert goal.points[-1] == (turn, 3.0)
 
