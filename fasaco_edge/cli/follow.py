@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.robot import RobotConfig
     from fasaco_edge.config.ros import RosConfig
-    from fasaco_edge.follow.estimate import Limits
+    from fasaco_edge.follow.estimate import BaseLimits
     from fasaco_edge.follow.node import Node
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
 
@@ -191,11 +191,11 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
     )
 
 
-def limits_of(robot: RobotConfig) -> Limits:
+def limits_of(robot: RobotConfig) -> BaseLimits:
     """Return the limits of a base on speeds and accelerations."""
-    from fasaco_edge.follow.estimate import Limits
+    from fasaco_edge.follow.estimate import BaseLimits
 
-    return Limits(
+    return BaseLimits(
         robot.speed_m_s,
         robot.acceleration_m_s2,
         math.radians(robot.turning_deg_s()),

@@ -27,7 +27,7 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.follow.settings import FollowSettings
-from fasaco_edge.follow.supervision import Reason, State
+from fasaco_edge.follow.supervision import FollowerState, Reason
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -179,13 +179,13 @@ class BaseClaim(BusClaim):
             if self.state is ClaimState.PLANS and self.rival:
                 log.warning("follower %s is gone: this one drives", self.rival)
         if self.state is ClaimState.LOOKS or self.is_uncertain(now):
-            return State.LOOKS, ""
+            return FollowerState.LOOKS, ""
         if self.state.is_waiting:
-            return State.SECOND, f"Zenoh id {self.rival}; this one waits"
+            return FollowerState.SECOND, f"Zenoh id {self.rival}; this one waits"
         if not self._is_seen and now >= self._look_at:
             self._is_seen = self._look()
             self._look_at = time.monotonic() + LOOK_AGAIN_S
-        return None if self._is_seen else (State.NO_RIGHT, NO_RIGHT)
+        return None if self._is_seen else (FollowerState.NO_RIGHT, NO_RIGHT)
 
     def _look(self) -> bool:
         """Return whether a second session sees the token."""

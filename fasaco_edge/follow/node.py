@@ -13,12 +13,12 @@ from fasaco_edge.bus.publisher import Publisher, RosPublisher
 from fasaco_edge.bus.session import Bus, join
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.daemons import BaseClaim
-from fasaco_edge.follow.estimate import STAND, Command
+from fasaco_edge.follow.estimate import STAND, VelocityCommand
 from fasaco_edge.follow.follower import PERIOD_S, Follower
 from fasaco_edge.follow.inputs import Inputs, ScanInputs
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.standstill import Standstill
-from fasaco_edge.follow.supervision import LINK_S, Patience, State, Supervision
+from fasaco_edge.follow.supervision import LINK_S, FollowerState, Patience, Supervision
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -42,9 +42,9 @@ class Node:
         keys = Keys(settings.robot, settings.base)
         self._claim = None if settings.dry_run else BaseClaim(bus, settings)
         self._blocked = None if settings.dry_run else bus.advertise(keys, topics.BLOCKED)
-        follower.standby = (State.LOOKS, "") if self._claim else None
+        follower.standby = (FollowerState.LOOKS, "") if self._claim else None
         self._standstill = Standstill()
-        self._logged: State | None = None
+        self._logged: FollowerState | None = None
         self._due = -math.inf
 
     def turn(self) -> None:
@@ -85,7 +85,7 @@ class Node:
         state, detail = self._follower.state, self._follower.detail
         if state is not self._logged:
             self._logged = state
-            standing = "" if state is State.DRIVING else "standing, "
+            standing = "" if state is FollowerState.DRIVING else "standing, "
             log.info("%s%s%s", standing, state.value, f": {detail}" if detail else "")
 
 
@@ -122,7 +122,7 @@ class FollowerNode(Node):
             turn = math.degrees(sent.turn_rate)
             self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {follower.state.value}")
 
-    def _send(self, command: Command) -> None:
+    def _send(self, command: VelocityCommand) -> None:
         """Send a command; send none in a dry run, or while another follower drives."""
         settings = self._settings
         if not settings.dry_run and not self._follower.standby:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from fasaco_edge.follow.estimate import Limits
+from fasaco_edge.follow.estimate import BaseLimits
 from fasaco_edge.wire.schemas import TWIST
 
 
@@ -59,7 +59,7 @@ class FollowSettings:
     robot: str
     base: str
     connect: tuple[str, ...]
-    limits: Limits
+    limits: BaseLimits
     pose_schema: str
     poses: tuple[PoseSource, ...]
     cmd_key: str
@@ -84,7 +84,7 @@ class FollowSettings:
         """Return the settings in a document of ``encode``."""
         members = json.loads(document)
         members["poses"] = tuple(PoseSource(**source) for source in members["poses"])
-        members["limits"] = Limits(**members["limits"])
+        members["limits"] = BaseLimits(**members["limits"])
         members["connect"] = tuple(members["connect"])
         members["frames"] = tuple(members["frames"]) if members["frames"] else None
         return cls(**members)
