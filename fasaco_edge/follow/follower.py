@@ -138,7 +138,6 @@ class Follower(Supervision):
         return command
 
     def _limit(self, pose: Pose2D, route: LegRoute) -> Limit:
-        """Return the limit that the scan sets."""
         if self._sight is None or not self._sight.things:
             return NO_LIMIT
         line = route.line_ahead((pose.x, pose.y), AHEAD_M)

@@ -254,7 +254,6 @@ class Nav2Follower(Supervision):
             self.take_accepted(goal.id, accepted=True, why="", now=now)
 
     def _begin(self, path: PathDriven, whole: float, now: float) -> None:
-        """Send a goal if Nav2 has none."""
         if self._trouble_of_nav2 is not None:
             self.state, self.detail = self._trouble_of_nav2
         if whole - path.way <= STEP_M:
@@ -271,7 +270,6 @@ class Nav2Follower(Supervision):
             self._send(path, max(goal.next_start, path.way))
 
     def _send(self, path: PathDriven, start: float) -> None:
-        """Send the piece that begins there."""
         end = end_of_piece(path.line, start, self._near)
         goal = self._pending = SentPiece(self._new_id(), start, end)
         points = [path.line.at(way) for way in path.line.ways(start, end)]
@@ -335,7 +333,6 @@ class Nav2Follower(Supervision):
         return math.atan2(y - self._here[1], x - self._here[0])
 
     def _stop(self) -> None:
-        """End all goals."""
         self._requests += [CancelGoal(goal.id) for goal in (self._active, self._pending) if goal]
         self._active = self._pending = None
 

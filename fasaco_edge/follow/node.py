@@ -81,7 +81,6 @@ class Node:
         return True
 
     def _log(self) -> None:
-        """Log a change of the robot's state."""
         state, detail = self._follower.state, self._follower.detail
         if state is not self._logged:
             self._logged = state

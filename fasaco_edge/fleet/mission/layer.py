@@ -247,7 +247,6 @@ class FleetLayer(Company):
     def _why_anew(
         self, joint: ReachableArea, left: Mask, robots: list[Robot], now: float, *, at_once: bool
     ) -> str:
-        """Return why to divide again, or ""."""
         division = self._division
         names = {robot.name for robot in robots}
         known = set() if division is None else set(division.names)
@@ -298,12 +297,10 @@ class FleetLayer(Company):
         return carried(self._tried[1], self._tried[0], area.lattice.window)
 
     def _is_own(self, division: Division, area: ReachableArea) -> Mask:
-        """Return which cells of this robot's area are in its part."""
         joint = self._joint(area)
         return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
 
     def _of_me(self, division: Division, joint: ReachableArea) -> Mask:
-        """Return which cells of a joint area are in this robot's part."""
         mine = division.names.index(self._robot)
         return np.equal(self._owners_on(division, joint), mine)
 

@@ -233,7 +233,6 @@ class FleetRecorder(BusRecorder):
         self._scene.join(member)
 
     def _note(self, now_ns: int) -> None:
-        """Note and show what arrived since the last note."""
         for member in self._members:
             traffic = self._inbox.traffic(member.name)
             if traffic.too_large:

@@ -156,7 +156,6 @@ class FleetView:
             self._note_state(robot, now)
 
     def _look_at_floor(self, divider: ObservedRobot | None, now_ns: int) -> None:
-        """Survey the floor after changes, if that is due."""
         division = None if divider is None else (divider.name, divider.newest.division)
         key = division, *((member.name, member.changes) for member in self.members)
         began = time.monotonic()
@@ -256,7 +255,6 @@ class FleetView:
             self._seen[member.name].status = status
 
     def _note_state(self, robot: FleetRobot, now: float) -> None:
-        """Note a robot's activity if it has changed."""
         seen, doing = self._seen[robot.name], robot.doing
         if doing == seen.noted or now - seen.noted_at < NOTED_EVERY_S:
             return
