@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fasaco_edge.fleet.cli.mission import command_fleet
     from fasaco_edge.fleet.cli.review import print_fleet
-    from fasaco_edge.fleet.cli.watch import fleet_on_bus
     from fasaco_edge.fleet.mission.travel import apart
     from fasaco_edge.fleet.recording.recorder import file_name, run_fleet_recorder
     from fasaco_edge.fleet.review.drawing import draw_fleet_mission
     from fasaco_edge.fleet.review.tracks import swept_by_others
+    from fasaco_edge.fleet.watch.screen import fleet_on_bus
 
 __all__ = [
     "apart",
@@ -33,7 +33,7 @@ _PLACES = {
     "command_fleet": "cli.mission",
     "draw_fleet_mission": "review.drawing",
     "file_name": "recording.recorder",
-    "fleet_on_bus": "cli.watch",
+    "fleet_on_bus": "watch.screen",
     "print_fleet": "cli.review",
     "run_fleet_recorder": "recording.recorder",
     "swept_by_others": "review.tracks",

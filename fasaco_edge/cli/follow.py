@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fasaco_edge.config.config import DaemonConfig
     from fasaco_edge.config.robot import RobotConfig
     from fasaco_edge.config.ros import RosConfig
-    from fasaco_edge.follow.estimate import Limits
+    from fasaco_edge.follow.estimate import BaseLimits
     from fasaco_edge.follow.node import Node
     from fasaco_edge.follow.settings import FollowSettings, PoseSource
 
@@ -66,11 +66,6 @@ With `ros2.follow: nav2` this program sends no velocities: Nav2's controller get
 piece, as goals of /follow_path (nav2_msgs/FollowPath). They are cancelled for the same reasons, and
 their results are reported here. If this program or its computer dies, Nav2 drives to the end of the
 present goal, at most 20 m.
-
-With `ros2.dock: nav2` Nav2's docking server drives the robot from a pose in front of the dock into
-it, and out again before the next path, by goals of /dock_robot and /undock_robot
-(nav2_msgs/DockRobot, UndockRobot). Until it has finished, this program does not drive; after an
-error it tries again, in 10 s to 5 min.
 
 examples:
   fasaco-edge follow --config /etc/fasaco-edge/config.yaml --dry-run
@@ -191,7 +186,6 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         else here.keys.of(topics.CMD_VEL),
         ros=_ros_node(ros, schema) if ros else {},
         nav2=_nav2(config) if ros and ros.follow == "nav2" else {},
-        dock=_dock(config) if ros and ros.dock == "nav2" else {},
         scan=_scan(config) if config.scan and not (ros and ros.follow == "nav2") else {},
         radius_m=robot.radius_m,
         pace=args.speed,
@@ -199,11 +193,11 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
     )
 
 
-def limits_of(robot: RobotConfig) -> Limits:
+def limits_of(robot: RobotConfig) -> BaseLimits:
     """Return the limits of a base on speeds and accelerations."""
-    from fasaco_edge.follow.estimate import Limits
+    from fasaco_edge.follow.estimate import BaseLimits
 
-    return Limits(
+    return BaseLimits(
         robot.speed_m_s,
         robot.acceleration_m_s2,
         math.radians(robot.turning_deg_s()),
@@ -268,21 +262,6 @@ def _nav2(config: DaemonConfig) -> dict[str, object]:
         "release": nav2.release,
         "plugins": names,
         "near_m": near_m,
-    }
-
-
-def _dock(config: DaemonConfig) -> dict[str, object]:
-    assert config.ros2
-    assert config.mission.dock is not None  # checked when the configuration was read
-    ros, nav2, dock = config.ros2, config.ros2.nav2, config.mission.dock
-    return {
-        "dock_action": ros.full_name(nav2.dock_action),
-        "undock_action": ros.full_name(nav2.undock_action),
-        "id": nav2.dock_id,
-        "type": nav2.dock_type,
-        "frame": ros.frames.map,
-        "pose": (dock.x_m, dock.y_m, math.radians(dock.yaw_deg)),
-        "approach_m": dock.approach_m,
     }
 
 

@@ -301,9 +301,6 @@ class DaemonConfig(StrictDocument, frozen=True):
         if self.bus.security.roles.ros and not self.ros2:
             text = "without a block ros2 there is no such role"
             yield BadConfiguration(text, key="bus.security.roles.ros", others=["ros2"])
-        if self.ros2 and self.ros2.dock == "nav2" and not self.mission.dock:
-            text = "must be given where ros2.dock is nav2, got null"
-            yield BadConfiguration(text, key="mission.dock", others=["ros2.dock"])
 
     @property
     def cell_m(self) -> float:

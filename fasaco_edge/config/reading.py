@@ -11,6 +11,11 @@ from fasaco_edge.errors import BadConfiguration, joined
 FOLDER = "CREDENTIALS_DIRECTORY"
 # Removed keys of earlier releases: why, and what to do. A removed key without a value is ignored,
 # as copies of old examples contain it.
+_DOCKING = (
+    "was removed in this version, follow does not command Nav2's docking server",
+    "delete the key; the base docks by itself, or on command of a program of your own that reads "
+    "the state `charging`",
+)
 REMOVED = {
     "planner.own": (
         "was removed in this version, the daemon plans with its own planners only",
@@ -21,6 +26,11 @@ REMOVED = {
         "for true write name: colony-search, or leave the name out; for false write name: fasaco; "
         "with another name delete the key",
     ),
+    "ros2.dock": _DOCKING,
+    "ros2.nav2.dock_action": _DOCKING,
+    "ros2.nav2.undock_action": _DOCKING,
+    "ros2.nav2.dock_id": _DOCKING,
+    "ros2.nav2.dock_type": _DOCKING,
 }
 
 

@@ -79,9 +79,6 @@ class Nav2Config(StrictDocument, frozen=True):
     for the only one there is; ``release`` is the ROS release whose goals a server behind a bridge
     accepts. Parts of a goal's path keep ``near_m`` [m] from each other, by default 0.75 of the
     tool's width.
-
-    Its docking server, used if ``dock`` is ``nav2``: ``dock_id`` names a dock of its database, ""
-    for the pose ``mission.dock``; ``dock_type`` is its plugin, "" for the only one there is.
     """
 
     action: str = "/follow_path"
@@ -91,22 +88,14 @@ class Nav2Config(StrictDocument, frozen=True):
     progress_checker: str = ""
     path_handler: str = ""
     near_m: Annotated[float, Meta(ge=0.05, le=10)] | None = None
-    dock_action: str = "/dock_robot"
-    undock_action: str = "/undock_robot"
-    dock_id: str = ""
-    dock_type: str = ""
 
     def faults(self) -> Iterator[BadConfiguration]:
-        usual = Nav2Config()
-        for key in ("action", "dock_action", "undock_action"):
-            if not _TOPIC.fullmatch(name := getattr(self, key)):
-                yield _misfit(key, f"like {getattr(usual, key)}", name)
-        plugins = ("controller", "goal_checker", "progress_checker", "path_handler")
-        for key in (*plugins, "dock_id", "dock_type"):
+        if not _TOPIC.fullmatch(self.action):
+            yield _misfit("action", "like /follow_path", self.action)
+        for key in ("controller", "goal_checker", "progress_checker", "path_handler"):
             name = getattr(self, key)
             if not name.isprintable() or len(name.encode()) > MAX_STRING_BYTES:
-                of = "dock" if key == "dock_id" else "plugin"
-                yield _misfit(key, f"the name of a {of}", name)
+                yield _misfit(key, "the name of a plugin", name)
 
 
 class RosConfig(StrictDocument, frozen=True):
@@ -116,8 +105,7 @@ class RosConfig(StrictDocument, frozen=True):
     zenoh-bridge-ros2dds. ``domain`` and ``node`` are for rmw_zenoh, as a bridge has its own.
     ``pose`` is the type of the pose's topic, or "tf"; the mission's commands are services below
     ``services``. ``follow`` is what ``fasaco-edge follow`` does: drive the base itself, or send the
-    path to Nav2's controller. ``dock`` is what moves the robot into its dock and out of it: the
-    base by itself, or Nav2's docking server, on request of ``fasaco-edge follow``.
+    path to Nav2's controller.
     """
 
     kind: Literal["bridge", "rmw_zenoh"]
@@ -134,7 +122,6 @@ class RosConfig(StrictDocument, frozen=True):
     ] = "tf"
     frames: RosFrames = RosFrames()
     follow: Literal["own", "nav2"] = "own"
-    dock: Literal["base", "nav2"] = "base"
     nav2: Nav2Config = Nav2Config()
 
     @property

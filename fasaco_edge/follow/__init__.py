@@ -6,6 +6,6 @@
 
 ``follower`` drives a base by velocities: ``estimate`` of its pose, ``legs`` of a ``route``,
 ``pursuit`` along it, ``sight`` of what the map does not show, ``grip`` to check its motion.
-``nav2`` has Nav2's controller drive ``pieces`` of the path, ``docking`` has Nav2's docking server
-dock: both send goals by ``actions``. ``standstill`` reports what blocks the robot.
+``nav2`` has Nav2's controller drive ``pieces`` of the path, by goals that ``nav2_node`` sends.
+``standstill`` reports what blocks the robot.
 """

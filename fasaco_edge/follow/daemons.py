@@ -27,7 +27,7 @@ from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.errors import BusUnavailable
 from fasaco_edge.follow.settings import FollowSettings
-from fasaco_edge.follow.supervision import Reason, State
+from fasaco_edge.follow.supervision import FollowerState, Reason
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
@@ -49,7 +49,6 @@ class News:
     Attributes:
         planner: its id; "" without a daemon.
         status_at: arrival of its newest status [s]; None without a new status.
-        state: its state, by the newest status; "" before the first status.
         path: its newest path; None without a new path.
         revision: revision of its newest path; 0 if unknown.
         speed_m_s: speed limit on its newest path [m/s]; infinity without a limit.
@@ -57,7 +56,6 @@ class News:
 
     planner: str = ""
     status_at: float | None = None
-    state: str = ""
     path: Sample | None = None
     revision: int = 0
     speed_m_s: float = math.inf
@@ -89,15 +87,12 @@ class Daemons:
 
     def take_status(self, payload: bytes, now: float) -> None:
         """Take in a status; it is ignored if it is malformed, or its daemon does not plan."""
-        document = _object(payload)
-        claim = document.get("claim")
+        claim = _object(payload).get("claim")
         own = claim.get("id") if isinstance(claim, dict) and claim.get("stand") == PLANS else None
         if not _is_id(own):
             return
-        state = document.get("state")
         with self._lock:
-            daemon = self._daemon(own)
-            daemon.status_at, daemon.state = now, state if isinstance(state, str) else ""
+            self._daemon(own).status_at = now
 
     def take_path(self, sample: Sample) -> None:
         """Take in a path; one that does not name its daemon is ignored."""
@@ -184,13 +179,13 @@ class BaseClaim(BusClaim):
             if self.state is ClaimState.PLANS and self.rival:
                 log.warning("follower %s is gone: this one drives", self.rival)
         if self.state is ClaimState.LOOKS or self.is_uncertain(now):
-            return State.LOOKS, ""
+            return FollowerState.LOOKS, ""
         if self.state.is_waiting:
-            return State.SECOND, f"Zenoh id {self.rival}; this one waits"
+            return FollowerState.SECOND, f"Zenoh id {self.rival}; this one waits"
         if not self._is_seen and now >= self._look_at:
             self._is_seen = self._look()
             self._look_at = time.monotonic() + LOOK_AGAIN_S
-        return None if self._is_seen else (State.NO_RIGHT, NO_RIGHT)
+        return None if self._is_seen else (FollowerState.NO_RIGHT, NO_RIGHT)
 
     def _look(self) -> bool:
         """Return whether a second session sees the token."""

@@ -39,7 +39,7 @@ BLEND_S = 0.15
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class BaseLimits:
     """The limits of the base.
 
     Attributes:
@@ -60,7 +60,7 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class VelocityCommand:
     """A velocity.
 
     Attributes:
@@ -72,7 +72,7 @@ class Command:
     turn_rate: float = 0.0
 
 
-STAND = Command()
+STAND = VelocityCommand()
 
 
 class PoseEstimate:
@@ -90,7 +90,7 @@ class PoseEstimate:
         delay: time from a command to the arrival of a pose that shows its effect [s].
     """
 
-    def __init__(self, limits: Limits) -> None:
+    def __init__(self, limits: BaseLimits) -> None:
         self._limits = limits
         self.jump: tuple[float, float] | None = None
         self.delay = FIRST_DELAY_S
@@ -100,7 +100,7 @@ class PoseEstimate:
         self._pose, self._pose_at = Pose2D(0.0, 0.0), -math.inf
         self.measured, self.commanded = self._pose, (0.0, 0.0, 0.0)
         self._doubted, self._agreeing = self._pose, 0
-        self._sent = deque[tuple[float, Command]]()
+        self._sent = deque[tuple[float, VelocityCommand]]()
 
     def take(self, pose: Pose2D, now: float) -> None:
         """Take in a pose on arrival."""
@@ -121,12 +121,12 @@ class PoseEstimate:
         if self._agreeing >= AGREEING:
             self._accept(pose, pose, now)
 
-    def sent(self, command: Command, now: float) -> None:
+    def sent(self, command: VelocityCommand, now: float) -> None:
         """Note a command sent to the base now."""
         if self._sent:
             (before, last), limits = self._sent[-1], self._limits
             faster, rate = limits.acceleration * (now - before), limits.turn_acceleration
-            command = Command(
+            command = VelocityCommand(
                 limited(last.speed, command.speed, faster),
                 limited(last.turn_rate, command.turn_rate, rate * (now - before)),
             )
@@ -146,7 +146,7 @@ class PoseEstimate:
             pose = moved(pose, command, seconds)
         return pose
 
-    def _between(self, since: float, until: float) -> Iterator[tuple[float, Command]]:
+    def _between(self, since: float, until: float) -> Iterator[tuple[float, VelocityCommand]]:
         """Yield the commands in force between two times, with their durations [s]."""
         for index, (begins, command) in enumerate(self._sent):
             ends = self._sent[index + 1][0] if index + 1 < len(self._sent) else until
@@ -182,7 +182,7 @@ class PoseEstimate:
         self.jump, self._agreeing = None, 0
 
 
-def moved(pose: Pose2D, command: Command, seconds: float) -> Pose2D:
+def moved(pose: Pose2D, command: VelocityCommand, seconds: float) -> Pose2D:
     """Return the pose after moving with a command for a short time."""
     turn = command.turn_rate * seconds
     heading = pose.yaw + 0.5 * turn

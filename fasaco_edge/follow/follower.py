@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import math
 
-from fasaco_edge.follow.estimate import STAND, Command, Limits, PoseEstimate
+from fasaco_edge.follow.estimate import STAND, BaseLimits, PoseEstimate, VelocityCommand
 from fasaco_edge.follow.grip import Grip
 from fasaco_edge.follow.pursuit import CurvePursuit, Pursuit
-from fasaco_edge.follow.route import CurveRoute, Joining, Route
+from fasaco_edge.follow.route import CurveRoute, JoinOutcome, LegRoute
 from fasaco_edge.follow.sight import AHEAD_M, NO_LIMIT, Limit, Sight
 from fasaco_edge.follow.standstill import floor_ahead
-from fasaco_edge.follow.supervision import Patience, Reason, State, Supervision
+from fasaco_edge.follow.supervision import FollowerState, Patience, Reason, Supervision
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.wire.messages.path_points import PathPoints
 
@@ -41,7 +41,7 @@ class Follower(Supervision):
 
     def __init__(
         self,
-        limits: Limits,
+        limits: BaseLimits,
         patience: Patience | None = None,
         *,
         moves: bool = True,
@@ -55,12 +55,12 @@ class Follower(Supervision):
         self._pursuit = (CurvePursuit if limits.turn_radius else Pursuit)(limits, PERIOD_S)
         self._grip = Grip()
         # The route that is driven, and the route to join next.
-        self._route: Route | None = None
-        self._next: Route | None = None
+        self._route: LegRoute | None = None
+        self._next: LegRoute | None = None
         self._driven_at = -math.inf
         self._stepped_at: float | None = None
 
-    def step(self, now: float) -> Command | None:
+    def step(self, now: float) -> VelocityCommand | None:
         """Return the command to send now, or None."""
         if self._stepped_at is not None:
             self._pursuit.passed(now - self._stepped_at)
@@ -86,7 +86,7 @@ class Follower(Supervision):
         self._estimate.take(pose, now)
 
     def _have(self, points: PathPoints) -> None:
-        self._next = (CurveRoute if self._limits.turn_radius else Route)(points, self._limits)
+        self._next = (CurveRoute if self._limits.turn_radius else LegRoute)(points, self._limits)
 
     def _withdraw(self) -> None:
         self._route = self._next = None
@@ -96,10 +96,10 @@ class Follower(Supervision):
             return reason
         if self._estimate.jump is not None:
             far, turned = self._estimate.jump
-            return State.POSE_JUMPED, f"by {far:.1f} m and {math.degrees(turned):.0f} deg"
+            return FollowerState.POSE_JUMPED, f"by {far:.1f} m and {math.degrees(turned):.0f} deg"
         return self._sight.trouble(self.path_frame, now) if self._sight is not None else None
 
-    def _steer(self, now: float) -> Command | None:
+    def _steer(self, now: float) -> VelocityCommand | None:
         pose = self._estimate.at(now)
         here = (pose.x, pose.y)
         if self._next is not None:
@@ -107,10 +107,10 @@ class Follower(Supervision):
             if self._estimate.speed:
                 heading = pose.yaw if self._estimate.speed > 0.0 else pose.yaw + math.pi
             joining = self._next.join(here, heading, self._route)
-            if joining is Joining.AT_REST:
+            if joining is JoinOutcome.AT_REST:
                 return self._pursuit.brake()
-            if joining is Joining.ELSEWHERE:
-                self.state = State.PATH_ELSEWHERE
+            if joining is JoinOutcome.ELSEWHERE:
+                self.state = FollowerState.PATH_ELSEWHERE
                 return None
             self._route, self._next = self._next, None
         route = self._route
@@ -119,26 +119,25 @@ class Follower(Supervision):
         x, y = route.line_ahead(here, LEADS_M)[-1]
         toward = math.atan2(y - here[1], x - here[0])
         if leg is not None and self._grip.is_lost(self._estimate, toward, now):
-            self.state, self.detail = State.NOT_MOVING, self._grip.detail
+            self.state, self.detail = FollowerState.NOT_MOVING, self._grip.detail
             self.ahead = floor_ahead(here, toward, self._radius)
             return None
         if leg is not None and (off := leg.distance(here)) > OFF_PATH_M:
-            self.state, self.detail = State.OFF_PATH, f"by {off:.2f} m"
+            self.state, self.detail = FollowerState.OFF_PATH, f"by {off:.2f} m"
             return None
         limit = self._limit(pose, route)
         most = min(limit.speed, self._path_most_m_s)
         command = self._pursuit.steer(pose, route, most)
         if route.leg is None:
-            self.state = State.DRIVEN
+            self.state = FollowerState.DRIVEN
             return None
         if self._pursuit.is_lost:
-            self.state, self.detail = State.OFF_PATH, "it leads where the base cannot steer"
+            self.state, self.detail = FollowerState.OFF_PATH, "it leads where the base cannot steer"
         elif limit.speed == 0.0 and command == STAND and not self._pursuit.is_turning:
-            self.state, self.detail, self.ahead = State.OBSTACLE, limit.why, limit.around
+            self.state, self.detail, self.ahead = FollowerState.OBSTACLE, limit.why, limit.around
         return command
 
-    def _limit(self, pose: Pose2D, route: Route) -> Limit:
-        """Return the limit that the scan sets."""
+    def _limit(self, pose: Pose2D, route: LegRoute) -> Limit:
         if self._sight is None or not self._sight.things:
             return NO_LIMIT
         line = route.line_ahead((pose.x, pose.y), AHEAD_M)

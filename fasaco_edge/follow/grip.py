@@ -14,7 +14,7 @@ import math
 from collections import deque
 from statistics import fmean, median
 
-from fasaco_edge.follow.estimate import Command, PoseEstimate
+from fasaco_edge.follow.estimate import PoseEstimate, VelocityCommand
 from fasaco_edge.follow.standstill import Tries
 from fasaco_edge.grid.geometry import Pose2D
 
@@ -132,7 +132,7 @@ class Grip:
         self._tries.failed(done.middle(), toward, now)
         return True
 
-    def sent(self, command: Command, seconds: float) -> None:
+    def sent(self, command: VelocityCommand, seconds: float) -> None:
         """Note a command and its duration."""
         if way := seconds * (abs(command.speed) + WAY_M_RAD * abs(command.turn_rate)):
             self._interval.way += way

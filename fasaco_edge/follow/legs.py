@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
-from fasaco_edge.follow.estimate import Limits
+from fasaco_edge.follow.estimate import BaseLimits
 from fasaco_edge.grid.geometry import Point, Pose2D
 
 # Least length of a leg [m].
@@ -118,7 +118,7 @@ def times(turn: float, turn_rate: float, turn_acceleration: float) -> tuple[floa
     return along + aside * math.tan(0.5 * turn), aside / math.cos(0.5 * turn)
 
 
-def rounding(turn: float, room: float, limits: Limits) -> tuple[float, float]:
+def rounding(turn: float, room: float, limits: BaseLimits) -> tuple[float, float]:
     """Return the greatest speed in a corner [m/s], and how long before it the turn begins [s].
 
     Args:

@@ -15,19 +15,18 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.follow.actions import AskResult, CancelGoal, Request, SendGoal, goal_error
 from fasaco_edge.follow.pieces import (
     COAST_M,
     LEAST_M,
     STEP_M,
     TIP_M,
-    Goal,
-    Line,
+    PathByLength,
     PathDriven,
+    SentPiece,
     end_of_piece,
 )
 from fasaco_edge.follow.standstill import Tries, floor_ahead
-from fasaco_edge.follow.supervision import Patience, Reason, State, Supervision
+from fasaco_edge.follow.supervision import FollowerState, Patience, Reason, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.nav2_goals import (
     ABORTED,
@@ -69,18 +68,37 @@ NO_CODE = "without a code; does another program send goals, too?"
 
 
 @dataclass(frozen=True, slots=True)
-class SendPiece(SendGoal):
-    """A request to follow points [m] in a frame.
+class SendPiece:
+    """A request to begin a goal: to follow points [m] in a frame.
 
     Attributes:
+        id: of the goal.
         end_yaw: heading at the last point [rad]; None to keep the heading of arrival.
         is_back: whether it is driven backward: headings are opposite to the motion.
     """
 
+    id: bytes
     points: list[Point]
     frame: str
     end_yaw: float | None = None
     is_back: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AskResult:
+    """A query for the result of a goal; the reply arrives when the goal has ended."""
+
+    id: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class CancelGoal:
+    """A request to cancel a goal; it is repeated until the server confirms it."""
+
+    id: bytes
+
+
+Request = SendPiece | AskResult | CancelGoal
 
 
 class Nav2Follower(Supervision):
@@ -115,10 +133,10 @@ class Nav2Follower(Supervision):
         self._moved_last: tuple[Point, float] | None = None
         self._path: PathDriven | None = None
         # The path that replaces the present one, once Nav2 has answered the pending request.
-        self._next: Line | None = None
+        self._next: PathByLength | None = None
         # The goal that Nav2 drives, and the goal sent but not answered yet.
-        self._active: Goal | None = None
-        self._pending: Goal | None = None
+        self._active: SentPiece | None = None
+        self._pending: SentPiece | None = None
         self._asked_at = -math.inf
         self._tries = Tries(PROGRESS_M, RETRY_S, MOST_RETRY_S)
         self._is_canceled = False
@@ -130,7 +148,7 @@ class Nav2Follower(Supervision):
         """Return the requests to Nav2 now."""
         if not self._supervised(self._drive, now):
             self._stop()
-        if self.state in (State.STANDS, State.GIVEN_UP) and self._path:
+        if self.state in (FollowerState.STANDS, FollowerState.GIVEN_UP) and self._path:
             self.ahead = floor_ahead(self._here, self._toward(self._path), self._radius)
         return self._taken()
 
@@ -143,7 +161,7 @@ class Nav2Follower(Supervision):
         """Take in that a goal could not be sent."""
         if self._pending is not None and self._pending.id == goal_id:
             self._pending = None
-            self._fail(State.NO_NAV2, why, now)
+            self._fail(FollowerState.NO_NAV2, why, now)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
         """Take in whether Nav2 accepted a goal; None without an answer: it is cancelled."""
@@ -162,7 +180,7 @@ class Nav2Follower(Supervision):
             return
         if accepted is None:
             self._requests.append(CancelGoal(goal_id))
-        state = State.REFUSED if accepted is False else State.NO_NAV2
+        state = FollowerState.REFUSED if accepted is False else FollowerState.NO_NAV2
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
@@ -176,22 +194,27 @@ class Nav2Follower(Supervision):
             # Nav2 switches to the next goal.
             return
         if ending is None:
-            self._fail(State.NO_NAV2, why, now)
+            self._fail(FollowerState.NO_NAV2, why, now)
         elif ending.status == SUCCEEDED:
             if (path := self._path) is None:
                 return
             far = math.dist(self._here, path.line.at(goal.end))
             if far > DONE_M and goal.end - path.way > DONE_M:
-                self._fail(State.GIVEN_UP, f"reported as done {far:.1f} m before the end", now)
+                self._fail(
+                    FollowerState.GIVEN_UP, f"reported as done {far:.1f} m before the end", now
+                )
             else:
                 path.finish(goal)
         elif ending.status == ABORTED:
-            self._fail(State.GIVEN_UP, goal_error(ending, ERRORS, NO_CODE), now)
+            code = ending.code
+            error = f"{code} {ERRORS.get(code, 'no code')}" if code else NO_CODE
+            why = f"{error}: {ending.message}" if ending.message else error
+            self._fail(FollowerState.GIVEN_UP, why, now)
         elif ending.status == CANCELED:
             self._is_canceled = True
-            self._fail(State.CANCELED, "goes on with a path elsewhere", now, for_good=True)
+            self._fail(FollowerState.CANCELED, "goes on with a path elsewhere", now, for_good=True)
         else:
-            self._fail(State.NO_NAV2, "Nav2 does not know the goal: was it restarted?", now)
+            self._fail(FollowerState.NO_NAV2, "Nav2 does not know the goal: was it restarted?", now)
 
     def take_silence(self, goal_id: bytes, waited_s: float, now: float) -> None:
         """Take in that a query for a result ended without a reply: if soon, the server is gone."""
@@ -231,15 +254,14 @@ class Nav2Follower(Supervision):
             self.take_accepted(goal.id, accepted=True, why="", now=now)
 
     def _begin(self, path: PathDriven, whole: float, now: float) -> None:
-        """Send a goal if Nav2 has none."""
         if self._trouble_of_nav2 is not None:
             self.state, self.detail = self._trouble_of_nav2
         if whole - path.way <= STEP_M:
-            self.state, self.detail = State.DRIVEN, ""
+            self.state, self.detail = FollowerState.DRIVEN, ""
         elif self._tries.may_try(self._toward(path), now):
             self._send(path, path.way)
 
-    def _send_next(self, path: PathDriven, goal: Goal) -> None:
+    def _send_next(self, path: PathDriven, goal: SentPiece) -> None:
         """Send the next goal, once the robot is near enough to its start."""
         if goal.next_start is None:
             goal.next_start = path.start_after(goal, self._ahead, self._near)
@@ -248,21 +270,20 @@ class Nav2Follower(Supervision):
             self._send(path, max(goal.next_start, path.way))
 
     def _send(self, path: PathDriven, start: float) -> None:
-        """Send the piece that begins there."""
         end = end_of_piece(path.line, start, self._near)
-        goal = self._pending = Goal(self._new_id(), start, end)
+        goal = self._pending = SentPiece(self._new_id(), start, end)
         points = [path.line.at(way) for way in path.line.ways(start, end)]
         yaw, is_back = path.heading_after(goal), path.line.is_back(start + LEAST_M)
         self._requests.append(SendPiece(goal.id, points, self.path_frame, yaw, is_back))
 
-    def _join(self, line: Line, now: float) -> bool:
+    def _join(self, line: PathByLength, now: float) -> bool:
         """Switch to a new path if it begins near the robot; return whether it does.
 
         If the path does not change up to the end of Nav2's goal, Nav2 keeps the goal.
         """
         way, far = line.nearest(self._here, 0.0, line.length(BEGINNING_M))
         if far > BEGINNING_M:
-            self.state, self.detail = State.PATH_ELSEWHERE, f"{far:.2f} m away"
+            self.state, self.detail = FollowerState.PATH_ELSEWHERE, f"{far:.2f} m away"
             return False
         goal, before = self._active, self._path
         self._path, self._next = (path := PathDriven(line, way)), None
@@ -281,7 +302,7 @@ class Nav2Follower(Supervision):
             goal.next_start = None
         return True
 
-    def _watch(self, path: PathDriven, goal: Goal, now: float) -> None:
+    def _watch(self, path: PathDriven, goal: SentPiece, now: float) -> None:
         """Query the result again, or give up the goal, if the robot stands."""
         if self._moved_last is None or math.dist(self._steady, self._moved_last[0]) > MOVED_M:
             self._moved_last = (self._steady, now)
@@ -290,16 +311,18 @@ class Nav2Follower(Supervision):
         if stands_s <= longest_s:
             return
         if stands_s > STANDS_S:
-            self.state, self.detail = State.STANDS, f"for {stands_s:.0f} s"
+            self.state, self.detail = FollowerState.STANDS, f"for {stands_s:.0f} s"
         if stands_s > GIVE_UP_S:
             self._requests.append(CancelGoal(goal.id))
             self._active = None
-            self._fail(State.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
+            self._fail(FollowerState.GIVEN_UP, f"stood for {stands_s:.0f} s without an error", now)
         elif now - self._asked_at > longest_s:
             self._asked_at = now
             self._requests.append(AskResult(goal.id))
 
-    def _fail(self, state: State, detail: str, now: float, *, for_good: bool = False) -> None:
+    def _fail(
+        self, state: FollowerState, detail: str, now: float, *, for_good: bool = False
+    ) -> None:
         self._trouble_of_nav2 = (state, detail)
         if self._path is not None:
             self._tries.failed(self._here, self._toward(self._path), now, for_good=for_good)
@@ -310,7 +333,6 @@ class Nav2Follower(Supervision):
         return math.atan2(y - self._here[1], x - self._here[0])
 
     def _stop(self) -> None:
-        """End all goals."""
         self._requests += [CancelGoal(goal.id) for goal in (self._active, self._pending) if goal]
         self._active = self._pending = None
 
@@ -324,7 +346,7 @@ class Nav2Follower(Supervision):
         self._steady = (x + share * (pose.x - x), y + share * (pose.y - y))
 
     def _have(self, points: PathPoints) -> None:
-        self._next = Line(points, is_curved=self._is_curved)
+        self._next = PathByLength(points, is_curved=self._is_curved)
 
     def _withdraw(self) -> None:
         self._path = self._next = None

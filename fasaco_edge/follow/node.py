@@ -8,27 +8,23 @@ import threading
 import time
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, join
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.follow.daemons import BaseClaim
-from fasaco_edge.follow.estimate import STAND, Command
+from fasaco_edge.follow.estimate import STAND, VelocityCommand
 from fasaco_edge.follow.follower import PERIOD_S, Follower
 from fasaco_edge.follow.inputs import Inputs, ScanInputs
 from fasaco_edge.follow.settings import FollowSettings
 from fasaco_edge.follow.standstill import Standstill
-from fasaco_edge.follow.supervision import LINK_S, Patience, State, Supervision
+from fasaco_edge.follow.supervision import LINK_S, FollowerState, Patience, Supervision
 from fasaco_edge.host.processes import release_unused
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.messages.base import Velocity, encode_velocity
 from fasaco_edge.wire.ros_keys import RosNode, RosTopic, gid_of
 from fasaco_edge.wire.topic_types import VOLATILE
-
-if TYPE_CHECKING:
-    from fasaco_edge.follow.docking import DockingNode
 
 log = logging.getLogger(__name__)
 
@@ -38,7 +34,7 @@ LEAST_S = 1e-6
 
 
 class Node:
-    """A follower on the bus: its inputs, the claim on the base, docking by Nav2, and reports."""
+    """A follower on the bus: its inputs, the claim on the base, and reports."""
 
     def __init__(self, bus: Bus, settings: FollowSettings, follower: Supervision) -> None:
         self._settings, self._follower = settings, follower
@@ -46,10 +42,9 @@ class Node:
         keys = Keys(settings.robot, settings.base)
         self._claim = None if settings.dry_run else BaseClaim(bus, settings)
         self._blocked = None if settings.dry_run else bus.advertise(keys, topics.BLOCKED)
-        follower.standby = (State.LOOKS, "") if self._claim else None
-        self._docking = docking_of(bus, settings)
+        follower.standby = (FollowerState.LOOKS, "") if self._claim else None
         self._standstill = Standstill()
-        self._logged: State | None = None
+        self._logged: FollowerState | None = None
         self._due = -math.inf
 
     def turn(self) -> None:
@@ -60,11 +55,6 @@ class Node:
         if not self._is_due(now):
             return
         follower.standby = self._claim.standby(time.monotonic()) if self._claim else None
-        if self._docking is not None:
-            if follower.standby:
-                self._docking.end()
-            else:
-                self._docking.turn(inputs.news.state, follower)
         self._step(now)
         news = inputs.news
         report = self._standstill.report(follower, news.planner, news.revision, now)
@@ -72,10 +62,9 @@ class Node:
             self._blocked.put(report)
         self._log()
 
+    @abstractmethod
     def end(self) -> None:
         """Make the robot stand."""
-        if self._docking is not None:
-            self._docking.end()
 
     @abstractmethod
     def _step(self, now: float) -> None:
@@ -92,11 +81,10 @@ class Node:
         return True
 
     def _log(self) -> None:
-        """Log a change of the robot's state."""
         state, detail = self._follower.state, self._follower.detail
         if state is not self._logged:
             self._logged = state
-            standing = "" if state is State.DRIVING else "standing, "
+            standing = "" if state is FollowerState.DRIVING else "standing, "
             log.info("%s%s%s", standing, state.value, f": {detail}" if detail else "")
 
 
@@ -119,8 +107,6 @@ class FollowerNode(Node):
         self._report, self._reported_at = report, -math.inf
 
     def end(self) -> None:
-        """Make the robot stand."""
-        super().end()
         self._send(STAND)
 
     def _step(self, now: float) -> None:
@@ -135,7 +121,7 @@ class FollowerNode(Node):
             turn = math.degrees(sent.turn_rate)
             self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {follower.state.value}")
 
-    def _send(self, command: Command) -> None:
+    def _send(self, command: VelocityCommand) -> None:
         """Send a command; send none in a dry run, or while another follower drives."""
         settings = self._settings
         if not settings.dry_run and not self._follower.standby:
@@ -161,16 +147,6 @@ def patience_of(settings: FollowSettings) -> Patience:
     """Return the timeouts of a follower's inputs."""
     link_s = max(settings.pose_age_s, LINK_S)
     return Patience(settings.pose_age_s, link_s, Patience().status_s * settings.pace)
-
-
-def docking_of(bus: Bus, settings: FollowSettings) -> DockingNode | None:
-    """Return the node for docking by Nav2; None if the base docks itself, or in a dry run."""
-    if not settings.dock or settings.dry_run:
-        return None
-    # A follower without a dock does not load it.
-    from fasaco_edge.follow.docking import DockingNode  # noqa: PLC0415
-
-    return DockingNode(bus, settings)
 
 
 def run_follower(

@@ -32,7 +32,7 @@ REVERSAL_RAD = math.radians(120.0)
 LEAST_M = 1e-3
 
 
-class Line:
+class PathByLength:
     """A path parametrised by arc length, from 0 at its start, and read lazily."""
 
     def __init__(self, poses: Iterable[Pose2D], *, is_curved: bool = False) -> None:
@@ -135,7 +135,7 @@ class Line:
         return ways
 
 
-def end_of_piece(line: Line, start: float, near: float) -> float:
+def end_of_piece(line: PathByLength, start: float, near: float) -> float:
     """Return the end of a piece that begins at ``start``, as arc length [m].
 
     A piece that must end before the line does ends at the last corner, if one is not far before:
@@ -189,7 +189,7 @@ COAST_M = 0.5
 
 
 @dataclass(slots=True)
-class Goal:
+class SentPiece:
     """A piece sent to Nav2, from ``start`` to ``end`` on the line [m]."""
 
     id: bytes
@@ -203,16 +203,16 @@ class Goal:
 class PathDriven:
     """A path driven goal by goal: its line, and the robot's distance along it [m]."""
 
-    def __init__(self, line: Line, way: float) -> None:
+    def __init__(self, line: PathByLength, way: float) -> None:
         self.line, self.way = line, way
         # End of the last finished goal: the next goal begins there, wherever the robot stopped.
         self._done = -1.0
 
-    def finish(self, goal: Goal) -> None:
+    def finish(self, goal: SentPiece) -> None:
         """Note that a goal is done."""
         self.way = self._done = goal.end
 
-    def advance(self, here: Point, goal: Goal | None) -> None:
+    def advance(self, here: Point, goal: SentPiece | None) -> None:
         """Update the robot's distance along the line: never backward nor beyond its goal."""
         if goal is not None:
             end = min(goal.end, self.way + LOOK_AHEAD_M)
@@ -224,7 +224,7 @@ class PathDriven:
         if end > self.way:
             self.way, _ = self.line.nearest(here, self.way, end)
 
-    def start_after(self, goal: Goal, ahead: float, near: float) -> float:
+    def start_after(self, goal: SentPiece, ahead: float, near: float) -> float:
         """Return the earliest start of a piece that continues a goal; infinite if there is none.
 
         Args:
@@ -242,7 +242,7 @@ class PathDriven:
                 return start
         return math.inf
 
-    def heading_after(self, goal: Goal) -> float | None:
+    def heading_after(self, goal: SentPiece) -> float | None:
         """Return the heading of the line beyond a goal [rad]; None at the line's end, or where the
         robot turns back."""
         if self.line.length(goal.end + STEP_M) < goal.end + STEP_M:
@@ -253,7 +253,7 @@ class PathDriven:
         turned = math.pi if self.line.is_back(goal.end) else 0.0
         return math.remainder(math.atan2(to_y - y, to_x - x) + turned, math.tau)
 
-    def is_near_end(self, here: Point, goal: Goal, within: float) -> bool:
+    def is_near_end(self, here: Point, goal: SentPiece, within: float) -> bool:
         """Return whether the robot is within a distance of the end of its goal [m].
 
         Nav2 ends a goal by this distance, even if the robot has cut a bend before the end.
@@ -261,7 +261,7 @@ class PathDriven:
         is_last_part = goal.end - self.way <= COAST_M
         return is_last_part and math.dist(here, self.line.at(goal.end)) <= within
 
-    def shift_to(self, line: Line, way: float, goal: Goal) -> float | None:
+    def shift_to(self, line: PathByLength, way: float, goal: SentPiece) -> float | None:
         """Return what to add to arc lengths of a goal for another line [m]; None if the lines
         differ before the goal ends.
 

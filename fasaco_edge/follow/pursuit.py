@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import math
 
-from fasaco_edge.follow.estimate import STAND, Command, Limits
-from fasaco_edge.follow.route import Route
+from fasaco_edge.follow.estimate import STAND, BaseLimits, VelocityCommand
+from fasaco_edge.follow.route import LegRoute
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.motion import limited, stopping_rate
 
@@ -43,7 +43,7 @@ class Pursuit:
     ``period``: time from one command to the next [s].
     """
 
-    def __init__(self, limits: Limits, period: float) -> None:
+    def __init__(self, limits: BaseLimits, period: float) -> None:
         self._limits = limits
         self._period = period
         # Whether the robot turns on the spot; and whether it cannot steer to the route.
@@ -66,12 +66,12 @@ class Pursuit:
         """Whether the robot turns on the spot, or comes to rest to turn."""
         return self._is_turning
 
-    def brake(self) -> Command:
+    def brake(self) -> VelocityCommand:
         """Return the next command on the way to rest."""
-        self._is_turning, self.last = True, Command(self._braked(), self._toward(0.0))
+        self._is_turning, self.last = True, VelocityCommand(self._braked(), self._toward(0.0))
         return self.last
 
-    def steer(self, pose: Pose2D, route: Route, most: float = math.inf) -> Command:
+    def steer(self, pose: Pose2D, route: LegRoute, most: float = math.inf) -> VelocityCommand:
         """Return the next command, up to ``most`` [m/s]; ``STAND`` once the route is driven."""
         limits, here, self.is_lost = self._limits, (pose.x, pose.y), False
         route.pass_bends(here)
@@ -90,7 +90,9 @@ class Pursuit:
         self.stand()
         return STAND
 
-    def _along(self, pose: Pose2D, route: Route, along: float, ends: Ends, most: float) -> Command:
+    def _along(
+        self, pose: Pose2D, route: LegRoute, along: float, ends: Ends, most: float
+    ) -> VelocityCommand:
         """Return the next command on a leg; the robot is ``along`` it [m]."""
         most = min(most, self._most(ends))
         leg = route.leg
@@ -100,7 +102,7 @@ class Pursuit:
             error = math.remainder(math.atan2(leg.uy, leg.ux) - pose.yaw, math.tau)
             self._is_turning = False
             speed = self._sped(min(most, route.rounds))
-            self.last = Command(speed, self._toward(self._turning(error)))
+            self.last = VelocityCommand(speed, self._toward(self._turning(error)))
             if abs(error) <= ALIGNED_RAD:
                 route.rounds = 0.0
             return self.last
@@ -119,7 +121,7 @@ class Pursuit:
             speed, rate = self._arc(
                 error, max(math.dist((pose.x, pose.y), (x, y)), LOOKAHEAD_M), most
             )
-        self.last = Command(speed, self._toward(rate))
+        self.last = VelocityCommand(speed, self._toward(rate))
         return self.last
 
     def _arc(self, error: float, far: float, most: float) -> tuple[float, float]:
@@ -177,7 +179,7 @@ class CurvePursuit(Pursuit):
     to rest where the path changes between forward and backward.
     """
 
-    def __init__(self, limits: Limits, period: float) -> None:
+    def __init__(self, limits: BaseLimits, period: float) -> None:
         super().__init__(limits, period)
         self._is_back = False
 
@@ -186,11 +188,13 @@ class CurvePursuit(Pursuit):
         """False: the base cannot turn on the spot."""
         return False
 
-    def brake(self) -> Command:
+    def brake(self) -> VelocityCommand:
         """Return the next command on the way to rest."""
         return self._sent(self._braked(), 0.0)
 
-    def _along(self, pose: Pose2D, route: Route, along: float, ends: Ends, most: float) -> Command:
+    def _along(
+        self, pose: Pose2D, route: LegRoute, along: float, ends: Ends, most: float
+    ) -> VelocityCommand:
         leg = route.leg
         assert leg is not None
         if leg.is_back != self._is_back:
@@ -207,8 +211,8 @@ class CurvePursuit(Pursuit):
         far = max(math.dist((pose.x, pose.y), (x, y)), 1e-3)
         return self._sent(*self._arc(error, far, min(most, self._most(ends))))
 
-    def _sent(self, speed: float, rate: float) -> Command:
+    def _sent(self, speed: float, rate: float) -> VelocityCommand:
         """Return the next command, limited to the base's turning radius."""
         rate, tightest = self._toward(rate), speed / self._limits.turn_radius
-        self.last = Command(speed, min(max(rate, -tightest), tightest))
-        return Command(-speed if self._is_back else speed, self.last.turn_rate)
+        self.last = VelocityCommand(speed, min(max(rate, -tightest), tightest))
+        return VelocityCommand(-speed if self._is_back else speed, self.last.turn_rate)

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import islice, pairwise
 
-from fasaco_edge.follow.estimate import Limits
+from fasaco_edge.follow.estimate import BaseLimits
 from fasaco_edge.follow.legs import LEAST_LEG_M, Leg, apart, leg_between, rounding
 from fasaco_edge.grid.geometry import Point, Pose2D
 
@@ -34,7 +34,7 @@ SAME_M = 1e-3
 CHORD_M = 0.06
 
 
-class Joining(enum.Enum):
+class JoinOutcome(enum.Enum):
     """How a new path can be joined."""
 
     JOINED = "joined"
@@ -42,10 +42,10 @@ class Joining(enum.Enum):
     ELSEWHERE = "not from here"
 
 
-class Route:
+class LegRoute:
     """A path, read lazily, and the leg that the robot is on."""
 
-    def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
+    def __init__(self, poses: Iterable[Pose2D], limits: BaseLimits) -> None:
         # Greatest speed in the corner that the robot rounds to its leg [m/s]; 0 without a corner.
         self.rounds = 0.0
         self._limits = limits
@@ -131,7 +131,7 @@ class Route:
                 break
         return line
 
-    def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
+    def join(self, here: Point, heading: float | None, before: LegRoute | None) -> JoinOutcome:
         """Join this new path at its beginning: find the robot's leg.
 
         If the path has the corner that the robot was driving to, this is the leg to that corner: on
@@ -146,7 +146,7 @@ class Route:
         index, is_kept = self._passing(here, before)
         leg = self._leg(index)
         if leg is None:
-            return Joining.JOINED
+            return JoinOutcome.JOINED
         aside = leg.distance(here)
         is_same = before is not None and is_kept and leg.leads_as(before.leg)
         turn = math.atan2(leg.uy, leg.ux) - (heading or 0.0)
@@ -155,13 +155,13 @@ class Route:
             del self._legs[:index]
             # The robot may be about to round the corner to that leg.
             self.rounds = before.rounds if before is not None and is_same else 0.0
-            return Joining.JOINED
+            return JoinOutcome.JOINED
         begin = self._legs[0].start
         if lead := before._lead_to(begin, here) if before is not None else []:
             self._legs[:0] = lead
-            return Joining.JOINED
+            return JoinOutcome.JOINED
         if heading is not None:
-            return Joining.AT_REST
+            return JoinOutcome.AT_REST
         if aside <= NEAREST_M:
             del self._legs[:index]
             begin = leg.at(min(max(leg.placed(here)[0], 0.0), leg.length))
@@ -169,12 +169,12 @@ class Route:
             rest = [replace(leg, start=begin, length=rest_m)] if rest_m >= LEAST_LEG_M else []
             self._legs[:1] = rest
         elif math.dist(here, begin) > BEGINNING_M:
-            return Joining.ELSEWHERE
+            return JoinOutcome.ELSEWHERE
         if math.dist(here, begin) >= LEAST_LEG_M:
             self._legs.insert(0, leg_between(here, begin))
-        return Joining.JOINED
+        return JoinOutcome.JOINED
 
-    def _passing(self, here: Point, before: Route | None) -> tuple[int, bool]:
+    def _passing(self, here: Point, before: LegRoute | None) -> tuple[int, bool]:
         """Return the index of the leg beside ``here``, near the beginning, and whether it ends at
         the corner that the robot was driving to."""
         target = before._legs[0].end if before is not None and before._legs else None
@@ -256,7 +256,7 @@ class Route:
         return replace(leg, most=most, early_s=early_s)
 
 
-class CurveRoute(Route):
+class CurveRoute(LegRoute):
     """A curve for a robot that cannot turn on the spot, and the leg that the robot is on.
 
     The legs are chords of arcs, and lanes; the robot steers from each to the next. It comes to rest
@@ -264,7 +264,7 @@ class CurveRoute(Route):
     heading is opposite to the leg's direction.
     """
 
-    def __init__(self, poses: Iterable[Pose2D], limits: Limits) -> None:
+    def __init__(self, poses: Iterable[Pose2D], limits: BaseLimits) -> None:
         super().__init__(poses, limits)
         # The leg before the first one, unless the robot comes to rest between them.
         self._behind: Leg | None = None
@@ -290,26 +290,30 @@ class CurveRoute(Route):
         x, y = leg.end
         return x + beyond * math.cos(heading), y + beyond * math.sin(heading)
 
-    def join(self, here: Point, heading: float | None, before: Route | None) -> Joining:
-        """Join this new path; see ``Route.join``.
+    def join(self, here: Point, heading: float | None, before: LegRoute | None) -> JoinOutcome:
+        """Join this new path; see ``LegRoute.join``.
 
         The robot steers to a leg beside it, as it cannot turn towards the nearest point.
         """
         leg = self.leg
         if leg is None:
-            return Joining.JOINED
+            return JoinOutcome.JOINED
         index, _ = self._passing(here, before)
         if self._legs[index].distance(here) <= NEAREST_M:
             del self._legs[:index]
-            return Joining.JOINED
+            return JoinOutcome.JOINED
         if before is not None and (lead := before._lead_to(leg.start, here)):
             is_back = before._legs[len(lead) - 1].is_back
             most = math.inf if is_back == leg.is_back else 0.0
             self._legs[:0] = [*lead[:-1], replace(lead[-1], most=most, is_back=is_back)]
-            return Joining.JOINED
+            return JoinOutcome.JOINED
         if heading is not None:
-            return Joining.AT_REST
-        return Joining.ELSEWHERE if math.dist(here, leg.start) > BEGINNING_M else Joining.JOINED
+            return JoinOutcome.AT_REST
+        return (
+            JoinOutcome.ELSEWHERE
+            if math.dist(here, leg.start) > BEGINNING_M
+            else JoinOutcome.JOINED
+        )
 
     def _leg_between(self, start: Pose2D, end: Pose2D) -> Leg:
         leg = super()._leg_between(start, end)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from fasaco_edge.follow.estimate import Limits
+from fasaco_edge.follow.estimate import BaseLimits
 from fasaco_edge.wire.schemas import TWIST
 
 
@@ -48,8 +48,6 @@ class FollowSettings:
         ros: kind, domain, namespace, name of the node and topic, if ``cmd_key`` is ROS 2's.
         nav2: if Nav2's controller drives: name of its action, release, names of plugins, and the
             least distance between separate stretches of one goal's path [m].
-        dock: if Nav2's docking server docks: names of its actions, id, type, frame and pose (x, y
-            [m], yaw [rad]) of the dock, and the distance in front of it at which paths end [m].
         scan: if scans are used: pose of the lidar (``mount``), ``lost_s``, ``free_at_most``,
             ``most_pixels`` of a map, and further topics of scans, maps and updates: name, key,
             whether it is latched, depth.
@@ -61,7 +59,7 @@ class FollowSettings:
     robot: str
     base: str
     connect: tuple[str, ...]
-    limits: Limits
+    limits: BaseLimits
     pose_schema: str
     poses: tuple[PoseSource, ...]
     cmd_key: str
@@ -71,7 +69,6 @@ class FollowSettings:
     frame: str = "base_link"
     ros: Mapping[str, Any] = field(default_factory=dict)
     nav2: Mapping[str, Any] = field(default_factory=dict)
-    dock: Mapping[str, Any] = field(default_factory=dict)
     scan: Mapping[str, Any] = field(default_factory=dict)
     secured: Mapping[str, Any] = field(default_factory=dict, repr=False)
     radius_m: float = 0.0
@@ -87,7 +84,7 @@ class FollowSettings:
         """Return the settings in a document of ``encode``."""
         members = json.loads(document)
         members["poses"] = tuple(PoseSource(**source) for source in members["poses"])
-        members["limits"] = Limits(**members["limits"])
+        members["limits"] = BaseLimits(**members["limits"])
         members["connect"] = tuple(members["connect"])
         members["frames"] = tuple(members["frames"]) if members["frames"] else None
         return cls(**members)

@@ -18,7 +18,7 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 from fasaco_edge.errors import MalformedMessage
-from fasaco_edge.follow.supervision import Reason, State
+from fasaco_edge.follow.supervision import FollowerState, Reason
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.motion import stopping_rate
 from fasaco_edge.wire.messages.base import LaserScan, decode_scan
@@ -138,11 +138,6 @@ def _way_to(thing: Thing, line: Sequence[Point], radius: float) -> float:
     return math.inf
 
 
-def speed_before(way: float, acceleration: float, period: float) -> float:
-    """Return the highest speed that allows a stop ``STOP_M`` before the end of ``way`` [m/s]."""
-    return stopping_rate(max(way - STOP_M, 0.0), acceleration, period)
-
-
 def speed_beside(
     things: Iterable[Thing], pose: Pose2D, radius: float, acceleration: float
 ) -> tuple[float, Thing | None]:
@@ -260,14 +255,14 @@ class Sight:
         try:
             scan = decode_scan(payload)
         except MalformedMessage as error:
-            self._fault = State.BAD_SCAN, str(error)
+            self._fault = FollowerState.BAD_SCAN, str(error)
             return
         if scan.stamp_ns and scan.stamp_ns == self._stamp_ns:
             return
         self._stamp_ns = scan.stamp_ns
         points = points_of(scan, self._mount)
         if points is None:
-            self._fault = State.BAD_SCAN, "it sees nothing: is the lidar covered?"
+            self._fault = FollowerState.BAD_SCAN, "it sees nothing: is the lidar covered?"
             return
         self._fault, self._scan_at = None, now
         self._look(points, pose, now)
@@ -277,13 +272,13 @@ class Sight:
         if self._fault is not None:
             return self._fault
         if self._grid is None:
-            return State.NO_SCAN, "no map to compare scans with"
+            return FollowerState.NO_SCAN, "no map to compare scans with"
         if self._grid.frame != frame:
-            return State.NO_SCAN, f"map in {self._grid.frame!r}, path in {frame!r}"
+            return FollowerState.NO_SCAN, f"map in {self._grid.frame!r}, path in {frame!r}"
         if self._scan_at is None:
-            return State.NO_SCAN, "none has come"
+            return FollowerState.NO_SCAN, "none has come"
         if (age_s := now - self._scan_at) > self._lost_s:
-            return State.NO_SCAN, f"for {age_s:.1f} s"
+            return FollowerState.NO_SCAN, f"for {age_s:.1f} s"
         return None
 
     def limit(
@@ -300,7 +295,8 @@ class Sight:
         radius, why = self._radius, "something moves"
         speed, thing = speed_beside(self.things, pose, radius, acceleration)
         way, met = first_met(self.things, line, radius)
-        if met is not None and (ahead := speed_before(way, acceleration, period)) < speed:
+        ahead = stopping_rate(max(way - STOP_M, 0.0), acceleration, period)
+        if met is not None and ahead < speed:
             speed, thing, why = ahead, met, "something stands"
         if thing is None or speed >= LEAST_M_S:
             return Limit(speed)

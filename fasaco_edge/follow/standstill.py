@@ -15,21 +15,21 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal
 
-from fasaco_edge.follow.supervision import State, Supervision
+from fasaco_edge.follow.supervision import FollowerState, Supervision
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.limits import MAX_BLOCKED_POINTS, MAX_STRING_BYTES
 
-Reason = Literal["obstacle", "stuck", "elsewhere"]
+BlockedReason = Literal["obstacle", "stuck", "elsewhere"]
 
 # Reported reasons, and the time after which each is reported [s].
-REASONS: Final[dict[State, tuple[Reason, float]]] = {
-    State.OBSTACLE: ("obstacle", 5.0),
-    State.NOT_MOVING: ("stuck", 3.0),
-    State.STANDS: ("stuck", 5.0),
-    State.GIVEN_UP: ("stuck", 1.0),
-    State.PATH_ELSEWHERE: ("elsewhere", 2.0),
-    State.OFF_PATH: ("elsewhere", 2.0),
+REASONS: Final[dict[FollowerState, tuple[BlockedReason, float]]] = {
+    FollowerState.OBSTACLE: ("obstacle", 5.0),
+    FollowerState.NOT_MOVING: ("stuck", 3.0),
+    FollowerState.STANDS: ("stuck", 5.0),
+    FollowerState.GIVEN_UP: ("stuck", 1.0),
+    FollowerState.PATH_ELSEWHERE: ("elsewhere", 2.0),
+    FollowerState.OFF_PATH: ("elsewhere", 2.0),
 }
 # A standstill ends once the robot has moved this far [m], or had no reason for this long [s].
 MOVED_M, GONE_S = 0.1, 2.0
@@ -44,7 +44,7 @@ class Standstill:
 
     def __init__(self) -> None:
         self._place: Point = math.inf, math.inf
-        self._state: State | None = None
+        self._state: FollowerState | None = None
         self._since = self._last = self._reported_at = -math.inf
 
     def report(

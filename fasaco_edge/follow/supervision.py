@@ -23,7 +23,7 @@ _Result = TypeVar("_Result")
 LINK_S = 2.0
 
 
-class State(enum.Enum):
+class FollowerState(enum.Enum):
     """State of the robot, with reasons to stand."""
 
     DRIVING = "driving"
@@ -36,7 +36,6 @@ class State(enum.Enum):
     OBSTACLE = "obstacle ahead"
     NO_SCAN = "no scan"
     BAD_SCAN = "scan refused"
-    DOCK = "left to the docking server"
     NOT_MOVING = "does not move as commanded"
     NO_POSE = "no pose"
     OLD_POSE = "pose too old"
@@ -55,7 +54,7 @@ class State(enum.Enum):
     CANCELED = "canceled by another program"
 
 
-Reason = tuple[State, str]
+Reason = tuple[FollowerState, str]
 """Why a robot stands: its state, and details in words."""
 
 
@@ -87,14 +86,12 @@ class Supervision:
         pose_fault: fault of the newest pose; None if it is valid.
         has_path: whether there is a path to follow.
         path_frame: name of the frame of the newest path.
-        held: why the docking server controls the robot; "" if it does not.
         standby: why the follower must not command the robot, with details; None if it may.
     """
 
     def __init__(self, patience: Patience) -> None:
         self.ahead: tuple[Point, ...] = ()
-        self.state, self.detail = State.NO_DAEMON, ""
-        self.held = ""
+        self.state, self.detail = FollowerState.NO_DAEMON, ""
         self.standby: Reason | None = None
         self.newest_pose: Pose2D | None = None
         self.link: Link | None = None
@@ -105,7 +102,7 @@ class Supervision:
         self._frame, self._stamp_ns, self._repeats = "", 0, False
         self._path_most_m_s = math.inf
         # Why there is no path.
-        self._no_path: Reason = State.NO_PATH, ""
+        self._no_path: Reason = FollowerState.NO_PATH, ""
         self._planner = self._path_of = ""
         self._statuses, self._status_at = 0, -math.inf
 
@@ -127,10 +124,10 @@ class Supervision:
         try:
             points = PathPoints(payload)
         except MalformedMessage as error:
-            self._have_none(State.BAD_PATH, str(error))
+            self._have_none(FollowerState.BAD_PATH, str(error))
             return
         if not points.left:
-            self._have_none(State.EMPTY_PATH)
+            self._have_none(FollowerState.EMPTY_PATH)
             return
         self.has_path, self.path_frame = True, points.frame
         self._have(points)
@@ -141,7 +138,7 @@ class Supervision:
             return
         self._planner, self._statuses, self._status_at = planner, 0, -math.inf
         if planner and planner != self._path_of:
-            self._have_none(State.NO_PATH)
+            self._have_none(FollowerState.NO_PATH)
             self._path_of = ""
 
     def take_heartbeat(self, now: float) -> None:
@@ -162,7 +159,7 @@ class Supervision:
     def _withdraw(self) -> None:
         """Follow nothing."""
 
-    def _have_none(self, state: State, detail: str = "") -> None:
+    def _have_none(self, state: FollowerState, detail: str = "") -> None:
         """Drop the path."""
         self.has_path, self._no_path = False, (state, detail)
         self._withdraw()
@@ -170,14 +167,14 @@ class Supervision:
     def _supervised(self, drive: Callable[[float], _Result], now: float) -> _Result | None:
         """Return the result of ``drive`` if the robot may drive, else None."""
         self.ahead = ()
-        self.state, self.detail = self._trouble(now) or (State.DRIVING, "")
-        if self.state is not State.DRIVING:
+        self.state, self.detail = self._trouble(now) or (FollowerState.DRIVING, "")
+        if self.state is not FollowerState.DRIVING:
             return None
         try:
             return drive(now)
         except MalformedMessage as error:
             # The rest of the path is malformed.
-            self._have_none(State.BAD_PATH, str(error))
+            self._have_none(FollowerState.BAD_PATH, str(error))
             self.state, self.detail = self._no_path
             return None
 
@@ -186,27 +183,34 @@ class Supervision:
         if self.standby is not None:
             return self.standby
         if not self._planner:
-            return State.NO_DAEMON, "no daemon plans for this robot"
+            return FollowerState.NO_DAEMON, "no daemon plans for this robot"
         if (silent_s := now - self._status_at) > self._patience.status_s:
             sent_any = silent_s < math.inf
-            return State.SILENT_DAEMON, f"for {silent_s:.1f} s" if sent_any else "no status yet"
+            return (
+                FollowerState.SILENT_DAEMON,
+                f"for {silent_s:.1f} s" if sent_any else "no status yet",
+            )
         if not self.has_path:
             return self._no_path
-        if self.held:
-            return State.DOCK, self.held
         return self._trouble_of_poses(now)
 
     def _trouble_of_poses(self, now: float) -> Reason | None:
         if self.pose_fault is not None:
-            return State.BAD_POSE, str(self.pose_fault)
+            return FollowerState.BAD_POSE, str(self.pose_fault)
         if self.newest_pose is None:
-            return State.NO_POSE, "none has come"
+            return FollowerState.NO_POSE, "none has come"
         if (age_s := now - self._pose_at) > self._patience.pose_s:
             why = ", and is repeated with the same stamp" if self._repeats else ""
-            return State.OLD_POSE, f"{age_s:.2f} s{why}"
+            return FollowerState.OLD_POSE, f"{age_s:.2f} s{why}"
         if self.link and (age_s := now - self.link.came_at) > self._patience.link_s:
             link = self.link.transform
-            return State.OLD_POSE, f"{age_s:.2f} s: transform of {link.child!r} in {link.frame!r}"
+            return (
+                FollowerState.OLD_POSE,
+                f"{age_s:.2f} s: transform of {link.child!r} in {link.frame!r}",
+            )
         if self._frame != self.path_frame:
-            return State.WRONG_FRAME, f"pose in {self._frame!r}, path in {self.path_frame!r}"
+            return (
+                FollowerState.WRONG_FRAME,
+                f"pose in {self._frame!r}, path in {self.path_frame!r}",
+            )
         return None

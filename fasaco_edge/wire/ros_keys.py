@@ -182,10 +182,7 @@ Call = Literal["send_goal", "cancel_goal", "get_result"]
 CALLS: Final[tuple[Call, ...]] = ("send_goal", "cancel_goal", "get_result")
 _CANCEL: Final = "action_msgs/srv/CancelGoal"
 
-FOLLOW_PATH: Final = ("nav2_msgs/action/FollowPath",)
-DOCK_ROBOT: Final = ("nav2_msgs/action/DockRobot", "opennav_docking_msgs/action/DockRobot")
-UNDOCK_ROBOT: Final = ("nav2_msgs/action/UndockRobot", "opennav_docking_msgs/action/UndockRobot")
-"""Types of actions, under all names that they have had."""
+_FOLLOW_PATH: Final = "nav2_msgs/action/FollowPath"
 
 Release = Literal["humble", "jazzy", "lyrical"]
 RELEASES: Final[dict[Release, int]] = {"humble": 2, "jazzy": 3, "lyrical": 4}
@@ -211,21 +208,19 @@ def server_tokens(domain: int, action: str) -> str:
     return f"@ros2_lv/{domain}/*/*/*/SS/*/*/*/{mangled(action)}%_action%$*/**"
 
 
-def served_keys(
-    domain: int, action: str, tokens: Iterable[str], types: Iterable[str] = FOLLOW_PATH
-) -> dict[Call, str]:
-    """Return the keys of the services named by tokens, for an action of one of these types."""
-    kinds: dict[Call, set[str]] = {
-        "send_goal": {dds_type(f"{one}_SendGoal") for one in types},
-        "cancel_goal": {dds_type(_CANCEL)},
-        "get_result": {dds_type(f"{one}_GetResult") for one in types},
+def served_keys(domain: int, action: str, tokens: Iterable[str]) -> dict[Call, str]:
+    """Return the keys of the services named by tokens, for an action of type FollowPath."""
+    kinds: dict[Call, str] = {
+        "send_goal": dds_type(f"{_FOLLOW_PATH}_SendGoal"),
+        "cancel_goal": dds_type(_CANCEL),
+        "get_result": dds_type(f"{_FOLLOW_PATH}_GetResult"),
     }
     found = dict[Call, str]()
     for token in sorted(tokens):
         parts = token.split("/")
         name, kind, type_hash = parts[9:12] if len(parts) >= 12 else ("", "", "")
         for call in CALLS:
-            if name == f"{mangled(action)}%_action%{call}" and kind in kinds[call]:
+            if name == f"{mangled(action)}%_action%{call}" and kind == kinds[call]:
                 found[call] = f"{domain}/{action.strip('/')}/_action/{call}/{kind}/{type_hash}"
     return found
 

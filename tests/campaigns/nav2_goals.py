@@ -32,7 +32,7 @@ import fasaco_edge as fe
 from fasaco_edge.cli.follow import NEAR_SHARE
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.follow.nav2 import EARLY_M
-from fasaco_edge.follow.pieces import GAIN_M, TIP_M, Line, end_of_piece
+from fasaco_edge.follow.pieces import GAIN_M, TIP_M, PathByLength, end_of_piece
 from fasaco_edge.grid.geometry import Pose2D
 from tests.follow.nav2_missions import Point, Robot, kind_of, nav2_follower, passed
 from tests.support.driven_base import DrivenBase
@@ -89,7 +89,7 @@ def line_of(length_m: float, seed: int) -> list[Point]:
 
 def forced_s(pauses: list[dict[str, Any]], points: list[Point]) -> float:
     """Return how long the robot was forced to stand between goals [s]."""
-    line, way, forced = Line(Pose2D(x, y) for x, y in points), 0.0, 0.0
+    line, way, forced = PathByLength(Pose2D(x, y) for x, y in points), 0.0, 0.0
     for pause in pauses:
         way, _ = line.nearest(pause["end"], way, line.length(math.inf))
         early_m = max(
@@ -106,7 +106,7 @@ def forced_s(pauses: list[dict[str, Any]], points: list[Point]) -> float:
     return forced
 
 
-def _leads_on(line: Line, end: float, early_m: float) -> bool:
+def _leads_on(line: PathByLength, end: float, early_m: float) -> bool:
     """Return whether a goal that begins so early leads on beyond the end of the last one."""
     return early_m <= end and end_of_piece(line, end - early_m, NEAR_M) >= end + GAIN_M
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.estimate import Command
+from fasaco_edge.follow.estimate import VelocityCommand
 from tests.campaigns.lab.halls import hall
 from tests.campaigns.lab.judge import Ending
 from tests.campaigns.lab.known_floor import FloorAccount
@@ -64,7 +64,7 @@ def test_the_scans_of_its_base_are_those_of_a_lidar():
     # Behind, to the right, ahead, to the left, of 0.5, 0.5; walls begin a pixel off.
     assert ranges[[0, 60, 120, 180, 240]] == pytest.approx([0.5, 0.5, 3.5, 0.5, 0.5], abs=0.05)
     assert np.abs(ranges[[0, 60, 120, 180]] - [0.5, 0.5, 3.5, 0.5]).max() > 0.0005
-    base.command(Command(0.2, 0.0))
+    base.command(VelocityCommand(0.2, 0.0))
     for _ in range(40):
         base.tick()
     assert base.scan()[120] < ranges[120] - 0.05

@@ -395,14 +395,8 @@ def test_ros_is_left_out_unless_it_stands_there(load):
         ("{kind: dds}", "ros2.kind: expected bridge or rmw_zenoh, got 'dds'"),
         ("{kind: bridge, domain: 3}", "domain and node are for kind rmw_zenoh"),
         ("{kind: bridge, node: n}", "domain and node are for kind rmw_zenoh"),
-        (
-            "{kind: bridge, dock: nav2}",
-            "mission.dock: must be given where ros2.dock is nav2, got null",
-        ),
-        (
-            "{kind: bridge, nav2: {dock_action: x}}",
-            "ros2.nav2.dock_action: must be like /dock_robot",
-        ),
+        ("{kind: bridge, dock: nav2}", "ros2.dock: was removed in this version"),
+        ("{kind: bridge, nav2: {action: x}}", "ros2.nav2.action: must be like /follow_path"),
         ("{kind: rmw_zenoh, domain: -1}", "ros2.domain: expected int >= 0, got -1"),
         ("{kind: rmw_zenoh, node: a-b}", "ros2.node: must be letters, digits and _, got 'a-b'"),
         ("{kind: rmw_zenoh, namespace: r}", "ros2.namespace: must be / or like /robot1, got 'r'"),

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from fasaco_edge.follow.estimate import Limits
+from fasaco_edge.follow.estimate import BaseLimits
 from fasaco_edge.follow.follower import Follower
-from fasaco_edge.follow.supervision import State
+from fasaco_edge.follow.supervision import FollowerState
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.simulation.robot import SimulationConfig
@@ -18,7 +18,7 @@ from fasaco_edge.simulation.world import Activity, World
 from fasaco_edge.wire.messages.paths import encode_path
 
 CONFIG = SimulationConfig()
-LIMITS = Limits(
+LIMITS = BaseLimits(
     CONFIG.speed_m_s,
     CONFIG.acceleration_m_s2,
     CONFIG.turn_rad_s,
@@ -49,7 +49,7 @@ class ClosedLoop:
         self.follower.take_planner("a1")
         self.follower.take_heartbeat(0.0)
         self.now = 0.0
-        self.states: Counter[State] = Counter()
+        self.states: Counter[FollowerState] = Counter()
         self.truth_at: list[Pose2D] = []
         self._delay_s, self._jitter_s, self._noise = delay_s, jitter_s, noise
         self._turn_gain, self._late_s, self._left_m = turn_gain, late_s, left_m
@@ -75,7 +75,7 @@ class ClosedLoop:
 
     def drive(self, most_s=600.0):
         """Let it drive its path to the end; return the seconds that took."""
-        return self.run(lambda: self.follower.state is State.DRIVEN, most_s)
+        return self.run(lambda: self.follower.state is FollowerState.DRIVEN, most_s)
 
     def run(self, until, most_s=600.0):
         """Let time pass until ``until()`` holds; return the seconds that took."""

@@ -47,17 +47,12 @@ class Robot:
 
 @contextmanager
 def nav2_follower(
-    folder: Path,
-    endpoint: str,
-    ros2: dict[str, Any],
-    mission: dict[str, Any] | None = None,
-    **robot: Any,
+    folder: Path, endpoint: str, ros2: dict[str, Any], **robot: Any
 ) -> Iterator[Path]:
     """Run ``fasaco-edge follow`` that hands the path to Nav2; yield where it logs."""
     config, log = folder / "follow.yaml", folder / "follow.log"
     sections = {
         "robot": robot,
-        "mission": mission or {},
         "bus": {"mode": "client", "listen": [], "connect": [endpoint]},
         "ros2": {"follow": "nav2", "pose": "geometry_msgs/msg/PoseStamped", **ros2},
     }

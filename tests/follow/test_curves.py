@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.follow.route import CurveRoute
-from fasaco_edge.follow.supervision import State
+from fasaco_edge.follow.supervision import FollowerState
 from fasaco_edge.grid.fine_raster import RobotDiscs
 from fasaco_edge.grid.floor import Floor
 from fasaco_edge.grid.geometry import Pose2D
@@ -105,9 +105,9 @@ def test_it_stands_before_a_path_that_leads_back():
     loop.run(lambda: loop.world.pose.x > 2.0)
     x = loop.world.pose.x
     loop.send([(x + 0.05, 0.35), (x - 1.0, 0.35)], np.full(2, math.pi))
-    loop.run(lambda: loop.follower.state is State.OFF_PATH)
+    loop.run(lambda: loop.follower.state is FollowerState.OFF_PATH)
     loop.wait(5.0)
-    assert loop.follower.state is State.OFF_PATH
+    assert loop.follower.state is FollowerState.OFF_PATH
     assert "cannot steer" in loop.follower.detail
     assert loop.world.pose.x < x + 0.2
     assert abs(loop.world.pose.yaw) < 0.1

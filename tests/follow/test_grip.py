@@ -5,14 +5,14 @@ import random
 
 import pytest
 
-from fasaco_edge.follow.estimate import Command, Limits, PoseEstimate, moved
+from fasaco_edge.follow.estimate import BaseLimits, PoseEstimate, VelocityCommand, moved
 from fasaco_edge.follow.grip import Grip
 from fasaco_edge.grid.geometry import Pose2D
 
 TICK_S = 0.05
 # It executes commands at once.
-LIMITS = Limits(1.0, 1e3, 2.0, 1e3, 0.02)
-AHEAD, SLOWLY, TURNING = Command(0.3), Command(0.05), Command(0.0, 0.8)
+LIMITS = BaseLimits(1.0, 1e3, 2.0, 1e3, 0.02)
+AHEAD, SLOWLY, TURNING = VelocityCommand(0.3), VelocityCommand(0.05), VelocityCommand(0.0, 0.8)
 
 
 class Base:
@@ -40,7 +40,7 @@ class Base:
             is_lost = self.grip.is_lost(self._estimate, 0.0, now)
             self.losses += is_lost and not self._is_lost
             self._is_lost = is_lost
-            command = Command() if is_lost else self._command
+            command = VelocityCommand() if is_lost else self._command
             self._estimate.sent(command, now)
             self.grip.sent(command, TICK_S)
             self.pushed_s += 0.0 if is_lost else TICK_S

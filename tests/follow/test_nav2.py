@@ -6,18 +6,19 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.actions import AskResult, CancelGoal, SendGoal
 from fasaco_edge.follow.nav2 import (
     EARLY_M,
     GIVE_UP_S,
     NO_CODE,
     RETRY_S,
     STANDS_S,
+    AskResult,
+    CancelGoal,
     Nav2Follower,
     SendPiece,
 )
 from fasaco_edge.follow.pieces import TIP_M
-from fasaco_edge.follow.supervision import Patience, State
+from fasaco_edge.follow.supervision import FollowerState, Patience
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire.messages.nav2_goals import (
     ABORTED,
@@ -75,7 +76,7 @@ class Drive:
     def begun(self, x=0.0, y=0.0):
         """Return the first goal, which Nav2 has accepted."""
         (goal,) = self.step(x, y)
-        assert isinstance(goal, SendGoal)
+        assert isinstance(goal, SendPiece)
         self.accept(goal)
         assert self.step(x, y) == [AskResult(goal.id)]
         return goal
@@ -112,7 +113,7 @@ def test_the_next_goal_is_sent_ahead_and_leads_on():
     drive.accept(ahead)
     # What it takes the place of ends as aborted; that is no error.
     drive.end(goal, ABORTED)
-    assert drive.state is State.DRIVING
+    assert drive.state is FollowerState.DRIVING
 
 
 def test_the_one_before_may_end_before_the_next_is_accepted():
@@ -190,7 +191,7 @@ def test_before_a_short_rest_the_next_goal_waits_for_the_end():
     drive.step(2.8)
     drive.end(back, SUCCEEDED)
     assert drive.step(2.8) == []
-    assert drive.state is State.DRIVEN
+    assert drive.state is FollowerState.DRIVEN
 
 
 def test_a_goal_that_is_done_too_early_is_not_believed():
@@ -199,7 +200,7 @@ def test_a_goal_that_is_done_too_early_is_not_believed():
     drive.step(0.2)
     drive.end(goal, SUCCEEDED)
     assert drive.step(0.2) == []
-    assert drive.state is State.GIVEN_UP
+    assert drive.state is FollowerState.GIVEN_UP
     assert "reported as done 7.8 m before the end" in drive.follower.detail
     (again,) = drive.step(0.2, after=RETRY_S)
     assert again.points[0][0] == pytest.approx(0.2)
@@ -213,7 +214,7 @@ def test_errors_of_goals_are_named(code, said):
     goal = drive.begun()
     drive.end(goal, ABORTED, code)
     assert drive.step(0.0) == []
-    assert drive.state is State.GIVEN_UP
+    assert drive.state is FollowerState.GIVEN_UP
     assert drive.follower.detail == said
 
 
@@ -225,7 +226,7 @@ def test_a_goal_cancelled_by_others_stays_cancelled(goes_on):
     for number in range(20):
         drive.path((0.0, 0.0), (8.0, 0.01 * number))
         assert drive.step(0.0) == []
-        assert drive.state is State.CANCELED
+        assert drive.state is FollowerState.CANCELED
     if goes_on == "withdrawn":
         drive.path()
         drive.step(0.0)
@@ -233,7 +234,7 @@ def test_a_goal_cancelled_by_others_stays_cancelled(goes_on):
     elif goes_on == "elsewhere":
         drive.path((0.0, 0.0), (0.0, 8.0))
     (goal,) = drive.step(0.6 if goes_on == "moved" else 0.0)
-    assert isinstance(goal, SendGoal)
+    assert isinstance(goal, SendPiece)
 
 
 def test_a_new_path_the_same_way_does_not_shorten_the_pause():
@@ -242,7 +243,7 @@ def test_a_new_path_the_same_way_does_not_shorten_the_pause():
     for number in range(300):
         drive.path((0.0, 0.0), (8.0, 0.001 * number))
         for request in drive.step(0.0):
-            if isinstance(request, SendGoal):
+            if isinstance(request, SendPiece):
                 sent.append(drive.now)
                 drive.accept(request)
                 drive.end(request, ABORTED, 105)
@@ -250,7 +251,7 @@ def test_a_new_path_the_same_way_does_not_shorten_the_pause():
     assert pauses == pytest.approx([1.0, 2.0, 4.0, 8.0], abs=0.15)
     drive.path((0.0, 0.0), (0.0, 8.0))
     (goal,) = drive.step(0.0)
-    assert isinstance(goal, SendGoal)
+    assert isinstance(goal, SendPiece)
 
 
 def test_replaced_goals_do_not_extend_a_blocked_robots_tries():
@@ -259,13 +260,13 @@ def test_replaced_goals_do_not_extend_a_blocked_robots_tries():
     while canceled_at is None and drive.now < 3 * GIVE_UP_S:
         drive.path((0.0, 0.0), (8.0, 0.5 * (round(drive.now / 2.0) % 2)))
         for request in drive.step(0.0):
-            if isinstance(request, SendGoal):
+            if isinstance(request, SendPiece):
                 drive.accept(request)
             elif isinstance(request, CancelGoal):
                 canceled_at = drive.now
     assert canceled_at == pytest.approx(GIVE_UP_S, abs=1.0)
     drive.step(0.0)
-    assert drive.state is State.GIVEN_UP
+    assert drive.state is FollowerState.GIVEN_UP
 
 
 def accepted(value, why=""):
@@ -276,9 +277,14 @@ def accepted(value, why=""):
     ("answer", "state", "said", "cancels"),
     [
         # Nav2 may have taken it, and drive.
-        (accepted(None, "no answer"), State.NO_NAV2, "no answer", True),
-        (accepted(False), State.REFUSED, "is its controller server active?", False),
-        (lambda f, goal_id: f.take_unsent(goal_id, "none", 0.0), State.NO_NAV2, "none", False),
+        (accepted(None, "no answer"), FollowerState.NO_NAV2, "no answer", True),
+        (accepted(False), FollowerState.REFUSED, "is its controller server active?", False),
+        (
+            lambda f, goal_id: f.take_unsent(goal_id, "none", 0.0),
+            FollowerState.NO_NAV2,
+            "none",
+            False,
+        ),
     ],
 )
 def test_a_goal_that_is_not_taken_is_another_goal_later(answer, state, said, cancels):
@@ -288,7 +294,7 @@ def test_a_goal_that_is_not_taken_is_another_goal_later(answer, state, said, can
     assert drive.step(0.0) == ([CancelGoal(goal.id)] if cancels else [])
     assert (drive.state, drive.follower.detail) == (state, said)
     (again,) = drive.step(0.0, after=RETRY_S)
-    assert isinstance(again, SendGoal)
+    assert isinstance(again, SendPiece)
     assert again.id != goal.id
 
 
@@ -300,9 +306,9 @@ def test_a_restarted_server_gets_the_goal_again(ending):
     drive.follower.take_ending(goal.id, ending, "went away", drive.now)
     # It may be the way to it that is lost: then it drives on.
     assert drive.step(1.0) == ([CancelGoal(goal.id)] if ending is NO_ANSWER else [])
-    assert drive.state is State.NO_NAV2
+    assert drive.state is FollowerState.NO_NAV2
     again = drive.step(1.0, after=RETRY_S)[0]
-    assert isinstance(again, SendGoal)
+    assert isinstance(again, SendPiece)
     assert again.points[0][0] == pytest.approx(1.0)
 
 
@@ -314,7 +320,7 @@ def test_a_driven_goal_counts_as_accepted_if_the_answer_was_lost():
     drive.follower.take_accepted(goal.id, None, "did not answer", drive.now)
     # It is neither canceled nor sent again from where the robot was.
     assert drive.step(3.0) == []
-    assert drive.state is State.DRIVING
+    assert drive.state is FollowerState.DRIVING
     drive.end(goal, ABORTED, 105)
     drive.step(3.0)
     (again,) = drive.step(3.0, after=RETRY_S + 0.1)
@@ -328,7 +334,7 @@ def test_a_driven_short_goal_ends_though_its_answer_was_lost():
     assert asked == [AskResult(goal.id)]
     drive.end(goal, SUCCEEDED)
     assert drive.step(0.4) == []
-    assert drive.state is State.DRIVEN
+    assert drive.state is FollowerState.DRIVEN
 
 
 def test_a_path_that_is_the_same_ahead_changes_no_goal():
@@ -352,7 +358,7 @@ def test_a_path_that_is_another_one_ahead_replaces_the_goal(turn):
     drive.step(1.0)
     drive.path((0.9, 0.0), (turn, 0.0), (turn, 3.0))
     (goal,) = drive.step(1.1)
-    assert isinstance(goal, SendGoal)
+    assert isinstance(goal, SendPiece)
     assert goal.points[0] == (pytest.approx(1.1), 0.0)
     assert goal.points[-1] == (turn, 3.0)
 
@@ -362,7 +368,7 @@ def test_a_path_that_begins_elsewhere_is_not_driven():
     goal = drive.begun()
     drive.path((0.0, 5.0), (8.0, 5.0))
     assert drive.step(0.0) == [CancelGoal(goal.id)]
-    assert drive.state is State.PATH_ELSEWHERE
+    assert drive.state is FollowerState.PATH_ELSEWHERE
 
 
 @pytest.mark.parametrize("answered", [True, False])
@@ -371,7 +377,7 @@ def test_an_empty_path_cancels_what_there_is_and_so_does_the_end(answered):
     goal = drive.begun() if answered else drive.step(0.0)[0]
     drive.path()
     assert drive.step(0.1) == [CancelGoal(goal.id)]
-    assert drive.state is State.EMPTY_PATH
+    assert drive.state is FollowerState.EMPTY_PATH
     assert drive.step(0.1, after=1.0) == []
     drive.path(*LONG)
     (again,) = drive.step(0.1)
@@ -383,7 +389,7 @@ def test_an_old_pose_cancels_the_goal_and_a_new_one_resends_it():
     goal = drive.begun()
     drive.now += 1.0
     assert drive.follower.step(drive.now) == [CancelGoal(goal.id)]
-    assert drive.state is State.OLD_POSE
+    assert drive.state is FollowerState.OLD_POSE
     (again,) = drive.step(0.3)
     assert again.points[0][0] == pytest.approx(0.3)
 
@@ -402,7 +408,7 @@ def test_a_controller_that_stands_is_asked_and_then_given_up(noise_m):
     # The result may have been lost.
     assert requests.count(AskResult) >= 4
     assert requests.count(CancelGoal) >= 1
-    assert {State.STANDS, State.GIVEN_UP} <= said
+    assert {FollowerState.STANDS, FollowerState.GIVEN_UP} <= said
     assert requests.count(SendPiece) == 1
 
 

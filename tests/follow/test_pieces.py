@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fasaco_edge.follow.pieces import APART, LEAST_M, MOST_M, STEP_M, Line, end_of_piece
+from fasaco_edge.follow.pieces import APART, LEAST_M, MOST_M, STEP_M, PathByLength, end_of_piece
 from fasaco_edge.grid.geometry import Pose2D
 
 NEAR = 0.225
 
 
 def line_of(*points):
-    return Line(Pose2D(x, y) for x, y in points)
+    return PathByLength(Pose2D(x, y) for x, y in points)
 
 
 def pieces_of(line, near=NEAR):
@@ -64,20 +64,6 @@ def test_lanes_beside_each_other_are_one_piece():
     lanes = [(0.0, 0.0), (4.0, 0.0), (4.0, 0.276), (0.0, 0.276), (0.0, 0.552), (4.0, 0.552)]
     line = line_of(*lanes)
     assert pieces_of(line) == [(0.0, pytest.approx(12.552))]
-
-
-def test_the_way_back_over_a_lane_is_a_piece_of_its_own():
-    line = line_of((0.0, 0.0), (3.0, 0.0), (0.0, 0.0))
-    assert pieces_of(line) == [(0.0, 3.0), (3.0, 6.0)]
-
-
-def test_a_crossing_ends_a_piece_before_it():
-    line = line_of((0.0, 0.0), (4.0, 0.0), (4.0, 2.0), (2.0, 2.0), (2.0, -2.0))
-    (_, end), (start, _) = pieces_of(line)
-    assert start == end
-    x, y = line.at(end)
-    assert x == 2.0
-    assert NEAR <= y <= NEAR + 2 * STEP_M
 
 
 def test_a_piece_that_begins_later_may_be_longer():

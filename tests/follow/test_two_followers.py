@@ -9,7 +9,7 @@ import pytest
 
 from fasaco_edge.bus import access
 from fasaco_edge.follow.daemons import NO_RIGHT
-from fasaco_edge.follow.estimate import Command
+from fasaco_edge.follow.estimate import VelocityCommand
 from fasaco_edge.wire import topics
 from tests.campaigns.fault_links import Link
 from tests.follow.test_process import AHEAD, config_file
@@ -61,7 +61,7 @@ def test_the_second_waits_in_silence_and_takes_over(base, tmp_path, ends, ros2):
             until(lambda: standing(base) == ["drives"])
             until(lambda: "this one drives" in second_log.read_text())
             base.wait_until_it_moves()
-    assert base.heard[-1][1] == Command()
+    assert base.heard[-1][1] == VelocityCommand()
     assert "Traceback" not in first_log.read_text() + second_log.read_text()
 
 

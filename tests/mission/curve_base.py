@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fasaco_edge.daemon.loop.outbox import headings
-from fasaco_edge.follow.supervision import State as Following
+from fasaco_edge.follow.supervision import FollowerState
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.config import MissionConfig, MissionPolicy, Sweeping
@@ -87,5 +87,5 @@ class CurvedMission:
         return {
             state: count * 0.05
             for state, count in self.loop.states.items()
-            if state not in (Following.DRIVING, Following.DRIVEN, Following.NO_PATH)
+            if state not in (FollowerState.DRIVING, FollowerState.DRIVEN, FollowerState.NO_PATH)
         }

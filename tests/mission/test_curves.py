@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.supervision import State as Following
+from fasaco_edge.follow.supervision import FollowerState
 from fasaco_edge.grid.fine_raster import map_to_raster, raster_to_map
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.judge.driven_line import ArcBends
@@ -47,7 +47,7 @@ def judged(run):
 def test_a_mission_sweeps_a_room_without_a_turn_on_the_spot(driven):
     assert driven.mission.state is State.DONE
     assert driven.loop.world.collisions == 0
-    assert set(driven.standing_s) <= {Following.EMPTY_PATH}
+    assert set(driven.standing_s) <= {FollowerState.EMPTY_PATH}
     assert judged(driven).figures.swept_share > 0.94
     hull = SweepingRobot(TOOL_M, CONFIG.hull_radius_m)
     assert judge_floor(SWEPT_ROOM, driven.loop.trail, hull).figures.illegal_share == 0.0

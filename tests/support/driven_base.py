@@ -22,7 +22,7 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus, open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.follow.estimate import Command, moved
+from fasaco_edge.follow.estimate import VelocityCommand, moved
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -49,7 +49,7 @@ class DrivenBase:
         self.keys = Keys()
         self.bus = open_bus(BusSettings("router", (), (self.endpoint,), secured or {}))
         # The velocities received, each with its time [s, monotonic].
-        self.heard: list[tuple[float, Command]] = []
+        self.heard: list[tuple[float, VelocityCommand]] = []
         self.pose = Pose2D(0.0, 0.0)
         self.frame = "map"
         # The state that the daemon reports, and its Zenoh id.
@@ -102,7 +102,7 @@ class DrivenBase:
         self._pose.put(payload)
         return time.monotonic()
 
-    def newest(self) -> Command | None:
+    def newest(self) -> VelocityCommand | None:
         """Return the newest velocity of the last 0.2 s."""
         if self.heard and time.monotonic() - self.heard[-1][0] < 0.2:
             return self.heard[-1][1]
@@ -121,10 +121,12 @@ class DrivenBase:
         while True:
             time.sleep(max(until - time.monotonic(), 0.01))
             later = [(at, command) for at, command in list(self.heard) if at >= since]
-            stands = [at for at, command in later if command == Command()]
+            stands = [at for at, command in later if command == VelocityCommand()]
             if stands or time.monotonic() > since + LONGEST_S:
                 break
-        if not stands or any(command != Command() for at, command in later if at > stands[0]):
+        if not stands or any(
+            command != VelocityCommand() for at, command in later if at > stands[0]
+        ):
             return math.inf
         return stands[0] - since
 
@@ -136,13 +138,15 @@ class DrivenBase:
 
     def _hear(self, sample: Sample) -> None:
         velocity = decode_velocity(sample.payload, sample.schema or TWIST)
-        self.heard.append((time.monotonic(), Command(velocity.speed_m_s, velocity.turn_rad_s)))
+        self.heard.append(
+            (time.monotonic(), VelocityCommand(velocity.speed_m_s, velocity.turn_rad_s))
+        )
 
     def _move(self) -> None:
         told = 0.0
         while not self._stop.wait(POSE_S):
             newest = self.newest()
-            self.pose = moved(self.pose, newest or Command(), POSE_S)
+            self.pose = moved(self.pose, newest or VelocityCommand(), POSE_S)
             now = time.monotonic()
             if self.says_poses:
                 stamped = StampedPose(self.pose, self.frame, time.time_ns())

@@ -19,7 +19,6 @@ import time
 from collections import deque
 from typing import Any
 
-from tests.support.dock_server import DockingServer
 from tests.support.nav2_server import (
     ABORTED,
     CANCELED,
@@ -64,7 +63,6 @@ class Nav2Robot:
         self.counts = {"goals": 0, "preempted": 0, "canceled": 0}
         self._random = random.Random(wanted.get("seed", 0))
         self._server = self._serve()
-        self._docks = DockingServer(self, wanted, self._faults()) if "dock" in wanted else None
         self._path: list[tuple[float, float]] = []
         # Heading of the goal, and whether the robot has reached its position.
         self._end_yaw, self._is_there = 0.0, False
@@ -92,8 +90,6 @@ class Nav2Robot:
                 next_restart = self._after("restart_every_s")
                 self._restart()
             self._tick(dt, now, abort=abort)
-            if self._docks is not None:
-                self._docks.tick(dt)
             count += 1
             if count % 2 == 0:
                 self._publish()
@@ -128,8 +124,6 @@ class Nav2Robot:
         for name, count in self._server.counts.items():
             self.counts[name] += count
         self._server.close()
-        if self._docks is not None:
-            self.refused += self._docks.close()
 
     def _tick(self, dt: float, now: float, *, abort: bool) -> None:
         """One cycle of ControllerServer::computeControl."""
@@ -266,11 +260,7 @@ def main() -> None:
     thread.join()
     names = ("x", "y", "driven_m", "driving_s", "standing_s", "errors", "restarts", "refused")
     names += ("counts", "trail", "pauses")
-    docked = robot._docks.log if robot._docks is not None else []
-    print(
-        json.dumps({"docking": docked, **{name: getattr(robot, name) for name in names}}),
-        flush=True,
-    )
+    print(json.dumps({name: getattr(robot, name) for name in names}), flush=True)
 
 
 if __name__ == "__main__":

@@ -56,18 +56,12 @@ RESULT_KEPT_S = 10.0
 def store_of(release: str) -> Any:
     """Return rosbags' types, including those of the action."""
     names = "".join(f"string {name}\n" for name in PATH_IDS[release])
-    result = f"std_msgs/Empty result\n{RESULTS[release]}"
-    return action_store(f"nav_msgs/Path path\n{names}", result)
-
-
-def action_store(goal: str, result: str) -> Any:
-    """Return rosbags' types, including those of an action with these members of goal and result."""
     store = get_typestore(Stores.ROS2_JAZZY)
     definitions = {
-        "Send": f"unique_identifier_msgs/UUID goal_id\n{goal}",
+        "Send": f"unique_identifier_msgs/UUID goal_id\nnav_msgs/Path path\n{names}",
         "Sent": "bool accepted\nbuiltin_interfaces/Time stamp\n",
         "Ask": "unique_identifier_msgs/UUID goal_id\n",
-        "Ended": f"int8 status\n{result}",
+        "Ended": f"int8 status\nstd_msgs/Empty result\n{RESULTS[release]}",
         "Cancel": "action_msgs/GoalInfo goal_info\n",
         "Canceled": "int8 return_code\naction_msgs/GoalInfo[] goals_canceling\n",
     }
@@ -103,14 +97,12 @@ class Handle:
 
 
 class ActionServer:
-    """The services of ``follow_path``, and the present goal; subclasses serve other actions."""
-
-    node = "controller_server"
+    """The services of ``follow_path``, and the present goal."""
 
     def __init__(
         self, endpoint: str, domain: int | None, release: str, faults: Faults, action: str
     ) -> None:
-        self.store = self.store_of(release)
+        self.store = store_of(release)
         self.release = release
         self.lock = threading.RLock()
         self.current: Handle | None = None
@@ -127,13 +119,13 @@ class ActionServer:
         session_id = str(self._session.zid())
         mangled = action.replace("/", "%")
         for number, ((call, kind), type_hash) in enumerate(
-            zip(*self.services(release), strict=True), start=1
+            zip(TYPES, HASHES[release], strict=True), start=1
         ):
             key = f"{action.strip('/')}/_action/{call}"
             if domain is not None:
                 key = f"{domain}/{key}/{kind}/{type_hash}"
                 token = (
-                    f"@ros2_lv/{domain}/{session_id}/0/{number}/SS/%/%/{self.node}/"
+                    f"@ros2_lv/{domain}/{session_id}/0/{number}/SS/%/%/controller_server/"
                     f"{mangled}%_action%{call}/{kind}/{type_hash}/::,10:,:,:,,"
                 )
                 self._declared.append(self._session.liveliness().declare_token(token))
@@ -144,14 +136,6 @@ class ActionServer:
                     complete=True,
                 )
             )  # fmt: skip
-
-    def store_of(self, release: str) -> Any:
-        """Return the types."""
-        return store_of(release)
-
-    def services(self, release: str) -> tuple[Any, Any]:
-        """Return the calls with their types, and the type hashes."""
-        return TYPES, HASHES[release]
 
     def close(self) -> None:
         """Close, as a process does when it ends; goals are lost."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -17,9 +18,8 @@ from fasaco_edge.bus.publisher import Publisher
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.errors import FasacoError, FleetError
-from fasaco_edge.fleet.daemon.arrivals import FleetArrivals
-from fasaco_edge.fleet.mission.frames import FleetFrames
-from fasaco_edge.fleet.mission.kind import FleetKind, fleet_of, giving_way_of
+from fasaco_edge.fleet.mission.frames import MOST_OTHERS, FleetFrames
+from fasaco_edge.fleet.mission.kind import FleetKind, giving_way_of, layer_of
 from fasaco_edge.fleet.mission.message import Messages, waits_for
 from fasaco_edge.fleet.mission.shared import MapPlace
 from fasaco_edge.fleet.mission.tiles import Placed
@@ -31,10 +31,12 @@ from fasaco_edge.wire.documents.fleet import (
     FleetMember,
     FleetPart,
     decode_member,
+    fleet_of,
 )
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.status import FleetReport, MemberReport
-from fasaco_edge.wire.limits import MAX_FLEET_POINTS
+from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.limits import MAX_FLEET_POINTS, MAX_JSON_BYTES
 from fasaco_edge.wire.topics import FLEET
 
 if TYPE_CHECKING:
@@ -45,6 +47,13 @@ PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
 # Limit on the tiles of progress, and on those of ground, in a periodic message (once a second) and
 # in a message on a change. A robot sends 20 kB/s, and up to 27 kB/s after a change of the epoch.
 TILES, FEW_TILES = 10, 2
+# Members that the document of a robot and the event of it have in common.
+ALIKE = ("state", "x", "y", "step_s", "epoch", "division", "by", "radius_m", "waits_for")
+
+# Least time between two messages of a robot [s].
+LEAST_SPACING_S = 0.2
+# A robot silent for this long makes room for another [s].
+FORGOTTEN_S = 60.0
 
 
 def kind_of(config: DaemonConfig) -> FleetKind:
@@ -53,6 +62,80 @@ def kind_of(config: DaemonConfig) -> FleetKind:
     assert fleet
     place = MapPlace(_origin(fleet), fleet.map_frame) if fleet.frame else None
     return FleetKind(config.robot.name, place)
+
+
+class FleetArrivals:
+    """Filter and rate limit of other robots' messages by key; runs on a Zenoh thread.
+
+    All fleets under one ``bus.base`` publish on the same keys; other publishers can, too. Robots of
+    this fleet and other publishers are tracked separately, each up to a limited number.
+
+    Args:
+        keys: of this robot.
+        fleet: name of its fleet.
+    """
+
+    def __init__(self, keys: Keys, fleet: str) -> None:
+        self._keys, self._fleet = keys, fleet
+        # Time of each key's last message [s], oldest first: robots of this fleet; other publishers.
+        self._received_at: dict[str, float] = {}
+        self._strange_at: dict[str, float] = {}
+        # The loop gets some messages whose fleet is unreadable, to report the fault: time of the
+        # last [s].
+        self._unreadable_at = float("-inf")
+        self._has_refused = False
+        self._faults = deque[FasacoError](maxlen=1)
+
+    def is_due(self, sample: Sample, now: float) -> bool:
+        """Return whether the loop gets a message; ``now`` is monotonic time [s]."""
+        key, spaced = sample.key, now - LEAST_SPACING_S
+        if self._keys.robot_of(key) in ("", self._keys.robot):
+            return False
+        if max(_time(self._received_at, key), _time(self._strange_at, key)) > spaced:
+            return False
+        fleet = fleet_of(sample.payload) if sample.size <= MAX_JSON_BYTES else None
+        is_mate = fleet == self._fleet
+        if key in self._received_at and (is_mate or fleet is None):
+            _note(self._received_at, key, now)
+            return True
+        if is_mate:
+            return self._has_place(key, now)
+        if len(self._strange_at) >= MOST_OTHERS and key not in self._strange_at:
+            del self._strange_at[next(iter(self._strange_at))]
+        _note(self._strange_at, key, now)
+        if fleet is not None or self._unreadable_at > spaced:
+            return False
+        self._unreadable_at = now
+        return True
+
+    def take_faults(self) -> list[FasacoError]:
+        """Return the faults since the last call; on the loop's thread."""
+        return [self._faults.popleft() for _ in range(len(self._faults))]
+
+    def _has_place(self, key: str, now: float) -> bool:
+        """Track another robot of this fleet if there is a free place; return whether there is."""
+        if len(self._received_at) >= MOST_OTHERS:
+            oldest = next(iter(self._received_at))
+            if now - self._received_at[oldest] < FORGOTTEN_S:
+                if not self._has_refused:
+                    self._has_refused = True
+                    text = f"at most {MOST_OTHERS} others of fleet {self._fleet!r} are kept"
+                    self._faults.append(FleetError(f"{self._keys.robot_of(key)}: {text}"))
+                return False
+            del self._received_at[oldest]
+        self._strange_at.pop(key, None)
+        self._has_refused = False
+        _note(self._received_at, key, now)
+        return True
+
+
+def _time(times: dict[str, float], key: str) -> float:
+    return times.get(key, float("-inf"))
+
+
+def _note(times: dict[str, float], key: str, now: float) -> None:
+    times.pop(key, None)
+    times[key] = now
 
 
 class FleetReceiver:
@@ -112,23 +195,15 @@ class FleetReceiver:
             robot=robot,
             misfit=misfit,
             frame=member.frame,
-            state=member.state,
-            x=member.x,
-            y=member.y,
-            step_s=member.step_s,
-            epoch=member.epoch,
-            division=member.division,
             tiles=_placed(member.swept),
             ground=_placed(member.ground),
-            by=member.by,
             parts=tuple(
                 Part(part.robot, (part.row, part.col), part.handicap_s, part.step_s)
                 for part in member.parts
             ),
-            radius_m=member.radius_m,
             ahead=member.ahead,
-            waits_for=member.waits_for,
             kept=None if member.kept is None else _placed(member.kept),
+            **{name: getattr(member, name) for name in ALIKE},
         )
         if self._frames is None or misfit:
             return received
@@ -166,8 +241,8 @@ class FleetSender:
         """Publish a message if due; the caller catches failures."""
         if now - self._sent_at < LEAST_PERIOD_S:
             return
-        others, giving_way = fleet_of(mission), giving_way_of(mission)
-        key = mission.state, others.numbers.number, others.shared.epoch, waits_for(mission)
+        layer, giving_way = layer_of(mission), giving_way_of(mission)
+        key = mission.state, layer.numbers.number, layer.others.shared.epoch, waits_for(mission)
         is_news, is_due = key != self._sent, now - self._periodic_at >= PERIOD_S
         if not (is_news or is_due or giving_way.is_near):
             return
@@ -184,32 +259,24 @@ class FleetSender:
             cell_m=self._cell_m,
             lattice_deg=mission.rotation.deg,
             frame=self._frame_sent(mission),
-            state=message.state,
-            x=message.x,
-            y=message.y,
-            step_s=message.step_s,
-            epoch=message.epoch,
-            division=message.division,
             open_cells=mission.orders.cells.left(),
             swept=_tiles(message.tiles),
             ground=_tiles(message.ground),
-            by=message.by,
             parts=tuple(
                 FleetPart(part.robot, *part.seed, part.handicap_s, part.step_s)
                 for part in message.parts
             ),
-            radius_m=message.radius_m,
             ahead=tuple((round(x, 3), round(y, 3)) for x, y in _thinned(message.ahead)),
-            waits_for=message.waits_for,
             origin=self._origin,
             kept=None if message.kept is None else _tiles(message.kept),
+            **{name: getattr(message, name) for name in ALIKE},
         )
         self._publisher.put(encode_json(member))
 
     def _frame_sent(self, mission: Mission) -> str:
         """Return the fleet's frame; the map's own frame while its pose in the fleet is unknown."""
         frame = mission.ledger.frame
-        if not fleet_of(mission).shared.why_misplaced(frame):
+        if not layer_of(mission).others.shared.why_misplaced(frame):
             return self._frame or frame
         # Other robots must not mistake the map's frame for the fleet's.
         return frame if self._frame not in ("", frame) else f"{frame} of another map"
@@ -246,15 +313,15 @@ def report(fleet: str, mission: Mission | None, now: float) -> FleetReport:
     """Return the report of the fleet of this name at ``now`` [s]."""
     if mission is None:
         return FleetReport(fleet)
-    others = fleet_of(mission)
+    layer = layer_of(mission)
     members = tuple(
         MemberReport(
             name,
             member.newest.state,
             round(max(now - member.received_at, 0.0), 1),
             member.absence(now) or None,
-            others.shared.cells_of(name),
+            layer.others.shared.cells_of(name),
         )
-        for name, member in sorted(others.members.items())
+        for name, member in sorted(layer.others.known.items())
     )
-    return FleetReport(fleet, others.numbers.number, others.part_cells(), members)
+    return FleetReport(fleet, layer.numbers.number, layer.part_cells(), members)

@@ -100,7 +100,6 @@ class ResampledTiles:
         return [(row, col) for row in rows for col in cols]
 
     def _make(self, place: tuple[int, int]) -> bytes:
-        """Return the bits of one of this lattice's tiles."""
         y, x = np.mgrid[:TILE, :TILE] + 0.5
         x += place[1] * TILE - self._shift[0]
         y += place[0] * TILE - self._shift[1]

@@ -256,7 +256,6 @@ class GivingWay(Waiting):
         return 1 <= len(area.shortest_path(ends[0], ends[1])) <= 2
 
     def _obstruction(self, here: tuple[float, float], now: float) -> Obstruction | None:
-        """Return the robot's obstruction; None if there is none."""
         line, pace_s_m, others = self.line(), self._fleet.step_s / self._cell_m, self._neighbours
         found = obstruction(
             self._robot, self._radius_m, pace_s_m, spaced(line), others, self.waits_for

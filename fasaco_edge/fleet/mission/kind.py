@@ -56,7 +56,7 @@ class FleetKind(CompanyKind):
         return GivingWay(self.robot, config.footprint, map_state, orders, route, company)
 
 
-def fleet_of(mission: Mission) -> FleetLayer:
+def layer_of(mission: Mission) -> FleetLayer:
     """Return the other robots of a mission, which must be of ``FleetKind``."""
     assert isinstance(mission.company, FleetLayer)
     return mission.company

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.fleet.mission.division import Division, Robot, divide
-from fasaco_edge.fleet.mission.ground import viewpoint
-from fasaco_edge.fleet.mission.members import Member, Members
-from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, SharedProgress
-from fasaco_edge.fleet.mission.shared_work import AtWork, DivisionNumbers, Remainder
+from fasaco_edge.fleet.mission.members import Members
+from fasaco_edge.fleet.mission.shared import MOST_ROBOTS
+from fasaco_edge.fleet.mission.shared_ground import viewpoint
+from fasaco_edge.fleet.mission.shared_work import DivisionNumbers, Remainder
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
@@ -60,7 +60,6 @@ class FleetLayer(Company):
         self.others = Members(robot, ledger, cell_m)
         self.numbers = DivisionNumbers(robot, self.others)
         self._robot, self.step_s = robot, cost.step_s
-        self._at_work = AtWork(self.others, self.numbers)
         self._turn_steps = cost.quarter_turn_s / cost.step_s
         self._map, self._ledger = map_state, ledger
         self._division: Division | None = None
@@ -98,16 +97,6 @@ class FleetLayer(Company):
         return bool(self.others.known)
 
     @property
-    def shared(self) -> SharedProgress:
-        """The cells that the others have swept."""
-        return self.others.shared
-
-    @property
-    def members(self) -> dict[str, Member]:
-        """The other robots, by name."""
-        return self.others.known
-
-    @property
     def has_company(self) -> bool:
         """Whether other robots are at work on the remaining area."""
         return self._division is not None
@@ -126,7 +115,7 @@ class FleetLayer(Company):
         First for cells of this robot's part, then for any cells beyond doors that others show open.
         """
         area, division = self._map.area, self._division
-        if area is None or not self.members:
+        if area is None or not self.others.known:
             return
         if division is not None:
             joint, left = self._left(open_cells, area)
@@ -206,7 +195,7 @@ class FleetLayer(Company):
         area = self._map.area
         if silent := self.others.forget_silent(now):
             return f"{silent} is silent: only the map shows whether it stands in the way"
-        if area is None or not self.members:
+        if area is None or not self.others.known:
             return ""
         if not (at_once or now - self._looked_at >= LOOK_S):
             return self._why_by_taken()
@@ -214,7 +203,7 @@ class FleetLayer(Company):
         (joint, left), before = self._left(open_cells, area), self._division
         inside = area.lattice.window.slices_in(joint.lattice.window)
         own = left if before is None else left & self._of_me(before, joint)
-        at_work = [one.newest for one in self.members.values() if not one.absence(now)]
+        at_work = [one.newest for one in self.others.known.values() if not one.absence(now)]
         self._remainder.note_others(now, wait=all(other.waits_for for other in at_work))
         swept = self._ledger.shared.swept(joint.lattice.window) & joint.reachable
         swept_cells = int(np.count_nonzero(swept))
@@ -226,11 +215,11 @@ class FleetLayer(Company):
         else:
             robots = [
                 Robot(self._robot, cell, self.step_s),
-                *self._at_work.in_reach(joint, now),
+                *self.numbers.in_reach(joint, now),
             ]
             if not (why := self._why_anew(joint, left, robots, now, at_once=at_once)):
                 return self._why_by_taken()
-            robots += self._at_work.unseen(before, joint.lattice, robots, self._divided_at, now)
+            robots += self.numbers.unseen(before, joint.lattice, robots, self._divided_at, now)
             # Other robots refuse messages with more parts.
             robots = robots[: MOST_ROBOTS + 1]
             divided = divide(joint.lattice, left, robots, before, self._turn_steps)
@@ -258,7 +247,6 @@ class FleetLayer(Company):
     def _why_anew(
         self, joint: ReachableArea, left: Mask, robots: list[Robot], now: float, *, at_once: bool
     ) -> str:
-        """Return why to divide again, or ""."""
         division = self._division
         names = {robot.name for robot in robots}
         known = set() if division is None else set(division.names)
@@ -267,7 +255,7 @@ class FleetLayer(Company):
         gone = sorted(
             name
             for name in known - names - {self._robot}
-            if self._at_work.is_gone(name, self._divided_at, now)
+            if self.numbers.is_gone(name, self._divided_at, now)
         )
         if gone:
             if now - self._divided_at < EVEN_S:
@@ -277,7 +265,7 @@ class FleetLayer(Company):
             return ""
         # A robot that leaves and returns repeatedly would change all paths each time.
         new = names - known - {self._robot}
-        if more := sorted(name for name in new if now - self.members[name].left_at >= EVEN_S):
+        if more := sorted(name for name in new if now - self.others.known[name].left_at >= EVEN_S):
             return f"shared with {', '.join(more)}"
         return "" if division is None else self._why_by_parts(division, joint, left, names, now)
 
@@ -309,12 +297,10 @@ class FleetLayer(Company):
         return carried(self._tried[1], self._tried[0], area.lattice.window)
 
     def _is_own(self, division: Division, area: ReachableArea) -> Mask:
-        """Return which cells of this robot's area are in its part."""
         joint = self._joint(area)
         return self._of_me(division, joint)[area.lattice.window.slices_in(joint.lattice.window)]
 
     def _of_me(self, division: Division, joint: ReachableArea) -> Mask:
-        """Return which cells of a joint area are in this robot's part."""
         mine = division.names.index(self._robot)
         return np.equal(self._owners_on(division, joint), mine)
 

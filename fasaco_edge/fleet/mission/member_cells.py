@@ -6,19 +6,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 import msgspec
-import numpy as np
 from msgspec import Meta
 
-from fasaco_edge.fleet.mission.tiles import TILE_BYTES, Bits, bits_of
+from fasaco_edge.fleet.mission.tiles import TILE_BYTES, Bits, bits_of, cells_in
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.events import SAME_LATTICE
 
 if TYPE_CHECKING:
     # For types only: a daemon announces itself to its fleet before the kernels are loaded.
     from fasaco_edge.grid.lattice import Cell
-
-# Number of bits set in each byte value.
-_ONES = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1).sum(axis=1)
 
 Tiles = dict["Cell", Bits]
 
@@ -58,8 +54,7 @@ class MemberCells:
     @property
     def count(self) -> int:
         """Number of cells that count."""
-        counted = [self.counted(place) for place in self.tiles]
-        return int(_ONES[np.concatenate(counted)].sum()) if counted else 0
+        return sum(cells_in(self.counted(place)) for place in self.tiles)
 
     def counted(self, place: Cell) -> Bits:
         """Return the bits of a tile that count."""

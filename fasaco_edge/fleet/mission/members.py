@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.errors import FleetError
-from fasaco_edge.fleet.mission.ground import SharedGround
 from fasaco_edge.fleet.mission.refuge import without
 from fasaco_edge.fleet.mission.shared import MOST_ROBOTS, SharedProgress
+from fasaco_edge.fleet.mission.shared_ground import SharedGround
 from fasaco_edge.fleet.mission.traffic import OLD_S, Neighbour, least_apart_m
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.fleet.mission.ground import GroundQueue
-from fasaco_edge.fleet.mission.kind import fleet_of, giving_way_of
+from fasaco_edge.fleet.mission.kind import giving_way_of, layer_of
+from fasaco_edge.fleet.mission.shared_ground import GroundQueue
 from fasaco_edge.fleet.mission.tiles import SweptQueue
 from fasaco_edge.grid.rotation import rotated_points
 from fasaco_edge.mission.events import MemberReceived, State
@@ -39,11 +39,15 @@ class Messages:
         """
         if mission.pose is None or not mission.ledger.frame:
             return None
-        others, pose, tiles = fleet_of(mission), mission.pose.pose, mission.ledger.snapshot().tiles
-        if others.shared.epoch != self._epoch:
+        layer, pose, tiles = layer_of(mission), mission.pose.pose, mission.ledger.snapshot().tiles
+        if layer.others.shared.epoch != self._epoch:
             # All tiles are sent again. After a restart, the cells swept before are unknown.
             before = tiles if self._epoch else None
-            self._epoch, self._swept, most = others.shared.epoch, SweptQueue(before), most_anew
+            self._epoch, self._swept, most = (
+                layer.others.shared.epoch,
+                SweptQueue(before),
+                most_anew,
+            )
         swept = self._swept.next(tiles, most)
         return MemberReceived(
             robot=self._robot,
@@ -51,13 +55,13 @@ class Messages:
             state=str(mission.state),
             x=round(pose.x, 3),
             y=round(pose.y, 3),
-            step_s=others.step_s,
-            epoch=others.shared.epoch,
-            division=others.numbers.number,
+            step_s=layer.step_s,
+            epoch=layer.others.shared.epoch,
+            division=layer.numbers.number,
             tiles=swept,
             ground=self._ground.next(mission.map.area, most),
-            by=others.numbers.by,
-            parts=others.parts,
+            by=layer.numbers.by,
+            parts=layer.parts,
             radius_m=self._radius_m,
             ahead=tuple((x, y) for x, y in path_ahead(mission).tolist()),
             waits_for=waits_for(mission),
@@ -78,4 +82,4 @@ def waits_for(mission: Mission) -> str:
     stands = mission.doing is State.COVERING and len(mission.route.path.ahead) < 2
     if name or not (stands and orders.waits_for_others):
         return name
-    return fleet_of(mission).busiest(orders.cells.open_cells)
+    return layer_of(mission).busiest(orders.cells.open_cells)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 import numpy as np
@@ -260,8 +260,8 @@ class SharedProgress(OthersCells):
         """Return everything as bytes, to be stored with the ledger; b"" for nothing."""
         if self._encoded[0] != self.version:
             robots = {name: member.kept() for name, member in self._robots.items()}
-            note = _Note(_VERSION, self.epoch, robots, self._origin, self._map_frame, self._left)
-            self._encoded = self.version, msgspec.json.encode(note)
+            own = self.epoch, robots, self._origin, self._map_frame, self._left
+            self._encoded = self.version, msgspec.json.encode(_StoredProgress(1, *own))
         return self._encoded[1]
 
     def resume(self, kept: bytes) -> None:
@@ -270,9 +270,7 @@ class SharedProgress(OthersCells):
         If the configured place of this robot's map has changed, cells are ignored, too.
         """
         try:
-            if not kept or msgspec.json.decode(kept, type=_Head).version != _VERSION:
-                return
-            note = msgspec.json.decode(kept, type=_Note)
+            note = msgspec.json.decode(kept, type=_StoredProgress)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             return
         self.epoch, self._left = note.epoch, note.left
@@ -305,18 +303,8 @@ class SharedProgress(OthersCells):
             raise FleetError(f"{robot}: {MOST_TILES} tiles of others' progress are kept at most")
 
 
-# Version of the bytes.
-_VERSION = 1
-
-
-class _Head(msgspec.Struct, frozen=True):
-    """Members common to all versions."""
-
-    version: int
-
-
-class _Note(msgspec.Struct, frozen=True):
-    version: int
+class _StoredProgress(msgspec.Struct, frozen=True):
+    version: Literal[1]
     epoch: int
     robots: dict[str, Kept]
     # Place of this robot's map in the frame of the fleet, and the frame of that map.

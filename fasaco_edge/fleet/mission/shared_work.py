@@ -74,7 +74,11 @@ MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 
 
 class DivisionNumbers:
-    """Numbers the divisions of one robot, and checks the numbers that others send.
+    """Numbers the divisions of one robot, checks the numbers of others, and tells who takes part.
+
+    All robots have to agree who does: each makes a new division if the last one leaves out a robot
+    that takes part. If two robots do not receive each other, or a map shows no way between them, a
+    third robot decides.
 
     Attributes:
         number: number of the newest division.
@@ -117,18 +121,6 @@ class DivisionNumbers:
         numbers = self._others.division_numbers()
         first = min((number for number in numbers.values() if number), default=0)
         return (self.number or min(first, MOST_FIRST)) + MOST_AHEAD
-
-
-class AtWork:
-    """Decides which of the other robots take part.
-
-    All robots have to agree: each makes a new division if the last one leaves out a robot that
-    takes part. If two robots do not receive each other, or a map shows no way between them, a
-    third robot decides.
-    """
-
-    def __init__(self, others: Members, numbers: DivisionNumbers) -> None:
-        self._others, self._numbers = others, numbers
 
     def in_reach(self, area: ReachableArea, now: float) -> list[Robot]:
         """Return the robots at work in an area that this robot can reach."""
@@ -181,7 +173,7 @@ class AtWork:
         The author may receive robots that this robot does not. If this robot left them out, the two
         would replace each other's division endlessly.
         """
-        maker = self._others.known.get(self._numbers.by)
+        maker = self._others.known.get(self.by)
         if maker is None or maker.absence(now):
             return False
-        return maker.newest.division == self._numbers.number
+        return maker.newest.division == self.number

@@ -39,6 +39,11 @@ def bits_of(packed: bytes) -> Bits:
     return np.frombuffer(packed, np.uint8)
 
 
+def cells_in(bits: Bits | bytes) -> int:
+    """Return the number of cells in a tile's bits."""
+    return int.from_bytes(bytes(bits)).bit_count()
+
+
 def unpacked(bits: Bits) -> NDArray[np.bool_]:
     """Return the cells of a tile's bits, bool (TILE, TILE)."""
     return np.unpackbits(bits).reshape(TILE, TILE).view(np.bool_)

@@ -153,20 +153,13 @@ NEARER_M farther than the other, or about as far and the second | waits |
             continue
         slack_s = 2 * SLACK_S if is_held else SLACK_S
         meeting = _meeting(apart_m, clear_m, pace_s_m, near, slack_s)
-        if meeting is None or meeting.mine_m > WAIT_M:
+        if meeting is None or meeting[0] > WAIT_M:
             continue
-        sooner_m = meeting.mine_m - meeting.theirs_m
+        sooner_m = meeting[0] - meeting[1]
         yields = sooner_m > 0.0 if abs(sooner_m) > NEARER_M else not is_first
         if yields or is_held:
             return Obstruction(other, is_on_path=is_over)
     return blocked
-
-
-class _Meeting(NamedTuple):
-    """Place where two robots come too near each other: length of each path up to there [m]."""
-
-    mine_m: float
-    theirs_m: float
 
 
 def _is_over(apart_m: Points, clear_m: float) -> bool:
@@ -184,8 +177,9 @@ def _comes_to(apart_m: Points, clear_m: float) -> bool:
 
 def _meeting(
     apart_m: Points, clear_m: float, pace_s_m: float, near: Neighbour, slack_s: float
-) -> _Meeting | None:
-    """Return where two driving robots come too near each other at about the same time."""
+) -> tuple[float, float] | None:
+    """Return where two driving robots come too near each other at about the same time: the length
+    of each one's path up to there [m], this robot's first."""
     mine, theirs = apart_m.shape
     at_s = np.arange(mine) * SPACING_M * pace_s_m
     there_s = np.arange(theirs) * SPACING_M * near.pace_s_m - near.age_s
@@ -196,4 +190,4 @@ def _meeting(
     if is_parting or not is_meeting.any():
         return None
     mine_m = float(np.flatnonzero(is_meeting.any(axis=1))[0] * SPACING_M)
-    return _Meeting(mine_m, float(np.flatnonzero(is_meeting.any(axis=0))[0] * SPACING_M))
+    return mine_m, float(np.flatnonzero(is_meeting.any(axis=0))[0] * SPACING_M)

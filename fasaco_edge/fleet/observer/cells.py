@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.fleet.mission.frames import placed_point, turned
+from fasaco_edge.fleet.mission.frames import placed_point, seen_from, turned
 from fasaco_edge.fleet.mission.shared import MOST_TILES_OF_ONE
-from fasaco_edge.fleet.mission.tiles import bits_of, unpacked
+from fasaco_edge.fleet.mission.tiles import bits_of, cells_in, unpacked
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
@@ -60,9 +60,7 @@ class Seat:
 
     def cell_at(self, x: float, y: float) -> Place:
         """Return the cell (row, col) at a point of the map frame [m]."""
-        angle = math.radians(self.lattice_deg)
-        cos, sin = math.cos(angle), math.sin(angle)
-        along, across = cos * x + sin * y, cos * y - sin * x
+        along, across = placed_point(Pose2D(0.0, 0.0, -math.radians(self.lattice_deg)), x, y)
         return math.floor(across / self.cell_m), math.floor(along / self.cell_m)
 
     def geometry(self, window: Window) -> GridGeometry:
@@ -75,13 +73,11 @@ class Seat:
         """Return the cells of another seat that contain the centres of ``cells``, int64 (n, 2)."""
         if to == self or not len(cells):
             return cells
-        here, there = self.lattice, to.lattice
-        x, y = (cells[:, 1] + 0.5) * self.cell_m, (cells[:, 0] + 0.5) * self.cell_m
+        here = seen_from(self.lattice, to.lattice)
         cos, sin = math.cos(here.yaw), math.sin(here.yaw)
-        x, y = here.x + cos * x - sin * y - there.x, here.y + sin * x + cos * y - there.y
-        cos, sin = math.cos(there.yaw), math.sin(there.yaw)
-        rows, cols = (cos * y - sin * x) / to.cell_m, (cos * x + sin * y) / to.cell_m
-        return np.floor(np.column_stack((rows, cols))).astype(np.int64)
+        x, y = (cells[:, 1] + 0.5) * self.cell_m, (cells[:, 0] + 0.5) * self.cell_m
+        x, y = here.x + cos * x - sin * y, here.y + sin * x + cos * y
+        return np.floor(np.column_stack((y, x)) / to.cell_m).astype(np.int64)
 
 
 class TileSet:
@@ -95,16 +91,18 @@ class TileSet:
     def __init__(self) -> None:
         self.count = self.refused = 0
         self._tiles: dict[Place, bytes] = {}
+        # Places of the tiles that have changed since the last call of ``changed``.
+        self._changed: dict[Place, None] = {}
         self._span: tuple[int, int, int, int] | None = None
 
-    def take(self, tiles: Iterable[CellTile], *, grows: bool) -> list[CellTile]:
-        """Take tiles in; return those that have changed.
+    def take(self, tiles: Iterable[CellTile], *, grows: bool) -> bool:
+        """Take tiles in; return whether any has changed.
 
         Args:
             tiles: the tiles.
             grows: whether tiles only add cells; else they replace older tiles.
         """
-        changed = []
+        has_changed = False
         for tile in tiles:
             place = tile.row, tile.col
             before = self._tiles.get(place)
@@ -115,14 +113,21 @@ class TileSet:
             if grows and before is not None:
                 bits = (bits_of(before) | bits_of(bits)).tobytes()
             if bits != before:
-                self.count += _count(bits) - _count(before or b"")
+                self.count += cells_in(bits) - cells_in(before or b"")
                 self._tiles[place] = bits
-                changed.append(CellTile(*place, bits))
-        return changed
+                self._changed[place] = None
+                has_changed = True
+        return has_changed
+
+    def changed(self) -> list[CellTile]:
+        """Return the tiles that have changed since the last call."""
+        changed, self._changed = self._changed, {}
+        return [CellTile(*place, self._tiles[place]) for place in changed]
 
     def clear(self) -> None:
         """Drop all cells."""
         self._tiles.clear()
+        self._changed.clear()
         self._span, self.count = None, 0
 
     def tiles(self) -> list[CellTile]:
@@ -179,10 +184,6 @@ def mask_of(cells: Cells, window: Window) -> NDArray[np.bool_]:
     inside = ((at >= 0) & (at < mask.shape)).all(axis=1)
     mask[tuple(at[inside].T)] = True
     return mask
-
-
-def _count(bits: bytes) -> int:
-    return int.from_bytes(bits, "big").bit_count()
 
 
 def distances(ground: NDArray[np.bool_], start: Place, most_steps: int = FAR) -> NDArray[np.int32]:

@@ -21,7 +21,7 @@ from fasaco_edge.fleet.observer.cells import (
     mask_of,
     window_of,
 )
-from fasaco_edge.fleet.observer.members import MOST_MEMBERS, Member, Members
+from fasaco_edge.fleet.observer.observed import MOST_MEMBERS, ObservedFleet, ObservedRobot
 from fasaco_edge.grid.geometry import GridGeometry, Window
 from fasaco_edge.wire.documents.fleet import TILE
 
@@ -75,7 +75,7 @@ class Survey:
         return self.swept / self.area if self.area else None
 
 
-def survey_of(members: Members, now_ns: int) -> Survey:
+def survey_of(members: ObservedFleet, now_ns: int) -> Survey:
     """Return the survey of a fleet, by the division in force at ``now_ns``."""
     divider = members.dividing(now_ns)
     seat = divider.seat if divider else next((member.seat for member in members), None)
@@ -107,7 +107,7 @@ def survey_of(members: Members, now_ns: int) -> Survey:
     )
 
 
-def _window(seat: Seat, members: Members) -> Window | None:
+def _window(seat: Seat, members: ObservedFleet) -> Window | None:
     """Return the window of all cells on a lattice; cells far from the earlier ones are left out."""
     joined = None
     for member in members:
@@ -120,8 +120,8 @@ def _window(seat: Seat, members: Members) -> Window | None:
 
 
 def owners_of(
-    divider: Member,
-    members: Members,
+    divider: ObservedRobot,
+    members: ObservedFleet,
     known: NDArray[np.bool_],
     window: Window,
     most_steps: int = MOST_STEPS,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from fasaco_edge.drawing import palette
-from fasaco_edge.fleet.observer.members import Members
+from fasaco_edge.fleet.observer.observed import ObservedFleet
 from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.grid.geometry import Bounds
 from fasaco_edge.recording import entities
@@ -79,7 +79,7 @@ LEGEND = """\
 - **Line** bright its path, dark where it drove"""
 
 
-def card_of(title: str, members: Members, states: Mapping[str, str], survey: Survey) -> str:
+def card_of(title: str, members: ObservedFleet, states: Mapping[str, str], survey: Survey) -> str:
     """Return the card as Markdown; ``states``: the robots' states, by name."""
     twice_m2, rows, swept_m2 = survey.twice_m2, [], 0.0
     for member in members:

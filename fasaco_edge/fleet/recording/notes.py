@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -20,7 +20,7 @@ from msgspec import Meta
 
 from fasaco_edge.errors import DifferentRuns, UnreadableRecording
 from fasaco_edge.fleet.observer.cells import Place
-from fasaco_edge.fleet.observer.members import GONE, Member
+from fasaco_edge.fleet.observer.observed import GONE, ObservedRobot
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.recording import entities
 from fasaco_edge.recording.read.frames import chunks_in, column, pa
@@ -43,7 +43,7 @@ Text = Annotated[str, Meta(max_length=256)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
-class Pass(msgspec.Struct, frozen=True, array_like=True):
+class EnteredCell(msgspec.Struct, frozen=True, array_like=True):
     """A cell that a robot entered, and the time of that since the recording began [ms]."""
 
     at_ms: int
@@ -84,7 +84,7 @@ class Note(msgspec.Struct, array_like=True):
     bytes: Count
     driven_m: float
     plans_ms: list[float]
-    passes: list[Pass]
+    passes: list[EnteredCell]
     swept: list[CellTile]
     ground: list[CellTile]
     in_force: bool = False
@@ -114,24 +114,22 @@ class NoteBatch(msgspec.Struct, frozen=True, array_like=True):
     notes: list[Note]
 
 
-class _Head(msgspec.Struct, frozen=True, array_like=True):
+class _BatchHead(msgspec.Struct, frozen=True, array_like=True):
     version: int
 
 
 @dataclass(slots=True)
 class PendingNote:
-    """Poses, plans and cells of a robot since its last note."""
+    """Poses and plans of a robot since its last note."""
 
     _pose: Pose2D | None = None
     _stamp_ms: int = 0
     _time_scale: float = 1.0
     _cell: Place | None = None
-    _passes: list[Pass] = field(default_factory=list)
+    _passes: list[EnteredCell] = field(default_factory=list)
     _plans_ms: list[float] = field(default_factory=list)
     _plans: int = -1
     _driven_m: float = 0.0
-    _swept: dict[Place, CellTile] = field(default_factory=dict)
-    _ground: dict[Place, CellTile] = field(default_factory=dict)
 
     def move(self, cell: Place, stamped: StampedPose, at_ms: int) -> None:
         """Take in a pose in the robot's map frame, and its cell there."""
@@ -144,7 +142,7 @@ class PendingNote:
         self._pose = pose
         if cell != self._cell and len(self._passes) < MOST_PASSES:
             self._cell = cell
-            self._passes.append(Pass(at_ms, *cell))
+            self._passes.append(EnteredCell(at_ms, *cell))
 
     def note_status(self, status: Status) -> None:
         """Take in a status: the time of a plan made since the last status, and the time scale."""
@@ -155,16 +153,13 @@ class PendingNote:
             self._plans_ms.append(took_ms)
         self._plans = plans
 
-    def note_cells(self, member: Member, *, has_moved: bool) -> None:
-        """Take in the tiles that the newest message changed; drop all others if the frame moved."""
-        if has_moved:
-            self._swept.clear()
-            self._ground.clear()
-            self._cell = None
-        for kept, news in zip((self._swept, self._ground), member.news, strict=True):
-            kept.update(((tile.row, tile.col), tile) for tile in news)
+    def forget_cell(self) -> None:
+        """Forget the robot's cell: its frame has moved."""
+        self._cell = None
 
-    def note(self, member: Member, at_ms: int, now_ns: int, traffic: tuple[int, int]) -> Note:
+    def note(
+        self, member: ObservedRobot, at_ms: int, now_ns: int, traffic: tuple[int, int]
+    ) -> Note:
         """Return what arrived since the last note."""
         said, is_gone = member.newest, member.is_gone(now_ns)
         pose = self._pose or Pose2D(said.x, said.y)
@@ -182,17 +177,16 @@ class PendingNote:
             driven_m=round(self._driven_m, 3),
             plans_ms=[round(ms, 2) for ms in self._plans_ms],
             passes=self._passes,
-            swept=list(self._swept.values()),
-            ground=list(self._ground.values()),
+            swept=member.swept.changed(),
+            ground=member.ground.changed(),
             stamp_ms=self._stamp_ms,
             time_scale=self._time_scale,
         )
-        self._driven_m = 0.0
-        self._passes, self._plans_ms, self._swept, self._ground = [], [], {}, {}
+        self._driven_m, self._passes, self._plans_ms = 0.0, [], []
         return note
 
 
-def in_force(member: Member, at_ms: int) -> Note:
+def in_force(member: ObservedRobot, at_ms: int) -> Note:
     """Return a note of all cells received from a robot up to now."""
     said = member.newest
     return Note(
@@ -201,11 +195,9 @@ def in_force(member: Member, at_ms: int) -> Note:
     )  # fmt: skip
 
 
-def noted(member: Member) -> NotedRobot:
+def noted(member: ObservedRobot) -> NotedRobot:
     """Return a robot's entry in a batch."""
-    seat = member.seat
-    place = seat.cell_m, seat.lattice_deg, seat.x, seat.y, seat.deg
-    return NotedRobot(member.name, member.newest.radius_m, *place)
+    return NotedRobot(member.name, member.newest.radius_m, *astuple(member.seat))
 
 
 def encode_notes(batch: NoteBatch) -> bytes:
@@ -226,7 +218,7 @@ def decode_notes(blob: bytes) -> NoteBatch:
         raise ValueError(f"notes of a fleet: {error}") from error
     if inflate.unconsumed_tail or not inflate.eof:
         raise ValueError("notes of a fleet: they break off, or are too long")
-    version = msgspec.msgpack.decode(body, type=_Head).version
+    version = msgspec.msgpack.decode(body, type=_BatchHead).version
     if version != NOTES_VERSION:
         raise ValueError(f"notes of a fleet of version {version}, not {NOTES_VERSION}")
     batch = msgspec.msgpack.decode(body, type=NoteBatch)

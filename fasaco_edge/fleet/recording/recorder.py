@@ -17,8 +17,8 @@ from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
-from fasaco_edge.fleet.observer.members import JOINED, Member, Members
+from fasaco_edge.fleet.observer.observed import JOINED, ObservedFleet, ObservedRobot
+from fasaco_edge.fleet.observer.queues import FleetInbox, FleetSubscriptions, RobotSample
 from fasaco_edge.fleet.recording.layout import build_layout
 from fasaco_edge.fleet.recording.notes import (
     NOTES_VERSION,
@@ -88,13 +88,13 @@ class FleetRecorder(BusRecorder):
         self._began_ns = self._clock.began_ns
         self._title = f"fleet {fleet} {self._clock.began:%Y-%m-%d %H:%M:%S} UTC"
         self.writer.describe(self._title)
-        self._members = Members()
+        self._members = ObservedFleet()
         self._scene = FleetScene(self.writer, self._members)
         self._inbox = FleetInbox(afforded_bytes(memory_limit()), self._clock.arrival)
         self._subscriptions = FleetSubscriptions(
             bus, config.keys(), (STATUS, PATH, POSE), self._inbox.post
         )
-        self._first: list[Received] = []
+        self._first: list[RobotSample] = []
         self._gathers = True
         self._poses: dict[str, PoseDecoder] = {}
         self._pending: dict[str, PendingNote] = {}
@@ -136,7 +136,7 @@ class FleetRecorder(BusRecorder):
         self._scene.finish()
         return self.writer.close()
 
-    def _gathered(self, arrived: list[Received]) -> list[Received]:
+    def _gathered(self, arrived: list[RobotSample]) -> list[RobotSample]:
         """Return the samples to process now.
 
         The samples of the first robots come together, sorted by the robots' names, so that robots
@@ -161,7 +161,7 @@ class FleetRecorder(BusRecorder):
     def note(self, line: str) -> None:
         self._scene.add_line(line, "WARN")
 
-    def _attempt(self, received: Received) -> None:
+    def _attempt(self, received: RobotSample) -> None:
         """Take in a sample; an unusable sample is logged with its robot's name."""
         try:
             self._take(received.robot, received.arrival)
@@ -225,9 +225,9 @@ class FleetRecorder(BusRecorder):
             self._join(member)
         elif news:
             self._scene.add_line(one_line(f"{robot}: {news}"), "WARN")
-        self._pending[robot].note_cells(member, has_moved=bool(news))
+            self._pending[robot].forget_cell()
 
-    def _join(self, member: Member) -> None:
+    def _join(self, member: ObservedRobot) -> None:
         self._poses[member.name] = PoseDecoder(self._schema)
         self._pending[member.name] = PendingNote()
         self._subscriptions.subscribe(member.name)
@@ -235,7 +235,6 @@ class FleetRecorder(BusRecorder):
         self._scene.join(member)
 
     def _note(self, now_ns: int) -> None:
-        """Note and show what arrived since the last note."""
         for member in self._members:
             traffic = self._inbox.traffic(member.name)
             if traffic.too_large:
@@ -274,7 +273,7 @@ class FleetRecorder(BusRecorder):
         return max(wall_ns - self._began_ns, 0) // 1_000_000
 
 
-def _why(member: Member) -> str:
+def _why(member: ObservedRobot) -> str:
     return f"for {member.newest.waits_for}" if member.newest.waits_for else ""
 
 

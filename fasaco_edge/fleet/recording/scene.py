@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from fasaco_edge.drawing import palette
 from fasaco_edge.fleet.observer.cells import mask_of, window_of
-from fasaco_edge.fleet.observer.inbox import LEAST_SHARING
-from fasaco_edge.fleet.observer.members import GONE, Member, Members
+from fasaco_edge.fleet.observer.observed import GONE, ObservedFleet, ObservedRobot
+from fasaco_edge.fleet.observer.queues import LEAST_SHARING
 from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.fleet.recording.layout import (
     build_layout,
@@ -57,7 +57,7 @@ STATES = {
 
 
 @dataclass(slots=True)
-class _Drawn:
+class _RobotDrawings:
     """Drawings of a robot."""
 
     state: str = ""
@@ -69,20 +69,20 @@ class _Drawn:
 class FleetScene:
     """Draws a fleet into a writer; the caller sets the time."""
 
-    def __init__(self, writer: RecordingWriter, members: Members) -> None:
+    def __init__(self, writer: RecordingWriter, members: ObservedFleet) -> None:
         self._writer = writer
         self._members = members
         self._layers = Layers(FLEET_RATES)
         self._anchor: Anchor | None = None
-        self._drawn: dict[str, _Drawn] = {}
+        self._drawn: dict[str, _RobotDrawings] = {}
         self._framed: Bounds | None = None
         self._shown: tuple[str, ...] = ()
         self._survey, self._card = Survey(), ""
         writer.log_static(entities.FLEET, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
 
-    def join(self, member: Member) -> None:
+    def join(self, member: ObservedRobot) -> None:
         """Draw a robot from now on."""
-        self._drawn[member.name] = _Drawn()
+        self._drawn[member.name] = _RobotDrawings()
         self._limit()
         colour = _colour(member)
         styles = (("path", 1.3, colour), ("trail", 1.1, _darker(colour)))
@@ -107,7 +107,7 @@ class FleetScene:
         self._writer.log_static(robot_entity(member.name, "state"), states)
         self._show()
 
-    def add_pose(self, member: Member, pose: Pose2D) -> None:
+    def add_pose(self, member: ObservedRobot, pose: Pose2D) -> None:
         """Move a robot, and add to its trail."""
         x, y = self._here(member, pose.x, pose.y)
         placed = Pose2D(x, y, pose.yaw + member.seat.frame.yaw)
@@ -134,7 +134,7 @@ class FleetScene:
 
         self._draw(member, "trail", 24 * len(drawn.trail), draw_trail)
 
-    def add_path(self, member: Member, xy: NDArray[np.float64]) -> None:
+    def add_path(self, member: ObservedRobot, xy: NDArray[np.float64]) -> None:
         """Draw the path ahead of a robot."""
         points = np.array([self._here(member, x, y) for x, y in draw.corners(xy).tolist()])
         points = points.reshape(-1, 2)
@@ -145,7 +145,7 @@ class FleetScene:
 
         self._draw(member, "path", 12 * len(points), draw_path)
 
-    def add_map(self, member: Member, grid: OccupancyGrid) -> None:
+    def add_map(self, member: ObservedRobot, grid: OccupancyGrid) -> None:
         """Draw a robot's map; unknown pixels are transparent, to let other maps show."""
         grid = coarser(grid, MOST_PIXELS // max(len(self._drawn), LEAST_SHARING))
         x, y = self._here(member, grid.geometry.origin.x, grid.geometry.origin.y)
@@ -166,7 +166,7 @@ class FleetScene:
 
         self._draw(member, "map", 2 * size_in_file(grid.cells), draw_map)
 
-    def add_cells(self, member: Member) -> None:
+    def add_cells(self, member: ObservedRobot) -> None:
         """Draw the cells that a robot has swept."""
         self._draw(
             member, "swept", GRID_BYTES + member.swept.count // 8, lambda: self._draw_swept(member)
@@ -178,7 +178,7 @@ class FleetScene:
         size = 2 * CHUNK_BYTES + sum(member.ground.count for member in self._members) // 4
         self._layers.draw(entities.FLEET_SHARES, size, self._draw_survey, self._writer.wall_ns)
 
-    def add_figures(self, member: Member, figures: dict[str, float]) -> None:
+    def add_figures(self, member: ObservedRobot, figures: dict[str, float]) -> None:
         """Plot changed figures of a robot, by names of METRICS."""
         drawn = self._drawn[member.name]
         drawn.figures |= figures
@@ -191,7 +191,7 @@ class FleetScene:
 
         self._draw(member, "metrics", CHUNK_BYTES * (len(drawn.figures) - 1), draw_figures)
 
-    def enter(self, member: Member, state: str, why: str = "") -> None:
+    def enter(self, member: ObservedRobot, state: str, why: str = "") -> None:
         """Show and log a robot's new state."""
         drawn = self._drawn[member.name]
         if not state or drawn.state == state:
@@ -233,7 +233,7 @@ class FleetScene:
         self._framed = None
         self._show()
 
-    def _draw(self, member: Member, layer: str, size: int, make: Callable[[], None]) -> None:
+    def _draw(self, member: ObservedRobot, layer: str, size: int, make: Callable[[], None]) -> None:
         name = f"{layer}/{member.name}"
         self._layers.draw(name, CHUNK_BYTES + size, make, self._writer.wall_ns)
 
@@ -251,13 +251,13 @@ class FleetScene:
             self._anchor = Anchor.near(x, y)
         return self._anchor
 
-    def _here(self, member: Member, x: float, y: float) -> tuple[float, float]:
+    def _here(self, member: ObservedRobot, x: float, y: float) -> tuple[float, float]:
         """Return the place of the drawing for a point of a robot's map frame [m]."""
         x, y = member.placed(x, y)
         anchor = self._anchored(x, y)
         return x - anchor.x, y - anchor.y
 
-    def _draw_swept(self, member: Member) -> None:
+    def _draw_swept(self, member: ObservedRobot) -> None:
         cells = member.swept.cells()
         window = window_of(cells)
         if window is None:
@@ -305,11 +305,11 @@ class FleetScene:
             self._writer.show(build_layout(robots, known or NO_MAP))
 
 
-def _world(member: Member, name: str) -> str:
+def _world(member: ObservedRobot, name: str) -> str:
     return robot_entity(member.name, f"world/{name}")
 
 
-def _colour(member: Member) -> tuple[int, int, int]:
+def _colour(member: ObservedRobot) -> tuple[int, int, int]:
     return palette.robot(member.number)[1]
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,7 +23,7 @@ from fasaco_edge.fleet.observer.cells import (
     together,
     window_of,
 )
-from fasaco_edge.fleet.observer.members import Member
+from fasaco_edge.fleet.observer.observed import ObservedRobot
 from fasaco_edge.fleet.recording.notes import Note, NoteBatch, NotedRobot
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.judge.pixels import within
@@ -64,7 +65,7 @@ class RobotTrack:
 
 
 def seat_of(robot: NotedRobot) -> Seat:
-    return Seat(robot.cell_m, robot.lattice_deg, robot.x, robot.y, robot.deg)
+    return Seat(*msgspec.structs.astuple(robot)[2:])
 
 
 def tracks_of(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack], Cells]:
@@ -148,9 +149,9 @@ def swept_by_others(
     return found
 
 
-def _members(turns: Iterable[Arrival], fleet: str) -> list[Member]:
+def _members(turns: Iterable[Arrival], fleet: str) -> list[ObservedRobot]:
     """Return the other robots as of their last messages."""
-    members: dict[str, Member] = {}
+    members: dict[str, ObservedRobot] = {}
     decoder = SampleDecoder()
     for arrival in turns:
         with suppress(FasacoError):
@@ -161,6 +162,6 @@ def _members(turns: Iterable[Arrival], fleet: str) -> list[Member]:
                     continue
                 message = decode_member(sample.payload, fleet)
                 if message is not None:
-                    new = Member(sample.key, len(members), Seat.of(message), message, 0)
+                    new = ObservedRobot(sample.key, len(members), Seat.of(message), message, 0)
                     members.setdefault(sample.key, new).receive(message, 0)
     return list(members.values())

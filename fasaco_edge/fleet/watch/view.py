@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.phrases import BAD, GOOD, PLAIN, TROUBLED, EventLog
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.fleet.observer.inbox import Received
-from fasaco_edge.fleet.observer.members import JOINED, MOST_MEMBERS, Member, Members
+from fasaco_edge.fleet.observer.observed import JOINED, MOST_MEMBERS, ObservedFleet, ObservedRobot
+from fasaco_edge.fleet.observer.queues import RobotSample
 from fasaco_edge.fleet.observer.survey import Survey, survey_of
 from fasaco_edge.text import is_reported, one_line
 from fasaco_edge.wire.documents.fleet import decode_member, fleet_of
@@ -39,30 +39,27 @@ class FleetRobot:
     """A robot of the fleet at one time.
 
     Attributes:
+        member: the robot, with its last message.
         name: name of the robot.
         state: state of its mission, in its last message; one line.
         waits_for: name of the robot that it waits for; "" for none.
         silent_s: time since its last message if it is gone [s]; else None.
         away: why others give it no part of the remaining cells; "" if they do.
-        x, y: its position in the fleet's frame, in its last message [m].
         swept_cells: number of cells that it has swept.
         left_cells: number of cells left in its part; None without a division.
         cell_m2: area of its cells [m2].
-        division: number of its division.
         revision: number of its path; None if not known.
     """
 
+    member: ObservedRobot
     name: str
     state: str
     waits_for: str
     silent_s: float | None
     away: str
-    x: float
-    y: float
     swept_cells: int
     left_cells: int | None
     cell_m2: float
-    division: int
     revision: int | None
 
     @property
@@ -79,14 +76,16 @@ class FleetRobot:
 
     def document(self) -> dict[str, object]:
         """Return it as ``--json`` prints it."""
+        said = self.member.newest
+        x, y = self.member.placed(said.x, said.y)
         return {
             "name": self.name,
             "state": "gone" if self.silent_s is not None else self.state,
-            "x": round(self.x, 3),
-            "y": round(self.y, 3),
+            "x": round(x, 3),
+            "y": round(y, 3),
             "waits_for": self.waits_for,
             "away": self.away or None,
-            "division": self.division,
+            "division": said.division,
             "swept_cells": self.swept_cells,
             "swept_m2": round(self.swept_cells * self.cell_m2, 2),
             "part_cells": self.left_cells,
@@ -101,7 +100,7 @@ def short(text: str) -> str:
 
 
 @dataclass(slots=True)
-class _Seen:
+class _RobotNews:
     """Data of a robot besides its fleet messages."""
 
     status: Status | None = None
@@ -123,16 +122,16 @@ class FleetView:
 
     def __init__(self, fleet: str) -> None:
         self.fleet = fleet
-        self.members = Members()
+        self.members = ObservedFleet()
         self.events = EventLog()
         self.trouble = ""
         self.others: set[str] = set()
-        self._seen: dict[str, _Seen] = {}
+        self._seen: dict[str, _RobotNews] = {}
         self.floor, self._floor_key, self._floor_due_at = Survey(), object(), 0.0
         self._division = 0
         self._faults: Counter[tuple[str, str]] = Counter()
 
-    def take(self, received: Received) -> None:
+    def take(self, received: RobotSample) -> None:
         """Take in a sample; an unreadable sample is dropped and noted."""
         arrival, robot = received.arrival, received.robot
         try:
@@ -156,8 +155,7 @@ class FleetView:
         for robot in self.robots(now):
             self._note_state(robot, now)
 
-    def _look_at_floor(self, divider: Member | None, now_ns: int) -> None:
-        """Survey the floor after changes, if that is due."""
+    def _look_at_floor(self, divider: ObservedRobot | None, now_ns: int) -> None:
         division = None if divider is None else (divider.name, divider.newest.division)
         key = division, *((member.name, member.changes) for member in self.members)
         began = time.monotonic()
@@ -204,22 +202,19 @@ class FleetView:
             "unheard": self.unheard(now),
         }
 
-    def _robot(self, member: Member, away: str, now: float) -> FleetRobot:
+    def _robot(self, member: ObservedRobot, away: str, now: float) -> FleetRobot:
         said, status = member.newest, self._seen[member.name].status
-        x, y = member.placed(said.x, said.y)
         is_gone = member.is_gone(int(1e9 * now))
         return FleetRobot(
+            member=member,
             name=member.name,
             state=short(said.state),
             waits_for=short(said.waits_for),
             silent_s=now - 1e-9 * member.received_ns if is_gone else None,
             away=away,
-            x=x,
-            y=y,
             swept_cells=member.swept.count,
             left_cells=self.floor.left.get(member.name) if self.floor.division else None,
             cell_m2=member.seat.cell_m**2,
-            division=said.division,
             revision=status.path.revision if status and status.path else None,
         )
 
@@ -249,18 +244,17 @@ class FleetView:
             return
         _, news = self.members.receive(robot, said, at_ns)
         if news == JOINED:
-            self._seen[robot] = _Seen()
+            self._seen[robot] = _RobotNews()
         elif news:
             self._note_often(robot, "frame", news, 1e-9 * at_ns)
 
-    def _read_status(self, member: Member, sample: Sample) -> None:
+    def _read_status(self, member: ObservedRobot, sample: Sample) -> None:
         status = decode_tolerant(sample.payload, Status)
         # A second daemon with the robot's name does not plan.
         if status.claim.stand == "plans":
             self._seen[member.name].status = status
 
     def _note_state(self, robot: FleetRobot, now: float) -> None:
-        """Note a robot's activity if it has changed."""
         seen, doing = self._seen[robot.name], robot.doing
         if doing == seen.noted or now - seen.noted_at < NOTED_EVERY_S:
             return

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
-from fasaco_edge.fleet.mission.kind import fleet_of
+from fasaco_edge.fleet.mission.kind import layer_of
 from fasaco_edge.fleet.mission.travel import apart
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_map
@@ -156,7 +156,7 @@ def _figures(name: str, run: FleetRun, alone: FleetRun) -> FleetFigures:
         touches=sum(robot.world.touches for robot in run.robots),
         meetings=sum(robot.world.meetings for robot in run.robots),
         plans=sum(robot.plans for robot in run.robots),
-        divisions=max(fleet_of(robot.mission).numbers.number for robot in run.robots),
+        divisions=max(layer_of(robot.mission).numbers.number for robot in run.robots),
         plan_ms=_p99(run, "plan_ms"),
         step_ms=_p99(run, "step_ms"),
         plan_alone_ms=_p99(alone, "plan_ms"),

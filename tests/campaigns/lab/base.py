@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from shapely.strtree import STRtree
 
-from fasaco_edge.follow.estimate import STAND, Command, moved
+from fasaco_edge.follow.estimate import STAND, VelocityCommand, moved
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.motion import limited
 from tests.campaigns.lab.building import Building
@@ -83,14 +83,14 @@ class Base:
         self._lidar = self._body.lidar
         self._body.sensors = []
 
-    def command(self, command: Command) -> None:
+    def command(self, command: VelocityCommand) -> None:
         """Take in a command."""
         self._command, self._commanded_at = command, self.now
 
     def tick(self) -> None:
         """Move on by a tick."""
         told = self._command if self.now - self._commanded_at <= PATIENCE_S else STAND
-        self.wheels = Command(
+        self.wheels = VelocityCommand(
             limited(self.wheels.speed, told.speed, ACCELERATION_M_S2 * TICK_S),
             limited(self.wheels.turn_rate, told.turn_rate, TURN_ACCELERATION_RAD_S2 * TICK_S),
         )
@@ -135,14 +135,14 @@ class Base:
         elif self.now >= self._slips_until:
             self.grip = 1.0
 
-    def _counted(self) -> Command:
+    def _counted(self) -> VelocityCommand:
         """Return the velocities that the wheels count."""
         speed, turn_rate = self.wheels.speed, self.wheels.turn_rate
         if self._ideal:
             return self.wheels
         way, turn = 1.0 + SCATTER * self._rng.standard_normal(2)
         counted = turn_rate * TURN_GAIN + speed * BIAS_RAD_M
-        return Command(float(speed * WAY_GAIN * way), float(counted * turn))
+        return VelocityCommand(float(speed * WAY_GAIN * way), float(counted * turn))
 
 
 def _environment(building: Building, settings: LabSettings) -> Any:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.follow.estimate import STAND, Command
+from fasaco_edge.follow.estimate import STAND, VelocityCommand
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.raycast import Scanner, ranges_of
@@ -89,14 +89,14 @@ class OwnBase:
 
     odometry = truth
 
-    def command(self, command: Command) -> None:
+    def command(self, command: VelocityCommand) -> None:
         """Take in a command."""
         self.world.move(command.speed, command.turn_rate)
 
     def tick(self) -> None:
         """Move on by a tick."""
         emission = self.world.tick()
-        self.wheels = Command(self.world.drive.speed, self.world.drive.turn_rate)
+        self.wheels = VelocityCommand(self.world.drive.speed, self.world.drive.turn_rate)
         self.touches = self.world.activity is Activity.COLLIDED
         self.pose = emission.pose.pose if emission.pose is not None else self.pose
         self.map = emission.map or self.map

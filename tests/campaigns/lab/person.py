@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import ndimage
 
-from fasaco_edge.follow.estimate import STAND, Command
+from fasaco_edge.follow.estimate import STAND, VelocityCommand
 from tests.campaigns.lab.building import Building
 from tests.campaigns.lab.settings import TICK_S
 
@@ -51,14 +51,14 @@ class Person:
             self.nudges.append(now)
             self._stood_s = 0.0
 
-    def helps(self, base: Base | OwnBase, now: float) -> Command | None:
+    def helps(self, base: Base | OwnBase, now: float) -> VelocityCommand | None:
         """Return the joystick's command; None while nobody helps."""
         if not self.nudges or (since_s := now - self.nudges[-1]) >= HELPED_S:
             return None
         if since_s < TURNED_S:
             bend = math.remainder(self._away(base) - base.truth.yaw, math.tau)
-            return Command(0.0, max(-TURN_RAD_S, min(TURN_RAD_S, TURN_GAIN * bend)))
-        return Command(SPEED_M_S) if since_s < DRIVEN_S else STAND
+            return VelocityCommand(0.0, max(-TURN_RAD_S, min(TURN_RAD_S, TURN_GAIN * bend)))
+        return VelocityCommand(SPEED_M_S) if since_s < DRIVEN_S else STAND
 
     def _away(self, base: Base | OwnBase) -> float:
         """Return the direction away from the nearest wall [rad]."""

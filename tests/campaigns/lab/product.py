@@ -23,7 +23,7 @@ from fasaco_edge.daemon.loop.mission_runner import MissionRunner
 from fasaco_edge.daemon.loop.outbox import headings
 from fasaco_edge.daemon.loop.periodic import MOST_SQUARES
 from fasaco_edge.daemon.loop.status import HEARTBEAT_S, StatusBoard
-from fasaco_edge.follow.estimate import Command
+from fasaco_edge.follow.estimate import VelocityCommand
 from fasaco_edge.follow.follower import Follower
 from fasaco_edge.follow.sight import Mount, Sight
 from fasaco_edge.follow.standstill import Standstill
@@ -116,7 +116,7 @@ class Product:
         scan = LaserScan(-math.pi, step, LEAST_RANGE_M, MOST_RANGE_M, told, "laser", stamp_ns(now))
         self.follower.take_scan(encode_scan(scan), now)
 
-    def step(self, now: float) -> Command | None:
+    def step(self, now: float) -> VelocityCommand | None:
         """Run a cycle of both at ``now`` [s]; return the command to the base, None for none.
 
         The follower has a path one cycle after the mission has published it.

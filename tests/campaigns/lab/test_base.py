@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fasaco_edge.follow.estimate import Command
+from fasaco_edge.follow.estimate import VelocityCommand
 
 pytest.importorskip("karto_scanmatcher", reason="needs the extra 'lab'")
 pytestmark = pytest.mark.filterwarnings("default")
@@ -32,7 +32,7 @@ def apart(a, b):
 def test_an_ideal_base_has_exact_odometry_and_stops_uncommanded():
     _, base = base_in(ideal=True)
     for _ in range(40):
-        base.command(Command(0.3, 0.0))
+        base.command(VelocityCommand(0.3, 0.0))
         base.tick()
     assert base.wheels.speed == pytest.approx(0.3)
     assert apart(base.truth, base.odometry) < 1e-9
@@ -46,7 +46,7 @@ def test_an_ideal_base_has_exact_odometry_and_stops_uncommanded():
 def test_wheels_slip_and_odometry_drifts():
     _, base = base_in(length_m=20.0)
     for _ in range(800):
-        base.command(Command(0.3, 0.0))
+        base.command(VelocityCommand(0.3, 0.0))
         base.tick()
     grips = base.odometry.x - base.truth.x
     assert 0.02 < grips < 1.0
@@ -61,7 +61,7 @@ def test_it_scans_walls_and_touches_them():
     assert ranges[0] == pytest.approx(0.5, abs=0.01)
     assert ranges[middle + middle // 2] == pytest.approx(0.5, abs=0.01)
     for _ in range(300):
-        base.command(Command(0.5, 0.0))
+        base.command(VelocityCommand(0.5, 0.0))
         base.tick()
     assert base.touches
     assert base.truth.x == pytest.approx(4.0 - 0.17, abs=0.01)
@@ -77,7 +77,7 @@ def test_the_mapper_corrects_odometry_and_draws_the_hall():
         toward = math.atan2(beside, ahead) - base.truth.yaw
         # Around the middle, at some distance from it.
         bend = math.remainder(toward - math.pi / 2, math.tau)
-        base.command(Command(0.2, 2.0 * bend + 0.2))
+        base.command(VelocityCommand(0.2, 2.0 * bend + 0.2))
         base.tick()
         if tick % 8 == 0 and mapper.wants(base.odometry):
             mapper.take(base.scan(), base.odometry)

@@ -56,19 +56,6 @@ def test_no_robot_receives_the_map_of_another(seats):
         assert heard[name]["revision"] == 1
 
 
-def test_no_robot_receives_paths_or_commands_of_another(seats):
-    first, *others = (seats[name] for name in FLEET)
-    subscriptions = [other.listen("path", late=False) for other in others]
-    first.put("map", map_bytes(pillared_room()))
-    first.put("pose", pose_bytes(0.75, 0.75))
-    first.wait_status(lambda status: status["state"] == "covering")
-    list(first.session.get(f"{first.prefix}/@rpc/mission", payload=b'{"command":"pause"}'))
-    first.wait_status(lambda status: status["state"] == "paused")
-    time.sleep(SILENCE_S)
-    assert all(receiver.heard == [] for receiver in subscriptions)
-    assert [other.ask_status()["state"] != "paused" for other in others] == [True, True]
-
-
 @pytest.mark.parametrize("key", ["fasaco/@v1/*/map", "fasaco/@v1/r$*/map"])
 def test_a_map_on_a_key_expression_reaches_matching_robots(router, seats, key):
     """Zenoh lets a key expression be published on; only access control forbids it."""

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from fasaco_edge.bus.arrival import Sample
-from fasaco_edge.fleet.daemon.arrivals import FORGOTTEN_S, LEAST_SPACING_S, FleetArrivals
+from fasaco_edge.fleet.daemon.exchange import FORGOTTEN_S, LEAST_SPACING_S, FleetArrivals
 from fasaco_edge.fleet.mission.frames import MOST_OTHERS
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import MAX_JSON_BYTES

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,8 +14,17 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from fasaco_edge.bus.arrival import Sample
+from fasaco_edge.bus.session import open_bus
+from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
+from fasaco_edge.daemon.loop.inbox import (
+    Batch,
+    Inbox,
+    Received,
+    make_mailbox,
+    take_batch,
+)
 from fasaco_edge.errors import FleetError, MalformedMessage
 from fasaco_edge.fleet.daemon.exchange import TILES, FleetReceiver, FleetSender
 from fasaco_edge.fleet.mission.kind import FleetKind
@@ -23,16 +34,22 @@ from fasaco_edge.grid.lattice import Footprint
 from fasaco_edge.mission.events import MapReceived, Part
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember, FleetPart, decode_member
 from fasaco_edge.wire.documents.json_text import encode_json
+from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.limits import (
     MAX_FLEET_PARTS,
     MAX_FLEET_POINTS,
     MAX_FLEET_TILES,
     MAX_JSON_BYTES,
 )
+from fasaco_edge.wire.messages.poses import PoseDecoder
+from fasaco_edge.wire.schemas import POSE_STAMPED
+from fasaco_edge.wire.topics import FLEET
 from tests.fleet.mission.fleets import FleetRobot
 from tests.mission import world
 from tests.mission.world import CELL, Drive, building, pose_at
 from tests.mission.world import CONFIG as WORLD
+from tests.support.outsider import TIMEOUT_S
+from tests.support.processes import free_endpoint
 from tests.wire.schemas import check
 
 TILE = CellTile(-1, 2, bytes(range(256)) * 2)
@@ -126,23 +143,23 @@ def test_another_version_is_recognised_in_an_unreadable_message():
         decode_member(b'{"version": ' + b"9" * 4000 + b', "fleet": "hall"}', "hall")
 
 
-def test_cells_of_another_size_do_not_fit():
-    cell_m = CONFIG.cell_m
-    assert heard(said(cell_m=cell_m)).misfit == ""
-    assert "its cells are 0.5 m wide" in heard(said(cell_m=0.5)).misfit
-
-
-def test_robots_of_a_frame_of_their_own_need_the_same_one():
-    config = structs.replace(CONFIG, fleet=FleetConfig("hall", frame="house"))
-    for frame, misfit in (
-        ("map", "its frame is 'map', that of this fleet is 'house'"),
-        ("house", ""),
-    ):
+@pytest.mark.parametrize(
+    ("frame", "members", "misfit"),
+    [
+        ("", {}, ""),
+        ("", {"cell_m": 0.5}, "its cells are 0.5 m wide, here they are 0.276 m"),
+        ("", {"lattice_deg": 12.5}, "its cells lie at 12.5 degrees to the map frame, here at 0"),
+        ("house", {"frame": "map"}, "its frame is 'map', that of this fleet is 'house'"),
         # Their maps may lie at any angle to each other, and so may their cells.
-        payload = said(cell_m=CONFIG.cell_m, frame=frame, lattice_deg=20.0, origin=[1.0, 2.0, 30.0])
-        event = FleetReceiver(config).event(Sample("fasaco/@v1/r2/fleet", payload))
-        assert event.misfit == misfit
-    assert event.frame == ""
+        ("house", {"frame": "house", "lattice_deg": 20.0, "origin": [1.0, 2.0, 30.0]}, ""),
+    ],
+)
+def test_a_robot_that_does_not_fit_is_left_out_with_the_reason(frame, members, misfit):
+    config = structs.replace(CONFIG, fleet=FleetConfig("hall", frame=frame))
+    payload = said(**{"cell_m": CONFIG.cell_m} | members)
+    event = FleetReceiver(config).event(Sample("fasaco/@v1/r2/fleet", payload))
+    assert event.misfit == misfit
+    assert misfit or event.frame == ("" if frame else "map")
 
 
 class Listener:
@@ -167,24 +184,6 @@ def test_a_robot_sends_pace_and_all_tiles_after_it_forgets_cells():
         sender.publish(robot.mission, now)
     assert [said.step_s for said in listener.heard] == [7.5] * 3
     assert [len(said.swept) for said in listener.heard] == [TILES] * 3
-
-
-def test_a_robot_sends_which_known_cells_precede_their_epoch():
-    robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
-    ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
-    ledger.visit((64, 0))
-    sender.publish(robot.mission, 0.0)
-    before = {tile.row: tile for tile in listener.heard[-1].swept}
-    assert listener.heard[-1].kept is None
-    robot.mission.covered.shared.note_forgotten()
-    sender.publish(robot.mission, 1.0)
-    ledger.visit((64, 9))
-    ledger.visit((128, 0))
-    sender.publish(robot.mission, 2.0)
-    told = listener.heard[-1]
-    assert {64 * tile.row for tile in told.swept} >= {64, 128}
-    assert {tile.row: tile for tile in told.kept}[1] == before[1]
-    assert 2 not in {tile.row for tile in told.kept}
 
 
 @pytest.mark.parametrize("cell_m", [0.005, 0.028, CELL])
@@ -233,16 +232,6 @@ def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
     assert [part.robot for part in parts[0]] == ["r1", "r2"]
 
 
-def test_a_robot_whose_cells_lie_at_another_angle_is_left_out():
-    cell_m = CONFIG.cell_m
-    assert heard(said(cell_m=cell_m, lattice_deg=0.0)).misfit == ""
-    told = heard(said(cell_m=cell_m, lattice_deg=12.5)).misfit
-    assert told == "its cells lie at 12.5 degrees to the map frame, here at 0"
-    older = json.loads(said(cell_m=cell_m))
-    older.pop("lattice_deg", None)
-    assert heard(json.dumps(older).encode()).misfit == ""
-
-
 def test_a_division_comes_with_its_parts_or_without():
     heard_now = heard(said())
     assert heard_now.by == "r2"
@@ -251,5 +240,47 @@ def test_a_division_comes_with_its_parts_or_without():
     older = json.loads(said())
     for member in ("ground", "by", "parts", "radius_m", "ahead", "waits_for", "kept"):
         del older[member]
+    older.pop("lattice_deg", None)
     assert heard(json.dumps(older).encode()).parts == ()
     assert heard(json.dumps(older).encode()).kept is None
+
+
+MAX_PIXELS = 1_000_000
+
+
+def test_an_oversized_fleet_message_is_dropped_on_arrival():
+    config = msgspec.convert({"robot": {"name": "r1"}, "fleet": {"name": "hall"}}, DaemonConfig)
+    keys, mailbox = config.keys(), make_mailbox(MAX_PIXELS)
+    with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
+        poses, receiver = PoseDecoder(POSE_STAMPED, None), FleetReceiver(config)
+        inbox = Inbox(bus, keys, mailbox, poses, MAX_PIXELS, fleet=receiver)
+        bus.publisher(Keys("r2").of(FLEET)).put(bytes(MAX_JSON_BYTES + 1))
+        batch = take_batch(mailbox, TIMEOUT_S)
+        assert batch.samples == []
+        events, faults = inbox.decode(batch)
+        assert events == []
+        assert [str(fault) for fault in faults] == [
+            "a fleet message of 1048577 bytes was dropped: it may have at most 1048576"
+        ]
+
+
+def test_fleet_messages_wait_for_the_mission():
+    """A replay hears nothing of it: with it, cells at the edges of tiles would be others."""
+    fleet = {"name": "hall", "frame": "house"}
+    config = msgspec.convert({"robot": {"name": "r1"}, "fleet": fleet}, DaemonConfig)
+    every, told = base64.b64encode(b"\xff" * 512).decode(), []
+    for col in range(2):
+        said = {"version": 1, "fleet": "hall", "cell_m": config.cell_m, "frame": "house"}
+        said |= {"state": "covering", "x": 0.0, "y": 0.0, "step_s": 1.0, "epoch": 1, "division": 0}
+        said |= {"open_cells": 9, "swept": [], "ground": [[0, col, every]]}
+        payload = json.dumps(said | {"origin": [3.0, 0.0, 20.0]}).encode()
+        told.append(Received("fleet", Sample("fasaco/@v1/r2/fleet", payload), 0.0))
+    with open_bus(BusSettings("peer", (), (free_endpoint(),))) as bus:
+        poses, receiver = PoseDecoder(POSE_STAMPED, None), FleetReceiver(config)
+        inbox = Inbox(
+            bus, config.keys(), make_mailbox(MAX_PIXELS), poses, MAX_PIXELS, fleet=receiver
+        )
+        assert inbox.decode(Batch(samples=told[:1]), has_mission=False) == ([], [])
+        events, faults = inbox.decode(Batch(samples=told[1:]))
+    assert events == [FleetReceiver(config).event(told[1].sample)]
+    assert faults == []

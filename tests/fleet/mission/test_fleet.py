@@ -168,7 +168,7 @@ def test_a_robot_that_does_not_fit_is_named_and_left_out(changes, why):
     report = other.report()
     ours.tell(replace(report, **changes))
     ours.tick()
-    assert ours.mission.company.members["r2"].absence(ours.now).startswith(why)
+    assert ours.mission.company.others.known["r2"].absence(ours.now).startswith(why)
     assert not ours.mission.company.has_company
     assert ours.mission.covered.shared.cells_of("r2") == 0
 
@@ -252,7 +252,7 @@ def test_memory_for_a_robot_with_false_cells_is_bounded():
     assert [fault.code for fault in decision.faults] == ["fleet_member"]
     ours.tick()
     assert ours.mission.state == "covering"
-    assert ours.mission.company.members["r2"].absence(ours.now).endswith("are kept at most")
+    assert ours.mission.company.others.known["r2"].absence(ours.now).endswith("are kept at most")
     # There is room for others.
     assert not ours.tell(replace(other.report(), robot="r3", tiles=tiles[:2])).faults
 
@@ -396,7 +396,7 @@ def test_robots_beyond_the_limit_do_not_replace_each_other():
         decision = ours.tell(*said, after=0.0)
         assert [fault.code for fault in decision.faults] == ["fleet_member"] * 8
         ours.tick()
-    assert list(ours.mission.company.members) == names[:MOST_ROBOTS]
+    assert list(ours.mission.company.others.known) == names[:MOST_ROBOTS]
     assert ours.mission.company.numbers.number <= 3
     # Those that are gone make room.
     later = [replace(report, robot=name) for name in names[8:]]

@@ -7,17 +7,34 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fasaco_edge.fleet.mission.ground import GroundQueue
+from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.members import HANGING_S
 from fasaco_edge.fleet.mission.message import waits_for
+from fasaco_edge.fleet.mission.shared_ground import GroundQueue
 from fasaco_edge.fleet.mission.shared_work import STUCK_S, WAITING_S, Remainder
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
-from fasaco_edge.mission.events import CommandReceived, MapReceived, Part, PriorityReceived
+from fasaco_edge.mission.events import (
+    CommandReceived,
+    MapReceived,
+    MemberReceived,
+    Part,
+    PriorityReceived,
+)
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
+from fasaco_edge.mission.work.order_state import OrderState
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot
 from tests.fleet.mission.test_fleet import tiles_of
-from tests.mission.world import CELL, CONFIG, building, patch, with_policy
+from tests.mission.world import (
+    CELL,
+    CONFIG,
+    Drive,
+    building,
+    patch,
+    pose_at,
+    rectangle,
+    with_policy,
+)
 
 HALL = ["." * 24] * 12
 CELLS = [(row, col) for row in range(12) for col in range(24)]
@@ -60,6 +77,9 @@ def test_a_robot_without_a_part_stands_while_another_sweeps():
     assert ours.mission.route.plans == plans
     # By that others know that it does not hang.
     assert waits_for(ours.mission) == "r2"
+    ours.command("pause", after=1.0)
+    assert (ours.mission.state, waits_for(ours.mission)) == ("paused", "")
+    ours.command("resume", after=1.0)
     shared.run(len(CELLS) - shared.swept)
     assert ours.mission.state == "done"
 
@@ -129,14 +149,6 @@ def test_a_robot_does_not_wait_again_for_others_that_stood(swept):
     assert remainder.others_go_on
 
 
-def test_a_paused_robot_sends_that_it_waits_for_none():
-    shared = Shared()
-    shared.run(40)
-    assert waits_for(shared.ours.mission) == "r2"
-    shared.ours.tell(CommandReceived(1, "pause"), after=1.0)
-    assert (shared.ours.mission.state, waits_for(shared.ours.mission)) == ("paused", "")
-
-
 def test_a_standing_robot_in_trouble_sends_which_it_waits_for():
     # Else the others took it for one that hangs, and left it out of the next division.
     shared = Shared(with_policy(CONFIG, stale_map_s=20.0))
@@ -167,7 +179,7 @@ def test_a_robot_standing_without_a_part_stays_in_the_fleet():
         shared.run(1)
         assert not shared.ours.walk
         other.tell(shared.ours.report(), after=1.0)
-    (ours,) = other.mission.company.members.values()
+    (ours,) = other.mission.company.others.known.values()
     assert ours.absence(other.now) == ""
 
 
@@ -199,18 +211,6 @@ def test_a_robot_that_sees_nothing_left_drives_to_its_part(to_r1):
     else:
         assert ours.mission.reason == "others sweep what is left"
         assert not ours.walk
-
-
-def test_a_robot_sweeps_its_part_once_it_has_come_to_see_it():
-    ours = FleetRobot("r1", (6, 0), [row[:12] for row in HALL])
-    # Off the way of the first.
-    other = FleetRobot("r2", (11, 16), HALL)
-    for second in range(60):
-        if ours.cell[1] == 10:
-            ours.tell(MapReceived(building(*HALL)), after=0.0)
-        ours.tell(heard_from_the_east(other, second + 1, True), after=0.0)
-        ours.tick()
-    assert max(col for _, col in ours.driven) > 18
 
 
 @pytest.mark.parametrize("late_s", [1, 4])
@@ -270,3 +270,31 @@ def test_a_robot_replans_once_others_swept_its_first_floor():
         ours.tick()
     assert "others have swept what lay ahead" in [each.reason for each in ours.updates]
     assert ours.mission.orders.scope.worth.least == 0
+
+
+def test_a_zone_behind_a_robot_that_stands_is_waited_for():
+    """Cells seen past it alone were tried in one step, and the order was over, it said."""
+    there = MemberReceived("r2", state="paused", x=8.5 * CELL, y=0.5 * CELL, epoch=1, radius_m=0.1)
+    config = with_policy(CONFIG, retries=2, retry_s=30.0)
+    drive = Drive(
+        (0, 0), config=config, order_state=OrderState.idle("no order yet"), kind=FleetKind("r1")
+    )
+    rows = ["." * 16 + " " * 14]
+    drive.tell(MapReceived(building(*rows)), pose_at(0, 0), there)
+    drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(0, 20, 1, 24)}]})
+    for _ in range(40):
+        if drive.request is not None:
+            drive.plan()
+        if drive.walk and drive.walk[0][1] < 7:
+            drive.cell = drive.walk.pop(0)
+        drive.tell(pose_at(*drive.cell), there, after=1.0)
+    assert drive.mission.state == "covering"
+    assert drive.mission.reason == "others stand in the way to zone 'z'"
+    away = replace(there, x=100.0)
+    drive.tell(MapReceived(building("." * 30)), away, after=1.0)
+    for _ in range(80):
+        if drive.request is not None:
+            drive.plan()
+        drive.go(away)
+    assert drive.mission.reason == "every reachable cell of the zones is covered"
+    assert {(0, col) for col in range(20, 24)} <= drive.visited

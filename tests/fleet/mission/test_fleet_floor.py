@@ -14,6 +14,7 @@ from fasaco_edge.fleet.mission.layer import MANY_TAKEN
 from fasaco_edge.fleet.mission.message import path_ahead
 from fasaco_edge.judge.floor import judge_floor
 from fasaco_edge.mission.core.mission import Mission
+from fasaco_edge.mission.coverage.floor_tiles import PIXEL_M
 from fasaco_edge.mission.events import MapReceived, MemberReceived, Part, State
 from tests.fleet.mission.test_fleet import tiles_of
 from tests.grid.test_floor import room
@@ -34,21 +35,31 @@ def divided_by(member, number):
         y=0.3,
         epoch=1,
         division=number,
-        tiles=(),
-        ground=(),
         by=member,
         parts=parts,
         radius_m=RADIUS_M,
-        ahead=(),
-        waits_for="",
     )
 
 
-def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
-    grid = room(4.5, 3.5)
+def in_room():
+    """A robot, r1, in a room."""
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
     robot.mission.covered.shared.begin(1)
-    robot.tell(MapReceived(grid))
+    robot.tell(MapReceived(room(4.5, 3.5)))
+    return robot
+
+
+def met(robot, steps):
+    """Let a robot drive; return what another one tells that is done, close ahead of it."""
+    robot.drive(steps)
+    while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
+        robot.drive()
+    x, y = path_ahead(robot.mission)[1].tolist()
+    return replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
+
+
+def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
+    robot, grid = in_room(), room(4.5, 3.5)
     for number in range(1, 2000):
         if robot.mission.state is State.DONE:
             break
@@ -59,34 +70,23 @@ def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
 
 
 def test_a_polished_line_survives_the_wait_for_another_robot():
-    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
-    robot.tell(MapReceived(room(4.5, 3.5)))
-    robot.drive(60)
-    while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
-        robot.drive()
+    robot = in_room()
+    in_the_way = met(robot, 60)
     before = {tuple(point) for point in robot.mission.line._ahead.xy().tolist()}
-    x, y = path_ahead(robot.mission)[1].tolist()
-    in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
     robot.tell(in_the_way)
     assert robot.mission.giving_way.waits_for == "r2"
     assert not robot.line
     for _ in range(10):
-        robot.tell(replace(in_the_way, x=x + 100.0))
+        robot.tell(replace(in_the_way, x=100.0))
     assert robot.mission.giving_way.waits_for == ""
     assert len(before & {tuple(point) for point in robot.line}) > 0.6 * len(before)
     robot.drive(20)
 
 
 def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
-    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
-    robot.tell(MapReceived(room(4.5, 3.5)))
-    robot.drive(40)
-    while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
-        robot.drive()
-    x, y = path_ahead(robot.mission)[1].tolist()
-    in_the_way = replace(divided_by("r2", 0), state="done", parts=(), by="", x=x, y=y)
+    robot = in_room()
+    in_the_way = met(robot, 40)
+    x, y = in_the_way.x, in_the_way.y
     robot.tell(in_the_way)
     assert robot.mission.giving_way.waits_for == "r2"
     # Beside the middle of its cell, on the side of the other robot.
@@ -101,9 +101,7 @@ def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
 
 
 def test_a_robot_leaves_the_rest_of_a_line_without_open_floor():
-    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
-    robot.tell(MapReceived(room(4.5, 3.5)))
+    robot = in_room()
     alone = replace(divided_by("r2", 0), parts=(), by="")
     robot.tell(alone)
     # Fewer are no reason for another path at once.
@@ -124,9 +122,7 @@ def nearest_to(line, place):
 @pytest.mark.parametrize("toward", range(12))
 def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     # Both stood in a doorway for good: straight to its refuge meant into the other's side.
-    robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
-    robot.tell(MapReceived(room(4.5, 3.5)))
+    robot = in_room()
     robot.drive(150)
     angle, apart = toward * math.tau / 12, 2 * RADIUS_M + 0.01
     x, y = robot.at[0] + apart * math.cos(angle), robot.at[1] + apart * math.sin(angle)
@@ -149,3 +145,48 @@ def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     for by_m in (0.012, 0.006):
         robot.tell(MapReceived(shifted(room(4.5, 3.5), by_m)))
         assert nearest_to(robot.line, (x, y)) >= apart - 1e-6
+
+
+def around(cell):
+    """The floor of a cell, as a mask function."""
+
+    def inside(window):
+        rows = (np.arange(window.row0, window.row1) + 0.5) * PIXEL_M // CELL_M == cell[0]
+        cols = (np.arange(window.col0, window.col1) + 0.5) * PIXEL_M // CELL_M == cell[1]
+        return rows[:, None] & cols
+
+    return inside
+
+
+def begun():
+    """A robot, r1, that has passed cells of a room beside another one; and one of those."""
+    robot = in_room()
+    robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
+    robot.drive(40, is_checked=False)
+    passed = robot.mission.covered.passed.next(100)
+    return robot, next(cell for cell in passed if robot.mission.ledger.has_visited(cell))
+
+
+def test_floor_of_a_passed_cell_stays_with_the_robot_that_passed():
+    unswept_m2 = []
+    for is_left in (False, True):
+        robot, cell = begun()
+        if is_left:
+            robot.mission.covered.floor.forget(around(cell))
+        for number in range(1, 9):
+            robot.tell(replace(divided_by("r2", number), x=0.3 + 0.2 * (number % 2)))
+            robot.drive(is_checked=False)
+        assert robot.mission.company.part_cells() == 0
+        to_sweep = robot.mission.line.left.areas
+        unswept_m2.append(to_sweep.ahead_m2 + to_sweep.left_m2)
+    assert unswept_m2[1] - unswept_m2[0] > 0.5 * CELL_M**2
+
+
+def test_unswept_floor_in_a_passed_cell_does_not_delay_others():
+    robot, cell = begun()
+    for _ in range(2000):
+        if robot.mission.state is State.DONE:
+            break
+        robot.drive(is_checked=False)
+        robot.mission.covered.floor.forget(around(cell))
+    assert robot.mission.state is State.DONE

@@ -218,7 +218,9 @@ def test_two_robots_whose_maps_lie_askew_share_a_hall():
         if all(robot.mission.state == "done" for robot in robots):
             break
     assert all(robot.mission.state == "done" for robot in robots), second
-    assert not any(m.left_out for robot in robots for m in robot.mission.company.members.values())
+    assert not any(
+        m.left_out for robot in robots for m in robot.mission.company.others.known.values()
+    )
     points = np.array([point for track in swept.values() for point in track])
     for row in range(1, 11):
         for col in range(1, 23):

@@ -15,14 +15,16 @@ from fasaco_edge.daemon.fleet_wing import company_of
 from fasaco_edge.fleet.daemon.exchange import FleetReceiver, FleetSender, kind_of
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.fleet.mission.shared import MapPlace, SharedProgress
+from fasaco_edge.fleet.mission.tiles import tile_bits
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import UNKNOWN, CoverageLattice
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.core.company_kind import ALONE
-from fasaco_edge.mission.events import MapReceived
+from fasaco_edge.mission.events import MapReceived, MemberReceived
 from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
 from fasaco_edge.wire.documents.json_text import encode_json
 from tests.fleet.mission.test_fleet_frames import AT, bits_of
+from tests.mission.test_other_building import HERE, NEW, OLD, stand
 from tests.mission.world import CELL, Drive, building, pose_at
 
 HALL = DaemonConfig(
@@ -139,7 +141,7 @@ class OnFloors(Drive):
     def receive(self, payload):
         """Return why the other robot does not belong to the fleet."""
         self.tell(self.receiver.event(Sample("fasaco/@v1/r2/fleet", payload)))
-        return self.mission.company.members["r2"].left_out
+        return self.mission.company.others.known["r2"].left_out
 
     def told(self):
         said = json.loads(self.listener.payload)
@@ -216,3 +218,19 @@ def test_a_map_frame_named_as_the_fleets_frame_is_another_frame():
     assert robot.told()[0] == "floor2"
     robot.stay_on(FLOORS[1])
     assert robot.told()[0] == "floor2 of another map"
+
+
+def test_cells_of_others_on_the_previous_floor_do_not_count():
+    """They go on telling of it, in the frame that the map here has, too."""
+    everywhere = tile_bits(np.ones((64, 64), np.uint16))
+    tiles = (((0, 0), everywhere),)
+    other = MemberReceived("b", frame="map", state="covering", epoch=1, tiles=tiles)
+    drive = Drive(HERE, OLD, pose_at(*HERE), kind=FleetKind("a"))
+    drive.tell(other)
+    assert drive.mission.coverage().remaining == 0
+    stand(drive, 8.0, NEW)
+    drive.tell(other)
+    assert drive.mission.coverage().remaining == 39
+    assert "another building" in drive.mission.covered.shared.why_misplaced("map")
+    drive.command("reset")
+    assert drive.mission.covered.shared.why_misplaced("map") == ""

@@ -26,6 +26,14 @@ def member(x, y):
     return MemberReceived("r2", state="covering", x=x, y=y, epoch=1, radius_m=0.1)
 
 
+def meet(drive, *heard, at=(2, 4), seconds=1):
+    """Let a robot stand in a cell and hear others, for so many seconds; it gets its plans."""
+    for _ in range(seconds):
+        drive.tell(pose_at(*at), *heard, after=1.0)
+        if drive.request is not None:
+            drive.plan()
+
+
 def planned(**policy):
     """A robot, r1, in a hall that has its first path."""
     drive = Drive((2, 4), config=with_policy(CONFIG, **policy), kind=FleetKind("r1"))
@@ -44,13 +52,29 @@ def members():
     return Members("r1", MissionLedger(CELL_M, CELL_M, shared=SharedProgress()), CELL_M)
 
 
-def test_cells_within_reach_of_a_robot_in_the_way_are_closed(area, members):
+# Two discs of 0.1 m, and 0.1 m between them: the cell of its place, and the four beside it.
+AROUND = {(4, 4), (3, 4), (5, 4), (4, 3), (4, 5)}
+
+
+@pytest.mark.parametrize(
+    ("then", "closed"),
+    [
+        (member(1.125, 1.125), AROUND),
+        # Its poses scatter while it stands.
+        (member(1.18, 1.07), AROUND),
+        (member(2.125, 1.125), set()),
+        (replace(member(1.125, 1.125), misfit="its map is another"), set()),
+    ],
+    ids=["stands", "scatters", "drives on", "on another map"],
+)
+def test_cells_around_a_robot_in_the_way_are_closed_while_it_stands(area, members, then, closed):
     members.receive(member(1.125, 1.125), 0.0)
     assert members.closed(area, RADIUS_M) is None
     members.avoid("r2")
-    closed = members.closed(area, RADIUS_M)
-    # Two discs of 0.1 m, and 0.1 m between them: the cell of its place, and the four beside it.
-    assert set(map(tuple, np.argwhere(closed).tolist())) == {(4, 4), (3, 4), (5, 4), (4, 3), (4, 5)}
+    members.receive(then, 1.0)
+    found = members.closed(area, RADIUS_M)
+    assert members.is_avoided("r2") == bool(closed)
+    assert (set() if found is None else set(map(tuple, np.argwhere(found).tolist()))) == closed
 
 
 @pytest.mark.parametrize("x", [-0.1, 10.1, 90.0])
@@ -58,30 +82,6 @@ def test_a_robot_at_the_edge_closes_only_cells_of_the_map(area, members, x):
     members.receive(member(x, 1.125), 0.0)
     members.avoid("r2")
     assert np.count_nonzero(members.closed(area, RADIUS_M)) == (0 if x == 90.0 else 1)
-
-
-def test_no_cells_stay_closed_behind_a_robot_that_drives_on(area, members):
-    members.receive(member(1.125, 1.125), 0.0)
-    members.avoid("r2")
-    members.receive(member(2.125, 1.125), 1.0)
-    assert members.closed(area, RADIUS_M) is None
-    assert not members.is_avoided("r2")
-
-
-def test_scattered_poses_of_a_standing_robot_keep_cells_closed(area, members):
-    members.receive(member(1.125, 1.125), 0.0)
-    members.avoid("r2")
-    closed = members.closed(area, RADIUS_M)
-    members.receive(member(1.18, 1.07), 1.0)
-    assert members.is_avoided("r2")
-    assert members.closed(area, RADIUS_M).sum() == closed.sum()
-
-
-def test_no_cells_stay_closed_for_a_robot_on_another_map(area, members):
-    members.receive(member(1.125, 1.125), 0.0)
-    members.avoid("r2")
-    members.receive(replace(member(1.125, 1.125), misfit="its map is another"), 1.0)
-    assert members.closed(area, RADIUS_M) is None
 
 
 def test_cells_closed_for_a_silent_robot_are_opened(area, members):
@@ -100,9 +100,7 @@ def test_a_robot_stopped_beside_another_plans_around_it():
     behind = member((4.5 - (col - 4)) * CELL_M, (2.5 - (row - 2)) * CELL_M)
     for _ in range(int(PATIENCE_S) + 1):
         assert not drive.mission.company.others.is_avoided("r2")
-        drive.tell(pose_at(2, 4), behind, after=1.0)
-        if drive.request is not None:
-            drive.plan()
+        meet(drive, behind)
     assert drive.mission.company.others.is_avoided("r2")
     assert len(drive.mission.route.path.ahead) > 1
 
@@ -118,9 +116,7 @@ def test_a_robot_that_waited_beside_another_may_drive_on():
     # Now it stands where the path does not lead.
     behind = member((8.5 - col) * CELL_M, (4.5 - row) * CELL_M)
     for _ in range(int(PATIENCE_S)):
-        drive.tell(pose_at(2, 4), behind, after=1.0)
-        if drive.request is not None:
-            drive.plan()
+        meet(drive, behind)
         assert drive.mission.giving_way.waits_for == ""
     assert len(drive.mission.route.path.ahead) > 1
 
@@ -159,9 +155,7 @@ def test_a_plan_avoids_robots_that_stand_in_the_way_repeatedly(names):
             off_m = 0.31 if tick % 2 == place else 0.34
             x, y = here + CELL_M * ahead + (1 - 2 * place) * off_m * aside
             heard.append(replace(member(x, y), robot=name))
-        drive.tell(pose_at(row, col), *heard, after=1.0)
-        if drive.request is not None:
-            drive.plan()
+        meet(drive, *heard, at=(row, col))
     assert any(map(drive.mission.company.others.is_avoided, names))
 
 
@@ -180,10 +174,7 @@ def test_a_jammed_robot_is_planned_around():
     x, y = (col + 0.5) * CELL_M, (row + 0.5) * CELL_M
     away = (x + (col - 4) * CELL_M, y + (row - 2) * CELL_M)
     jammed = replace(member(x, y), robot="r0", ahead=(away,), waits_for="r1")
-    for _ in range(int(PATIENCE_S + STANDS_S) + 2):
-        drive.tell(pose_at(2, 4), jammed, after=1.0)
-        if drive.request is not None:
-            drive.plan()
+    meet(drive, jammed, seconds=int(PATIENCE_S + STANDS_S) + 2)
     assert drive.mission.giving_way.waits_for == ""
     assert len(drive.mission.route.path.ahead) > 1
 
@@ -195,10 +186,7 @@ def test_a_robot_without_a_way_to_its_refuge_replans():
     (row, col), (to_row, to_col) = drive.walk[1], drive.walk[0]
     off = 2 + 0.4 * (to_row - 2), 4 + 0.4 * (to_col - 4)
     other = replace(member((col + 0.5) * CELL_M, (row + 0.5) * CELL_M), state="done")
-    for _ in range(int(2 * PATIENCE_S + STANDS_S)):
-        drive.tell(pose_at(*off), other, after=1.0)
-        if drive.request is not None:
-            drive.plan()
+    meet(drive, other, at=off, seconds=int(2 * PATIENCE_S + STANDS_S))
     assert drive.mission.giving_way.waits_for == ""
     assert len(drive.mission.route.path.ahead) > 1
 
@@ -207,15 +195,11 @@ def test_a_waiting_robot_is_done_when_others_sweep_the_rest():
     drive = planned()
     x, y = ((at + 0.5) * CELL_M for at in drive.walk[1][::-1])
     ahead = replace(member(x, y), waits_for="r3")
-    for _ in range(3):
-        drive.tell(pose_at(2, 4), ahead, after=1.0)
+    meet(drive, ahead, seconds=3)
     assert drive.mission.giving_way.waits_for == "r2"
     assert len(path_ahead(drive.mission))
     swept = replace(ahead, tiles=(((0, 0), b"\xff" * TILE_BYTES),))
-    for _ in range(3):
-        drive.tell(pose_at(2, 4), swept, after=1.0)
-        if drive.request is not None:
-            drive.plan()
+    meet(drive, swept, seconds=3)
     assert drive.mission.state == "done"
     assert drive.mission.giving_way.waits_for == ""
     assert not len(path_ahead(drive.mission))

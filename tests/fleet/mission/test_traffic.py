@@ -36,86 +36,64 @@ EAST = [(0.0, 0.0), (2.0, 0.0)]
 NORTH = [(1.0, -1.0), (1.0, 1.0)]
 
 
-def test_one_of_two_robots_that_would_meet_waits():
-    first = seen("r1", EAST, heard("r2", *NORTH))
-    second = seen("r2", NORTH, heard("r1", *EAST))
-    assert first is None
-    assert second.reason == "waits for r1"
+FACING = [(0.6, 0.0), (0.6, 2.0)]
+ACROSS, LATER = [(1.0, -1.2), (1.0, 1.2)], [(1.0, -1.6), (1.0, 1.2)]
+ON = [(0.5, 0.0), (2.5, 0.0)]
+NEAR = [(0.7, 0.0), (2.0, 0.0)]
+WEST = [(1.2, 0.0), (0.0, 0.0)]
 
 
-def test_the_nearer_robot_goes_first_whatever_its_name():
-    near = [(0.7, 0.0), (2.0, 0.0)]
-    assert seen("r9", near, heard("r2", *NORTH)) is None
-    assert seen("r2", NORTH, heard("r9", *near)).robot == "r9"
+def robots(case, name, line, waits_for, other, others_line, held_by, reason):
+    """Two robots, each with its line and whom it waits for; why the first may not go on."""
+    return pytest.param(
+        name, line, waits_for, heard(other, *others_line, waits_for=held_by), reason, id=case
+    )
 
 
 @pytest.mark.parametrize(
-    "other",
+    ("name", "line", "waits_for", "other", "reason"),
     [
-        heard("r1", (0.0, 3.0), (2.0, 3.0)),
-        heard("r1", (-1.0, 0.0), (-3.0, 0.0)),
-        heard("r1", (1.9, 1.0), (1.9, -1.0)),
-        heard("r1", (0.0, 0.45), (0.0, 3.0)),
+        robots("they meet: first", "r1", EAST, "", "r2", NORTH, "", ""),
+        robots("they meet: second", "r2", NORTH, "", "r1", EAST, "", "waits for r1"),
+        # The nearer one goes first, whatever its name.
+        robots("nearer", "r9", NEAR, "", "r2", NORTH, "", ""),
+        robots("farther", "r2", NORTH, "", "r9", NEAR, "", "waits for r9"),
+        robots("far away", "r2", EAST, "", "r1", [(0.0, 3.0), (2.0, 3.0)], "", ""),
+        robots("behind", "r2", EAST, "", "r1", [(-1.0, 0.0), (-3.0, 0.0)], "", ""),
+        robots("there later", "r2", EAST, "", "r1", [(1.9, 1.0), (1.9, -1.0)], "", ""),
+        robots("parting", "r2", EAST, "", "r1", [(0.0, 0.45), (0.0, 3.0)], "", ""),
+        # One that waits needs a larger gap than one that drives.
+        robots("gap", "r2", ON, "", "r1", LATER, "", ""),
+        robots("larger gap", "r2", ON, "r1", "r1", LATER, "", "waits for r1"),
+        # Face to face each waits for the other: the first by name is blocked, and plans around.
+        robots("face to face: second", "r2", EAST, "r1", "r1", FACING, "r2", "waits for r1"),
+        robots("face to face: first", "r1", EAST, "r2", "r2", FACING, "r1", "r2 stands in the way"),
+        # Each waited for the other for ever: it had no place to go to.
+        robots("no path", "r2", EAST, "r1", "r1", FACING[:1], "r2", "r1 stands in the way"),
+        robots("in its way", "r1", FACING[:1], "r2", "r2", EAST, "r1", "makes way for r2"),
+        robots("held by a third", "r2", EAST[:1], "", "r1", WEST, "r3", ""),
+        # The other has the way, and does not make way at the same time.
+        robots("over it", "r2", EAST, "r1", "r1", WEST, "r2", "makes way for r1"),
+        robots("without work", "r1", [(1.0, 0.0)], "", "r2", EAST, "", "makes way for r2"),
+        robots("stands near", "r1", EAST, "", "r2", [(0.8, 0.0)], "", "r2 stands in the way"),
+        robots("stands far", "r1", EAST, "", "r2", [(1.9, 0.0)], "", ""),
     ],
-    ids=["far away", "behind", "there later", "parting"],
 )
-def test_robots_that_do_not_meet_are_not_held_up(other):
-    assert seen("r2", EAST, other) is None
+def test_a_robot_waits_makes_way_or_goes_on(name, line, waits_for, other, reason):
+    held = seen(name, line, other, waits_for)
+    assert (held.reason if held else "") == reason
 
 
-def test_the_other_one_drives_at_its_own_pace():
-    # It comes across 1 m away: as fast as this one both meet, at a tenth of the pace it is late.
-    line, other = [(0.5, 0.0), (2.5, 0.0)], heard("r1", (1.0, -1.2), (1.0, 1.2))
-    assert seen("r2", line, other, "r1").reason == "waits for r1"
-    assert seen("r2", line, other, "r1", pace_s_m=40.0) is None
-
-
-def test_a_waiting_robot_waits_until_there_is_a_larger_gap():
-    line, other = [(0.5, 0.0), (2.5, 0.0)], heard("r1", (1.0, -1.6), (1.0, 1.2))
-    assert seen("r2", line, other) is None
-    assert seen("r2", line, other, "r1").reason == "waits for r1"
-
-
-def test_only_one_of_two_robots_face_to_face_waits():
-    # Face to face, each waits for the other: the first by name is blocked, and plans around.
-    there = [(0.6, 0.0), (0.6, 2.0)]
-    held = seen("r2", EAST, heard("r1", *there, waits_for="r2"), "r1")
-    assert held.reason == "waits for r1"
-    assert seen("r1", EAST, heard("r2", *there, waits_for="r1"), "r2").is_blocked
-
-
-def test_a_robot_without_a_path_that_cannot_yield_is_not_awaited():
-    # Each waited for the other for ever: it had no place to go to.
-    stands = heard("r1", (0.6, 0.0), waits_for="r2")
-    assert seen("r2", EAST, stands, "r1").is_blocked
-    assert seen("r1", [(0.6, 0.0)], heard("r2", *EAST, waits_for="r1"), "r2").is_on_path
-
-
-def test_one_on_the_path_of_a_robot_that_waits_for_a_third_stays():
-    other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r3")
-    held = seen("r2", [(0.0, 0.0)], other)
-    assert held is None
-
-
-def test_a_robot_that_waits_on_the_others_path_makes_way():
-    other = heard("r1", (1.2, 0.0), (0.0, 0.0), waits_for="r2")
-    held = seen("r2", EAST, other, waits_for="r1")
-    assert held.is_on_path
-    assert held.reason == "makes way for r1"
-    # The other has the way, and does not make way at the same time.
+def test_of_two_on_one_line_only_the_second_makes_way():
     first = seen("r1", [(0.8, 0.0), (0.0, 0.0)], heard("r2", *EAST, waits_for="r1"), "r2")
     assert not first.is_on_path
 
 
-def test_a_robot_without_work_makes_way_whatever_its_name():
-    assert seen("r1", [(1.0, 0.0)], heard("r2", *EAST)).is_on_path
-
-
-def test_a_robot_that_stands_in_the_way_is_named():
-    held = seen("r1", EAST, heard("r2", (0.8, 0.0)))
-    assert held.is_blocked
-    assert held.reason == "r2 stands in the way"
-    assert seen("r1", EAST, heard("r2", (1.9, 0.0))) is None
+def test_the_other_one_drives_at_its_own_pace():
+    # It comes across 1 m away: as fast as this one both meet, at a tenth of the pace it is late.
+    other = heard("r1", *ACROSS)
+    assert seen("r2", ON, other, "r1").reason == "waits for r1"
+    assert seen("r2", ON, other, "r1", pace_s_m=40.0) is None
 
 
 def at(cell):

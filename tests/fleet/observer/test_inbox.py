@@ -6,7 +6,7 @@ import pytest
 
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.fleet.mission.frames import MOST_OTHERS
-from fasaco_edge.fleet.observer.inbox import DEPTHS, FleetInbox
+from fasaco_edge.fleet.observer.queues import DEPTHS, FleetInbox
 
 CAPACITY = 4_000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fasaco_edge.fleet.observer.members import GONE_NS, Members
+from fasaco_edge.fleet.observer.observed import GONE_NS, ObservedFleet
 from fasaco_edge.fleet.observer.survey import NOBODY, owners_of, survey_of
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.wire.documents.fleet import FleetPart
@@ -19,18 +19,11 @@ PARTS = tuple(FleetPart(name, *cell, 0.0, 1.2) for name, cell in (("a", (0, 0)),
 @pytest.fixture
 def halved():
     """Two robots that have divided a hall."""
-    members = Members()
+    members = ObservedFleet()
     assert survey_of(members, 0).geometry is None
     for name in ("a", "b"):
         members.receive(name, member(division=7, by="a", parts=PARTS), SECOND)
     return members
-
-
-def test_each_has_the_part_that_it_is_nearer_to(halved):
-    cells = survey_of(halved, SECOND).left
-    assert cells.keys() == {"a", "b"}
-    assert cells.total() == HALL
-    assert abs(cells["a"] - cells["b"]) <= 20
 
 
 def test_the_last_robot_has_all_remaining_cells(halved):

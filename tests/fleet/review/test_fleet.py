@@ -9,7 +9,13 @@ pytest.importorskip("rerun")
 
 from fasaco_edge.drawing.plot import MapLayer
 from fasaco_edge.fleet.recording import notes
-from fasaco_edge.fleet.recording.notes import NOTES_VERSION, Note, NoteBatch, NotedRobot, Pass
+from fasaco_edge.fleet.recording.notes import (
+    NOTES_VERSION,
+    EnteredCell,
+    Note,
+    NoteBatch,
+    NotedRobot,
+)
 from fasaco_edge.fleet.review import report as fleet
 from fasaco_edge.fleet.review.drawing import draw_fleet_mission, robot_tint
 from fasaco_edge.fleet.review.report import review_fleet
@@ -32,7 +38,7 @@ def noted(robot, way, begin_s, *, waits=(), scale=1.0):
         notes.append(
             Note(
                 robot, at_ms, "covering", 0.0, 0.0, "other" if second in waits else "", 3, 9, 2,
-                500, CELL_M, [4.0], [Pass(at_ms, *cell)], list(tiles(swept)),
+                500, CELL_M, [4.0], [EnteredCell(at_ms, *cell)], list(tiles(swept)),
                 list(tiles(GROUND)) if not second else [],
                 stamp_ms=7_000 + round(scale * at_ms), time_scale=scale,
             )
@@ -88,32 +94,24 @@ def test_unswept_floor_is_new_even_after_a_month(monkeypatch):
     assert figures.again_m2 == figures.through_m2 == 0.0
 
 
-def test_makespan_balance_waiting_and_messages(monkeypatch):
-    figures = reviewed(monkeypatch, lane(0, 0, 10), lane(4, 0, 10), waits=(2, 3, 7))
+@pytest.mark.parametrize("scale", [1.0, 10.0], ids=["real", "simulated"])
+def test_makespan_balance_waiting_and_messages(monkeypatch, scale):
+    """Durations are by the robots' clocks."""
+    ways = lane(0, 0, 10), lane(4, 0, 10)
+    figures = reviewed(monkeypatch, *ways, waits=(2, 3, 7), scale=scale)
     first, second = figures.robots
-    assert figures.makespan_s == 21.0
+    assert figures.time_scale == scale
+    assert figures.makespan_s == 21.0 * scale
     assert (first.waits, first.waited_s) == (0, 0.0)
-    assert (second.waits, second.waited_s, second.longest_wait_s) == (2, 3.0, 2.0)
-    assert (first.busy_s, second.busy_s) == (10.0, 7.0)
+    waits = second.waits, second.waited_s, second.longest_wait_s
+    assert waits == (2, 3.0 * scale, 2.0 * scale)
+    assert (first.busy_s, second.busy_s) == (10.0 * scale, 7.0 * scale)
     assert figures.busy_balance == 0.7
     assert figures.swept_balance == 1.0
-    assert (first.messages_s, first.kb_s) == (2.2, 0.55)
+    assert first.messages_s == pytest.approx(2.2 / scale)
+    assert first.kb_s == pytest.approx(0.55 / scale, abs=0.006)
     assert first.driven_m == 11 * CELL_M
     assert (first.plans, first.plan_ms_p99) == (11, 4.0)
-
-
-def test_durations_are_the_simulated_robots(monkeypatch):
-    ways = lane(0, 0, 10), lane(4, 0, 10)
-    real = reviewed(monkeypatch, *ways, waits=(2, 3, 7))
-    figures = reviewed(monkeypatch, *ways, waits=(2, 3, 7), scale=10.0)
-    assert (real.time_scale, figures.time_scale) == (1.0, 10.0)
-    assert (figures.makespan_s, figures.duration_s) == (210.0, 210.0)
-    first, second = figures.robots
-    assert (second.waits, second.waited_s, second.longest_wait_s) == (2, 30.0, 20.0)
-    assert (first.busy_s, second.busy_s) == (100.0, 70.0)
-    assert (first.messages_s, first.kb_s) == (0.22, 0.06)
-    assert figures.again_m2 == real.again_m2
-    assert first.plan_ms_p99 == 4.0
 
 
 def test_robots_have_the_colours_of_the_recording(monkeypatch):

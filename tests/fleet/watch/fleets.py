@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fasaco_edge.bus.arrival import Arrival, Sample
-from fasaco_edge.fleet.observer.inbox import Received
+from fasaco_edge.fleet.observer.queues import RobotSample
 from fasaco_edge.fleet.watch.view import FleetView
 from fasaco_edge.wire.documents.fleet import FleetPart
 from fasaco_edge.wire.documents.json_text import encode_json
@@ -21,7 +21,7 @@ def tell(view: FleetView, robot: str, topic: str, payload: bytes, now: float = N
     """Let a sample come."""
     sample = Sample(f"fasaco/@v1/{robot}/{topic}", payload)
     at_ns = int(1e9 * now)
-    view.take(Received(robot, Arrival(topic, sample, at_ns, at_ns)))
+    view.take(RobotSample(robot, Arrival(topic, sample, at_ns, at_ns)))
 
 
 def say(view: FleetView, robot: str, now: float = NOW, **members: Any) -> None:

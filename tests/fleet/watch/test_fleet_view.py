@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.client.phrases import KEPT
-from fasaco_edge.fleet.observer.members import GONE_NS, MOST_MEMBERS
+from fasaco_edge.fleet.observer.observed import GONE_NS, MOST_MEMBERS
 from fasaco_edge.fleet.observer.survey import MOST_STEPS
 from fasaco_edge.fleet.watch import view as fleet_view
 from fasaco_edge.fleet.watch.view import LONGEST, MOST_FAULTS, MOST_FLEETS, FleetView
@@ -21,7 +21,7 @@ from fasaco_edge.wire.limits import (
     MAX_FLEET_PARTS,
     MAX_FLEET_TILES,
 )
-from tests.fleet.told import CELL_M, member, tiles
+from tests.fleet.told import member
 from tests.fleet.watch.fleets import PARTS, say, tell, two_in_a_hall
 from tests.watch.grids import NOW, status
 
@@ -40,41 +40,32 @@ def texts(view):
     return [entry.text for entry in view.events.entries]
 
 
-def doing(view, now=NOW):
-    return {robot.name: robot.doing for robot in view.robots(now)}
-
-
 def test_it_tells_who_does_what():
     view = two_in_a_hall()
-    a, b = view.robots(NOW)
-    assert doing(view) == {"a": "covering", "b": "waits for a"}
-    assert (a.x, a.y) == (1.0, 1.0)
-    assert (a.swept_cells, b.swept_cells) == (4, 3)
-    assert a.cell_m2 == pytest.approx(CELL_M**2)
-    # Each cell counts once, and cells that are swept are no part of what is left.
-    assert view.floor.area == HALL
-    assert (view.floor.swept, view.floor.twice.sum()) == (6, 1)
-    assert a.left_cells + b.left_cells == HALL - 6
-    assert abs(a.left_cells - b.left_cells) <= 20
+    document = view.document(NOW)
+    json.dumps(document, allow_nan=False)
+    a, b = document.pop("robots")
+    # Each cell counts once.
+    assert document == {
+        "fleet": "house", "at_work": 2, "division": 7, "cells": HALL, "swept_cells": 6,
+        "swept_twice_cells": 1, "swept_m2": 0.54, "fraction": 0.01, "unheard": [],
+    }  # fmt: skip
+    assert b | {"part_cells": 0} == {
+        "name": "b", "state": "covering", "x": 8.3, "y": 5.2, "waits_for": "a", "away": None,
+        "division": 7, "swept_cells": 3, "swept_m2": 0.27, "part_cells": 0, "path": None,
+    }  # fmt: skip
+    # Cells that are swept are no part of what is left.
+    assert a["part_cells"] + b["part_cells"] == HALL - 6
+    assert abs(a["part_cells"] - b["part_cells"]) <= 20
+    assert {robot.name: robot.doing for robot in view.robots(NOW)} == {
+        "a": "covering",
+        "b": "waits for a",
+    }
     assert texts(view) == [
         "division 7 by b, 2 parts",
         "a joined: covering",
         "b joined: waits for a",
     ]
-
-
-def test_the_same_as_json():
-    document = two_in_a_hall().document(NOW)
-    json.dumps(document, allow_nan=False)
-    robots = document.pop("robots")
-    assert document == {
-        "fleet": "house", "at_work": 2, "division": 7, "cells": HALL, "swept_cells": 6,
-        "swept_twice_cells": 1, "swept_m2": 0.54, "fraction": 0.01, "unheard": [],
-    }  # fmt: skip
-    assert robots[1] | {"part_cells": 0} == {
-        "name": "b", "state": "covering", "x": 8.3, "y": 5.2, "waits_for": "a", "away": None,
-        "division": 7, "swept_cells": 3, "swept_m2": 0.27, "part_cells": 0, "path": None,
-    }  # fmt: skip
 
 
 def test_each_change_is_one_event():
@@ -106,21 +97,10 @@ def test_places_are_in_the_frame_of_the_fleet():
     view = FleetView("house")
     # Its map lies 10 m to the east, turned by a quarter.
     say(view, "a", x=1.0, y=0.5, origin=(10.0, 0.0, 90.0), cells=[(0, 0)])
-    (a,) = view.robots(NOW)
-    assert (a.x, a.y) == pytest.approx((9.5, 1.0))
+    (a,) = view.document(NOW)["robots"]
+    assert (a["x"], a["y"]) == (9.5, 1.0)
     say(view, "a", NOW + 1, origin=(0.0, 0.0, 0.0))
     assert "its frame has changed" in texts(view)[-1]
-
-
-def test_robots_with_turned_maps_share_the_floor():
-    view = FleetView("house")
-    square = [(row, col) for row in range(10) for col in range(10)]
-    ours = {"ground": tiles(square)}
-    say(view, "a", cells=square, **ours)
-    # The same floor, seen from the corner across.
-    say(view, "b", cells=square[:50], origin=(3.0, 3.0, 180.0), **ours)
-    view.tick(NOW)
-    assert (view.floor.area, view.floor.swept, view.floor.twice.sum()) == (100, 100, 50)
 
 
 def test_a_robot_that_others_leave_out_is_shown_as_such():

@@ -28,7 +28,7 @@ LEAST_SHARING = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Received:
+class RobotSample:
     """A sample of a robot."""
 
     robot: str
@@ -81,7 +81,7 @@ class FleetInbox:
             self._is_news = True
             self._changed.notify()
 
-    def take(self, timeout_s: float) -> list[Received]:
+    def take(self, timeout_s: float) -> list[RobotSample]:
         """Return all waiting samples, robot by robot; wait up to ``timeout_s`` [s] for one."""
         with self._changed:
             if not self._is_news:
@@ -90,7 +90,7 @@ class FleetInbox:
             for robot, queues in self._robots.items():
                 arrivals = [one for waiting in queues.waiting.values() for one in waiting]
                 arrivals.sort(key=lambda arrival: arrival.at_ns)
-                taken += [Received(robot, arrival) for arrival in arrivals]
+                taken += [RobotSample(robot, arrival) for arrival in arrivals]
                 queues.waiting.clear()
                 queues.bytes = 0
             self._is_news = False

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from fasaco_edge.errors import FleetError
 from fasaco_edge.fleet.mission.frames import placed_point
 from fasaco_edge.fleet.observer.cells import Seat, TileSet
-from fasaco_edge.wire.documents.fleet import CellTile, FleetMember
+from fasaco_edge.wire.documents.fleet import FleetMember
 from fasaco_edge.wire.limits import MAX_FLEET_PARTS
 
 # Largest number of robots observed.
@@ -21,7 +21,7 @@ JOINED, GONE, WAITING = "joined", "gone", "waiting"
 
 
 @dataclass(slots=True)
-class Member:
+class ObservedRobot:
     """A robot of the fleet.
 
     Attributes:
@@ -32,7 +32,6 @@ class Member:
         received_ns: time of its newest message [ns].
         swept, ground: cells that it has swept; cells that it can reach.
         changes: number of changes of these cells and of their seat.
-        news: tiles of ``swept`` and of ``ground`` that its newest message changed.
     """
 
     name: str
@@ -43,7 +42,6 @@ class Member:
     swept: TileSet = field(default_factory=TileSet)
     ground: TileSet = field(default_factory=TileSet)
     changes: int = 0
-    news: tuple[Sequence[CellTile], Sequence[CellTile]] = (), ()
 
     def receive(self, said: FleetMember, at_ns: int) -> str:
         """Take in a message; return how its frame has changed, or ""."""
@@ -60,7 +58,7 @@ class Member:
         self.newest, self.received_ns = said, at_ns
         swept = self.swept.take(said.swept, grows=True)
         ground = self.ground.take(said.ground, grows=False)
-        self.news, self.changes = (swept, ground), self.changes + bool(swept or ground)
+        self.changes += swept or ground
         return moved
 
     def is_moved_by(self, said: FleetMember) -> bool:
@@ -82,13 +80,13 @@ class Member:
         return placed_point(self.seat.frame, x, y)
 
 
-class Members:
+class ObservedFleet:
     """The robots of one fleet, in order of joining."""
 
     def __init__(self) -> None:
-        self._by_name: dict[str, Member] = {}
+        self._by_name: dict[str, ObservedRobot] = {}
 
-    def receive(self, robot: str, said: FleetMember, at_ns: int) -> tuple[Member, str]:
+    def receive(self, robot: str, said: FleetMember, at_ns: int) -> tuple[ObservedRobot, str]:
         """Take in a message; return its robot, and JOINED, how its frame has changed, or "".
 
         Raises:
@@ -98,25 +96,26 @@ class Members:
         if member is None:
             if len(self) >= MOST_MEMBERS:
                 raise FleetError(f"{robot}: {MOST_MEMBERS} robots of a fleet are observed at most")
-            member = self._by_name[robot] = Member(robot, len(self), Seat.of(said), said, at_ns)
+            member = self._by_name[robot] = ObservedRobot(
+                robot, len(self), Seat.of(said), said, at_ns
+            )
             member.receive(said, at_ns)
             return member, JOINED
         if at_ns - member.received_ns < LEAST_SPACING_NS:
-            member.news = (), ()
             return member, ""
         return member, member.receive(said, at_ns)
 
-    def get(self, robot: str) -> Member | None:
+    def get(self, robot: str) -> ObservedRobot | None:
         """Return a robot; None if it has not joined."""
         return self._by_name.get(robot)
 
-    def __iter__(self) -> Iterator[Member]:
+    def __iter__(self) -> Iterator[ObservedRobot]:
         return iter(self._by_name.values())
 
     def __len__(self) -> int:
         return len(self._by_name)
 
-    def dividing(self, now_ns: int) -> Member | None:
+    def dividing(self, now_ns: int) -> ObservedRobot | None:
         """Return a robot that sends the division in force; None if no robot sends a division.
 
         A robot that is alone sends a number without parts: all cells left are its own. Messages of

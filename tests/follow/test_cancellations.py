@@ -2,7 +2,7 @@
 
 import pytest
 
-from fasaco_edge.follow.actions import MOST_CANCELLED, Cancellations
+from fasaco_edge.follow.nav2_node import MOST_CANCELLED, Cancellations
 from fasaco_edge.wire.messages.nav2_goals import ENDED_BEFORE, NO_SUCH_GOAL, REJECTED, TAKEN
 
 
@@ -16,7 +16,7 @@ def cancellations():
 @pytest.mark.parametrize("answer", [TAKEN, NO_SUCH_GOAL, ENDED_BEFORE, REJECTED, None])
 @pytest.mark.parametrize("accepted", [True, None])
 def test_a_goal_is_cancelled_each_second_until_confirmed(cancellations, answer, accepted):
-    """Also one whose answer was lost: docking cancelled such a goal for good."""
+    """Also one whose answer was lost."""
     cancellations.take_accepted(b"a", accepted)
     cancellations.add(b"a")
     assert [cancellations.due(now) for now in (5.0, 5.9, 6.0)] == [[b"a"], [], [b"a"]]

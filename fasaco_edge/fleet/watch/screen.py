@@ -1,8 +1,9 @@
-"""Watch of a fleet, its feed and its screen: robots' activities, latest events."""
+"""Watch of a fleet: its feed from the bus, and the screen that shows its robots and events."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
 
 from rich.console import Console, Group
 from rich.table import Table
@@ -11,10 +12,12 @@ from rich.text import Text
 from fasaco_edge.bus.arrival import Arrival, Sample
 from fasaco_edge.bus.session import Bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.client import phrases
 from fasaco_edge.client.feed import BusJoining
 from fasaco_edge.client.phrases import clock, steady_now
-from fasaco_edge.fleet.observer.inbox import FleetInbox, FleetSubscriptions, Received
+from fasaco_edge.errors import FasacoError, NobodyAnswersError
+from fasaco_edge.fleet.observer.queues import FleetInbox, FleetSubscriptions
 from fasaco_edge.fleet.observer.survey import Survey
 from fasaco_edge.fleet.watch.view import FleetRobot, FleetView, short
 from fasaco_edge.text import one_line, percent
@@ -22,7 +25,7 @@ from fasaco_edge.watch.glyphs import FAINT, GlyphSet, ScreenBlocks, with_keys
 from fasaco_edge.watch.live import Watched
 from fasaco_edge.watch.page import Layout
 from fasaco_edge.watch.status_table import LONGEST_BAR, state_colour
-from fasaco_edge.wire.keys import Keys
+from fasaco_edge.wire.keys import VERSION, Keys
 from fasaco_edge.wire.topics import STATUS
 
 GONE_COLOUR, WAITING_COLOUR = "red", "yellow"
@@ -133,32 +136,25 @@ class FleetFeed(BusJoining):
 
     The reader gets the fleet messages of all robots, and selects by ``attend`` the robots whose
     statuses it wants.
+
+    Attributes:
+        inbox: the samples that have arrived.
     """
 
     def __init__(self, settings: BusSettings, keys: Keys) -> None:
         super().__init__(settings)
         self._keys = keys
-        self._inbox = FleetInbox(CAPACITY_BYTES, _stamped)
+        self.inbox = FleetInbox(CAPACITY_BYTES, _stamped)
         self._subscriptions: FleetSubscriptions | None = None
-
-    def take(self, timeout_s: float) -> list[Received]:
-        """Return what has arrived, robot by robot; wait up to ``timeout_s`` [s] for a sample."""
-        return self._inbox.take(timeout_s)
 
     def attend(self, robots: Collection[str]) -> None:
         """Subscribe to the robots of these names; call it often."""
-        subscriptions = self._subscriptions
-        if subscriptions is None:
-            return
-        for robot in set(robots) - subscriptions.robots:
-            subscriptions.subscribe(robot)
-
-    def forget(self, robot: str) -> None:
-        """Drop the queues of a robot of another fleet."""
-        self._inbox.forget(robot)
+        if (subscriptions := self._subscriptions) is not None:
+            for robot in set(robots) - subscriptions.robots:
+                subscriptions.subscribe(robot)
 
     def _listen(self, bus: Bus) -> None:
-        subscriptions = FleetSubscriptions(bus, self._keys, (STATUS,), self._inbox.post)
+        subscriptions = FleetSubscriptions(bus, self._keys, (STATUS,), self.inbox.post)
         subscriptions.listen()
         self._subscriptions = subscriptions
 
@@ -190,13 +186,13 @@ class FleetWatch(Watched):
 
     def take(self, timeout_s: float) -> bool:
         view, feed = self.view, self._feed
-        items = feed.take(timeout_s)
+        items = feed.inbox.take(timeout_s)
         was_known = self.is_known()
         for received in items:
             view.take(received)
             if view.members.get(received.robot) is None:
                 # Invented names must not take all queues.
-                feed.forget(received.robot)
+                feed.inbox.forget(received.robot)
         now = steady_now()
         if not was_known:
             self._known_at = now
@@ -243,3 +239,23 @@ class FleetWatch(Watched):
         view = self.view
         is_complete = steady_now() - self._known_at > SENT_S
         return is_complete and view.floor.robots >= set(view.names())
+
+
+@contextmanager
+def fleet_on_bus(
+    fleet: str, keys: Keys, bus: BusSettings, console: Console
+) -> Iterator[tuple[FleetWatch, Callable[[], FasacoError]]]:
+    """Yield the watch of a fleet, and a function that returns the error if no robot answers."""
+    view = FleetView(fleet)
+    with FleetFeed(bus, keys) as feed:
+        yield FleetWatch(feed, view, console), lambda: _no_robot(keys, view)
+
+
+def _no_robot(keys: Keys, view: FleetView) -> NobodyAnswersError:
+    if not view.others:
+        return nobody_answers(f"{keys.base}/{VERSION}/*", ())
+    return NobodyAnswersError(
+        f"no robot of a fleet {one_line(view.fleet)!r} answers",
+        hint=f"there are robots of these fleets: {', '.join(sorted(view.others))}; "
+        "`fleet: {name: ...}` in its configuration makes a robot one of a fleet",
+    )
