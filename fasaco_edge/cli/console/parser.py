@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from fasaco_edge.cli.console.help import HelpText
-from fasaco_edge.text import nearest
+from fasaco_edge.text import suggestion
 
 USAGE = 2
 """Exit code of a wrong command line."""
@@ -41,17 +41,20 @@ class Parser(argparse.ArgumentParser):
         """Print the unknown arguments and a suggestion, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
-        meant = _suggestion(names[0], options) if names else ""
+        meant = suggestion(names[0], options) if names else ""
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:  # noqa: ANN401
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as error:
+            if re.fullmatch(r"-?\d*,\d+", arg_string):
+                error.message += f"; did you mean {arg_string.replace(',', '.')}?"
+            raise
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401
         if action.choices is None or value in action.choices:
             return
         names = [str(choice) for choice in action.choices]
-        meant = _suggestion(str(value), names) or f"there are {', '.join(names)}"
+        meant = suggestion(str(value), names) or f"there are {', '.join(names)}"
         raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {meant}")
-
-
-def _suggestion(word: str, names: Sequence[str]) -> str:
-    """Return a question for the name that ``word`` resembles; "" for none."""
-    return "".join(f"did you mean {name}?" for name in nearest(word, names)[:1])
