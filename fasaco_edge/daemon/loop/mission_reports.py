@@ -262,16 +262,23 @@ def zone_progress(mission: Mission) -> list[ZoneProgress]:
     return progress.zone_progress(mission.order_state, mission.map.area, mission.covered)
 
 
+def ahead_s(mission: Mission) -> float:
+    """Return the time of the path ahead [s]: of its line, or of its walk where cells are driven."""
+    line = mission.line.ahead()
+    if line is None:
+        return mission.orders.scope.walk_s(mission.route.path.ahead)
+    return line.seconds
+
+
 def room_progress(mission: Mission) -> dict[int, RoomProgress]:
     """Return the progress in each room, by its number."""
     from fasaco_edge.mission.coverage import progress  # noqa: PLC0415
 
-    area, ahead, line = mission.map.area, mission.route.path.ahead, mission.line.ahead()
+    area, ahead = mission.map.area, mission.route.path.ahead
     rooms = None if area is None else mission.room_cells.on(area.lattice)
     to_go_s: dict[int, float] = {}
     if area is not None and rooms is not None:
-        ahead_s = mission.orders.scope.walk_s(ahead) if line is None else line.seconds
-        to_go_s = progress.seconds_in(rooms, area.lattice.window, ahead, ahead_s)
+        to_go_s = progress.seconds_in(rooms, area.lattice.window, ahead, ahead_s(mission))
     deg = mission.rotation.deg
     return progress.room_progress(mission.rooms, deg, area, mission.covered, to_go_s)
 
