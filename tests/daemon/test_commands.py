@@ -256,8 +256,12 @@ def test_the_command_line(tmp_path):
         file.write_text("keep_out:\n  - [[1, 1], [2, 1], [2, 2]]\npasses: 3\n")
         mission = told(running, "start", "--order", str(file), "--yes")["mission"]
         assert (mission["passes"], mission["zones"]) == (3, [])
-        assert told(running, "reset")["reason"] == "reset: what was covered is forgotten"
-        assert told(running, "cancel")["state"] == "idle"
+        cancelled = told(running, "cancel")
+        assert cancelled["state"] == "idle"
+        assert cancelled["mission"]["last_order"]["passes"] == 3
+        reset = told(running, "reset")
+        assert reset["reason"] == "reset: what was covered is forgotten"
+        assert reset["mission"]["last_order"] is None
         refused = fasaco_edge("mission", "pause", "--connect", running.endpoint)
         assert refused.code == 1
         assert refused.out == ""

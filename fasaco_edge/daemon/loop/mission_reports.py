@@ -10,6 +10,7 @@ import numpy as np
 
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.mission.orders.order import order_document
 from fasaco_edge.mission.orders.order_state import OrderState
 from fasaco_edge.mission.orders.placing import left_out
 from fasaco_edge.wire.documents.replies import (
@@ -197,6 +198,7 @@ def mission_report(
         left_out=() if order is None else left_out(order.zones),
         time_left_s=rounded(mission.time_limit.left_s) if mission else None,
         first_from=mission.orders.scope.worth.least or None if mission else None,
+        last_order=order_document(order_state.last) if order_state.last else None,
     )
 
 
