@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
@@ -147,7 +148,10 @@ def show_mission(reply: Reply) -> None:
 
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     mission = answer.mission
-    rows = [("robot", answer.robot), ("state", answer.state), ("reason", plain(answer.reason))]
+    rows = [("robot", answer.robot), ("state", answer.state)]
+    # On its path a robot has no other reason than the path's number.
+    if not re.fullmatch(r"path \d+", answer.reason):
+        rows.append(("reason", plain(answer.reason)))
     if mission.ordered is not None:
         began = "begun by itself" if mission.ordered == "itself" else "as ordered"
         stage = phrases.stage(mission)

@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(f"{args.file}: in order")
         for remark in filter(None, (config.robot.assumed, *cautions(config))):
-            print(f"  {remark}")
+            say(out(), remark, "  ", "  ")
     return Exit.OK if config is not None else Exit.CONFIG
 
 

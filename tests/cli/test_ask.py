@@ -93,3 +93,9 @@ def test_troubles_are_shown_with_what_to_do(capsys):
     shown = " ".join(capsys.readouterr().out.split())
     assert "no ground beside keep-out far" in shown
     assert "move it" in shown
+
+
+@pytest.mark.parametrize(("reason", "shown"), [("path 7", False), ("paused by command", True)])
+def test_a_reason_is_shown_unless_it_is_the_number_of_a_path(capsys, reason, shown):
+    show("status", Reply(encode_json(Status(robot="r1", state="covering", reason=reason))))
+    assert ("reason" in capsys.readouterr().out) == shown

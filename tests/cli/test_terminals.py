@@ -66,7 +66,7 @@ TO_THE_END = [
 ENDED = [
     ("run --config other.yaml --state other", "ready after", 0),
     ("follow", "looks for other followers", 0),
-    ("serve --listen 127.0.0.1:{}", "page at http://127.0.0.1:", 0),
+    ("serve --listen 127.0.0.1:{}", "/ to look only", 0),
     ("record --out .", "records into .; Ctrl-C ends it", 0),
     ("init new.yaml", "Radius of the disc", 130),
     ("bench planners --seeds 1000 --maps basement", "planners ━", 130),
