@@ -121,7 +121,7 @@ def folder(tmp_path, monkeypatch):
         (f"simulate office --robot a/b --connect {NOBODY}", 78, "got 'a/b'"),
         ("simulate office --trail-out no/trail.csv", 78, "there is no folder no"),
         ("simulate office --connect office", 78, "'office': no protocol before the address"),
-        (f"record --out . --connect {NOBODY}", 1, "Unable to connect to any of"),
+        (f"record --out . --connect {NOBODY}", 1, f"cannot connect to {NOBODY}\n"),
         (f"record --out . --base /x --connect {NOBODY}", 78, "base: must be chunks"),
         (
             f"record --out . --quota-mb -5 --connect {NOBODY}",
@@ -157,7 +157,10 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("", "the following arguments are required: COMMAND"),
+        ("", "a command is missing; there are demo, plan, init"),
+        ("mission", "fasaco-edge mission: a command is missing; there are start, "),
+        ("--verison", "unrecognized arguments: --verison; did you mean --version?"),
+        ("plan --planer zigzag", "unrecognized arguments: --planer; did you mean --planner?"),
         ("dance", "invalid choice: 'dance'; there are demo, plan, init"),
         ("reviw a.rrd", "did you mean review?"),
         ("bench planer", "did you mean planners?"),

@@ -296,7 +296,7 @@ def begin_idle(outsider: Outsider) -> None:
         (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),
         (("start", "--zone", "a:0,0;1,1;1,0;0,1"), "zones[0].polygon: crosses or touches itself"),
         (("start", "--zone", "a:0,0;1,0;nan,1"), "zones[0].polygon[2]: must be finite"),
-        (("status",), "Unable to connect to any of"),
+        (("status",), "cannot connect to tcp/127.0.0.1:1\n"),
     ],
 )
 def test_mistakes_are_reported_without_a_daemon(tmp_path: Path, monkeypatch, capsys, words, said):

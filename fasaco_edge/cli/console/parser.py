@@ -22,18 +22,30 @@ class Parser(argparse.ArgumentParser):
         super().__init__(**{"formatter_class": HelpText} | options)
         # A value such as -1,2 is a position, and no option.
         self._negative_number_matcher = re.compile(r"-\.?\d")
+        self._given: Sequence[str] = ()
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Return the arguments, and unknown words; ``parser``: parser of the innermost command."""
+        self._given = sys.argv[1:] if args is None else args
         found, unknown = super().parse_known_args(args, namespace)
         if not hasattr(found, "parser"):
             found.parser = self
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        """Print an error, and exit."""
+        """Print an error, and exit; a misspelt option comes before a missing argument."""
+        if "arguments are required" in message:
+            options = tuple(self._option_string_actions)
+            for word in self._given:
+                name = word.partition("=")[0]
+                if name.startswith("--") and not any(each.startswith(name) for each in options):
+                    self._given = ()
+                    self.refuse([name])
+        if message.endswith("required: COMMAND"):
+            groups = [each for each in self._actions if isinstance(each.choices, dict)]
+            message = f"a command is missing; there are {', '.join(groups[0].choices or ())}"
         print(f"{self.prog}: {message}\nsee: {self.prog} --help", file=sys.stderr)
         sys.exit(USAGE)
 
