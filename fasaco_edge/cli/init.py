@@ -125,7 +125,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--listen",
-        type=seconds,
+        type=seconds(),
         default=5.0,
         metavar="S",
         help="time to look for maps (default: %(default)g s)",

@@ -8,8 +8,7 @@ import pytest
 
 from fasaco_edge.bus.queries import Reply
 from fasaco_edge.cli import main
-from fasaco_edge.cli.ask import show
-from fasaco_edge.cli.console.rooms_table import show_rooms
+from fasaco_edge.cli.ask import show, show_rooms
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import TroubleReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
