@@ -46,7 +46,7 @@ TO_THE_END = [
     ("check-config mine.yaml", {0}, "mine.yaml: in order"),
     # By the computer that the tests run on.
     ("check-config open.yaml", {78}, "authentication"),
-    ("init new.yaml --robot-radius 0.2 --tool-width 0.5 --map-by zenoh --force", {0}, "caution:"),
+    ("init wide.yaml --robot-radius 0.2 --tool-width 0.5 --map-by zenoh --force", {0}, "caution:"),
     ("doctor --config mine.yaml", {0, 1}, "the daemon runs: covering"),
     ("plan office --budget 0.1 --long", {0}, "walk recovered cells"),
     ("ask status", {0}, "covering"),
