@@ -63,6 +63,7 @@ def test_the_demo_is_a_live_map_and_then_a_summary(folder):
         screen = "\n".join(shell.screen())
     assert screen.startswith("kernels ready")
     assert "q quits" not in screen
+    assert "\nthe mission is over: " in screen
     assert "\nroom: every reachable cell is covered\n" in screen
     assert re.search(r"floor swept +│ \d\.\d of \d\.\d m2", screen)
     for program in ("fasaco-edge review", "fasaco-edge serve", "rerun"):
