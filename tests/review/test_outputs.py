@@ -10,6 +10,7 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from PIL import Image
@@ -299,3 +300,10 @@ def test_each_time_it_charged_is_a_line(parts):
     found = document_of(replace(review, states=(*review.states, *spans), data=data))
     assert [row[1:] for row in charge_rows(found)] == [("1:00.0", "14% to 90%")]
     assert "14% to 90%" in dict(screen_rows(review, found))["charges"]
+
+
+def test_shares_that_were_never_reached_are_left_out(parts):
+    review = read_review(parts)
+    reached_s = {"50": 60.0, "90": None, "99": None, "100": None}
+    found = msgspec.structs.replace(document_of(review), reached_s=reached_s)
+    assert dict(screen_rows(review, found))["cells after"] == "50 % 1:00.0"
