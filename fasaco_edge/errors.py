@@ -21,6 +21,9 @@ class FasacoError(Exception):
         super().__init__(message)
         if hint is not None:
             self.hint = hint
+        # So that a traceback shows it, too: in a notebook there is no command line that prints it.
+        if self.hint:
+            self.add_note(f"hint: {self.hint}")
 
 
 class DocumentError(FasacoError):

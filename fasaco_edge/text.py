@@ -90,3 +90,8 @@ def nearest(name: str, names: Collection[str], least: float = 0.6) -> list[str]:
     """Return the names that ``name`` probably stands for: it lacks their unit, or is misspelt."""
     near = [each for each in names if each.startswith(f"{name}_")]
     return near or get_close_matches(name, names, 1, least)
+
+
+def suggestion(word: str, names: Collection[str]) -> str:
+    """Return a question for the name that ``word`` probably stands for; "" for none."""
+    return "".join(f"did you mean {name}?" for name in nearest(word, names)[:1])

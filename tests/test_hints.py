@@ -1,5 +1,7 @@
 """Hints: each says what to do about the fault that was met, not about its class."""
 
+import traceback
+
 import numpy as np
 import pytest
 import yaml
@@ -69,6 +71,12 @@ def test_faults_of_a_file_and_of_its_name_have_other_hints(tmp_path):
     assert "whole" in hint_of(read_map, torn)
     assert "True = coverable" in hint_of(read_coverage_grid, tmp_path / "ints.npy")
     assert "True = coverable" in hint_of(load_map, np.ones((2, 2), int))
+
+
+def test_a_traceback_shows_the_hint():
+    with pytest.raises(MapFileError) as caught:
+        load_map("ofice")
+    assert "\nhint: did you mean office?" in "".join(traceback.format_exception(caught.value))
 
 
 def test_the_image_of_a_map_may_be_in_a_home_folder(tmp_path, monkeypatch):

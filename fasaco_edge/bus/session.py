@@ -342,7 +342,8 @@ def join(
         except BusUnavailable as error:
             if is_first:
                 there = ", ".join(settings.connect)
-                LOG.warning("waiting for the bus at %s: %s", there, error, extra={"event": "bus"})
+                why = str(error).removesuffix(f" to {there}")
+                LOG.warning("waiting for the bus at %s: %s", there, why, extra={"event": "bus"})
             waits(is_first)
             is_first = False
             stop.wait(RETRY_S)

@@ -11,6 +11,7 @@ The same for every process:
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -114,5 +115,8 @@ def _merged(own: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def first_line(error: Exception) -> str:
-    """Return Zenoh's error message without the location in its sources."""
-    return str(error).partition(" at /")[0].strip()
+    """Return Zenoh's error message without the location in its sources, in plain words."""
+    said = str(error).partition(" at /")[0].strip()
+    if (nobody := re.fullmatch(r"Unable to connect to any of \[(.*)\]!", said)) is None:
+        return said
+    return "cannot connect to " + re.sub(r"Single\((.*?)\)", r"\1", nobody[1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
@@ -17,17 +18,17 @@ from fasaco_edge.cli.console.arguments import (
     robot_on_bus,
     seconds,
 )
-from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import figures, known, out
 from fasaco_edge.client import phrases
 from fasaco_edge.errors import FasacoError, NobodyAnswersError
 from fasaco_edge.host.plain_yaml import dump
-from fasaco_edge.text import one_line
+from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
+from fasaco_edge.text import duration, one_line, percent
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.documents import replies
 from fasaco_edge.wire.documents.json_text import decode_json, decode_tolerant
-from fasaco_edge.wire.documents.rooms import Rooms
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.messages.maps import CoverageValue, decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
@@ -100,7 +101,7 @@ def add_question(parser: argparse.ArgumentParser) -> None:
     add_json(parser, "the answer")
     parser.add_argument(
         "--timeout",
-        type=seconds,
+        type=seconds(),
         default=TIMEOUT_S,
         metavar="S",
         help="how long to wait for the answer (default: %(default)s)",
@@ -147,7 +148,10 @@ def show_mission(reply: QueryReply) -> None:
 
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     mission = answer.mission
-    rows = [("robot", answer.robot), ("state", answer.state), ("reason", plain(answer.reason))]
+    rows = [("robot", answer.robot), ("state", answer.state)]
+    # On its path a robot has no other reason than the path's number.
+    if not re.fullmatch(r"path \d+", answer.reason):
+        rows.append(("reason", plain(answer.reason)))
     if mission.ordered is not None:
         began = "begun by itself" if mission.ordered == "itself" else "as ordered"
         stage = phrases.stage(mission)
@@ -182,6 +186,43 @@ def _unreached(unreached: replies.UnreachedReport) -> Table:
     if unreached.areas_left_out:
         table.caption = f"and {unreached.areas_left_out} smaller areas"
     return table
+
+
+def show_rooms(rooms: Rooms) -> None:
+    """Print rooms, one per line."""
+    if not rooms.rooms:
+        out().print("no rooms yet: they are found some seconds after the first map")
+        return
+    table = Table(
+        *("room", "name", "m2", "swept", "to go", "beside", "settings"),
+        title="Rooms",
+        title_justify="left",
+    )
+    for room in rooms.rooms:
+        beside = ", ".join(map(str, room.neighbours)) or "-"
+        swept = "-" if room.swept is None else percent(room.swept)
+        # 0 also for a room that the path does not enter.
+        to_go = duration(room.to_go_s) if room.to_go_s else "-"
+        row = f"{room.area_m2:.1f}", swept, to_go, beside, _settings(room)
+        table.add_row(str(room.id), room.name or "-", *row)
+    out().print(table)
+
+
+def _settings(room: RoomReport) -> str:
+    """Return a room's settings as text."""
+    words = []
+    if isinstance(room.passes, int):
+        words.append(f"passes: {room.passes}")
+    elif room.passes:
+        each = (item if isinstance(item, str) else _pass_words(item) for item in room.passes)
+        words.append(f"passes: {', '.join(each)}")
+    words += ["skip"] * room.skip
+    words += [] if room.priority == USUAL_PRIORITY else [f"priority: {room.priority}"]
+    return "; ".join(words) or "-"
+
+
+def _pass_words(members: dict[str, object]) -> str:
+    return " ".join(f"{name} {value}" for name, value in sorted(members.items()))
 
 
 def print_answer(reply: QueryReply) -> None:

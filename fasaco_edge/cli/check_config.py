@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.cli.console.terminal import out, say
 from fasaco_edge.config.cautions import cautions
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import inspect_config, with_mask
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         print(f"{args.file}: in order")
         for remark in filter(None, (config.robot.assumed, *cautions(config))):
-            print(f"  {remark}")
+            say(out(), remark, "  ", "  ")
     return Exit.OK if config is not None else Exit.CONFIG
 
 
@@ -95,9 +95,9 @@ def _print(file: Path, faults: list[BadConfiguration]) -> None:
     console = out()
     for fault in faults:
         where = f"{file}:{fault.line}" if fault.line else str(file)
-        console.print(f"{where}: {fault.said}", soft_wrap=True)
+        say(console, f"{where}: {fault.said}", below="  ")
         if fault.hint != BadConfiguration.hint:
-            console.print(f"  -> {fault.hint}", soft_wrap=True)
+            say(console, fault.hint, "  -> ", "     ")
 
 
 COMMAND = Command(

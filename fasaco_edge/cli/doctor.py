@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-import textwrap
 from dataclasses import asdict
 from pathlib import Path
 
@@ -12,10 +10,9 @@ from rich.text import Text
 
 from fasaco_edge.cli.console.arguments import Command, Exit, add_json
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.console.terminal import out
+from fasaco_edge.cli.console.terminal import out, wrapped
 from fasaco_edge.doctor.finding import Finding, Level
 from fasaco_edge.doctor.report import findings
-from fasaco_edge.text import one_line
 
 EPILOG = """\
 It joins the bus for a second, listens, and queries; it starts and changes nothing. Run it as the
@@ -42,8 +39,6 @@ examples:
   fasaco-edge doctor --config /etc/fasaco-edge.yaml
   fasaco-edge doctor --config robot.yaml --json | jq '.checks[] | select(.level != "ok")'
 """
-# Least width of the texts [characters].
-LEAST_ROOM = 24
 COLOURS = {"ok": "green", "warn": "yellow", "fail": "red"}
 
 
@@ -78,21 +73,18 @@ def _print(found: list[tuple[str, Finding]]) -> None:
     console = out()
     wide = max(len(name) for name, _ in found)
     indent = " " * (wide + 8)
-    # Lines are wrapped only in a terminal.
-    room = max(console.width - len(indent), LEAST_ROOM) if console.is_terminal else sys.maxsize
 
     def fitted(text: str) -> str:
-        lines = textwrap.wrap(one_line(text), room, break_on_hyphens=False)
-        return f"\n{indent}".join(lines)
+        return wrapped(console, text, indent, indent)
 
     for name, finding in found:
         level = Text(f"{finding.level:<4}", COLOURS[finding.level])
-        text = level.append(f"  {name:<{wide}}  {fitted(finding.found)}", "default")
+        text = level.append(f"  {name:<{wide}}  {fitted(finding.found)[len(indent) :]}", "default")
         console.print(text, soft_wrap=True)
         for line in finding.details:
-            console.print(Text(f"{indent}{fitted(line)}", "dim"), soft_wrap=True)
+            console.print(Text(fitted(line), "dim"), soft_wrap=True)
         if finding.to_do:
-            console.print(Text(f"{indent}{fitted(f'-> {finding.to_do}')}"), soft_wrap=True)
+            console.print(Text(fitted(f"-> {finding.to_do}")), soft_wrap=True)
 
 
 COMMAND = Command(

@@ -12,7 +12,7 @@ import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
-from fasaco_edge.cli.console.arguments import Command, Exit, add_robot_on_bus, robot_on_bus
+from fasaco_edge.cli.console.arguments import Command, Exit, add_robot_on_bus, robot_on_bus, seconds
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import python_program, stop_event
 
@@ -86,7 +86,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--pose-age",
-        type=_age,
+        type=seconds(0.05, 10.0),
         default=0.5,
         metavar="S",
         help="largest age of the newest pose, by its arrival [s]; the robot stops if it is older "
@@ -101,17 +101,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     add_robot_on_bus(parser)
     parser.add_argument("--given", action="store_true", help=argparse.SUPPRESS)
-
-
-def _age(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    # The comparison is negated to catch NaN.
-    if not 0.05 <= value <= 10.0:
-        raise argparse.ArgumentTypeError(f"must be in 0.05..10 s, got {text!r}")
-    return value
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""GeoJSON of rooms, lines and orders, for drawing programs and geographic information systems.
+"""GeoJSON of rooms, lines and orders, for drawing programs, and the reader of files of orders.
 
 Coordinates are (x, y) [m] in the frame of the map, not the degrees of RFC 7946: writer and reader
 have to agree on that. Polygons are closed, their outlines counter-clockwise.
@@ -6,8 +6,10 @@ have to agree on that. Polygons are closed, their outlines counter-clockwise.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeGuard
 
 from msgspec import UNSET, Meta, structs
@@ -15,12 +17,35 @@ from msgspec import UNSET, Meta, structs
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.host.documents import StrictDocument, inspected
-from fasaco_edge.mission.orders.order import OrderDocument
+from fasaco_edge.host.plain_yaml import read_written
+from fasaco_edge.mission.orders.order import MissionOrder, OrderDocument, order_of
 from fasaco_edge.wire.documents.rooms import Rooms
 
 SUFFIX = ".geojson"
 HINT = "draw each zone as a Polygon; `rooms list --geojson` shows what one looks like"
 Members = dict[str, object]
+
+
+def read_order_file(path: Path) -> MissionOrder:
+    """Return the order in a YAML, JSON or GeoJSON file.
+
+    Raises:
+        OrderError: the file cannot be read, or the order is invalid: the first fault with the
+            others, each with file and line.
+    """
+    # JSON is not read as YAML 1.1, in which 1e3 is a text.
+    parse = json.loads if path.suffix in (".json", SUFFIX) else None
+    text = read_written(path, OrderError, missing="name a file that can be read", parse=parse)
+    if text.values is None:
+        # It may be the rest of a file that was not written in full.
+        hint = 'write what to cover; for everything, `passes: 1` (in JSON {"passes": 1})'
+        text.check([OrderError("there is no order in it", hint=hint)])
+    if is_geojson(text.values):
+        order, faults = drawn_order(text.values)
+    else:
+        order, faults = inspected(OrderDocument, text.values, OrderError)
+    text.check(faults)
+    return order_of(order)
 
 
 def lines_collection(

@@ -20,7 +20,7 @@ from fasaco_edge.cli.console.arguments import (
     writing,
 )
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.console.terminal import err, out
+from fasaco_edge.cli.console.terminal import err, out, say
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.plain_yaml import dump
 from fasaco_edge.text import shown
@@ -58,6 +58,7 @@ QUESTIONS = {
 # Default clearance for a real robot, whose map and poses have errors of 1 to 2 cm [m]. The default
 # of the configuration is for a simulation without errors.
 CLEARANCE_M = 0.02
+INDENT = " " * len("assumed:    ")
 HEAD = "# Every key, with its default and what it means: deploy/fasaco-edge.yaml\n"
 EPILOG = """\
 On a terminal it asks for values that no option gives; elsewhere radius or size, tool width and
@@ -124,7 +125,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--listen",
-        type=seconds,
+        type=seconds(),
         default=5.0,
         metavar="S",
         help="time to look for maps (default: %(default)g s)",
@@ -226,7 +227,7 @@ def _asked(name: str) -> object:
             return _read(name, line.strip() or default)
         except BadConfiguration as error:
             more = "" if error.hint == BadConfiguration.hint else f" ({error.hint})"
-            err().print(f"  {error}{more}", markup=False, highlight=False, soft_wrap=True)
+            say(err(), f"{error}{more}", "  ", "  ")
 
 
 def _read(name: str, text: str) -> object:
@@ -272,13 +273,13 @@ def _print(file: Path, text: str, config: DaemonConfig, peers: Finding | None) -
     for line in text.splitlines():
         console.print(f"  {line}", markup=False, highlight=False, soft_wrap=True)
     if assumed := config.robot.assumed:
-        console.print(f"assumed:    {assumed}", soft_wrap=True)
+        say(console, assumed, "assumed:    ", INDENT)
     for caution in cautions(config):
-        console.print(f"caution:    {caution}", soft_wrap=True)
+        say(console, caution, "caution:    ", INDENT)
     if peers is not None:
-        console.print(f"on the bus: {peers.found}", soft_wrap=True)
+        say(console, peers.found, "on the bus: ", INDENT)
         for line in peers.details:
-            console.print(f"  {line}", soft_wrap=True, markup=False)
+            say(console, line, "  ", "  ")
     console.print(f"start it:   fasaco-edge run --config {file}", soft_wrap=True)
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from fasaco_edge.cli.ask import add_question, ask
+from fasaco_edge.cli.ask import add_question, ask, show_rooms
 from fasaco_edge.cli.console.arguments import Command, Exit, add_common, pair_of_floats
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
-from fasaco_edge.cli.console.rooms_table import show_rooms
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
 from fasaco_edge.cli.geojson import rooms_collection

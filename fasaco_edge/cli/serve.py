@@ -182,15 +182,14 @@ def _tls(args: argparse.Namespace) -> ssl.SSLContext | None:
 def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> None:
     page = f"{'https' if secured else 'http'}://{address.reached}/"
     if tokens is not None:
-        print(f"page at {page}; the tokens are in {one_line(str(tokens))}")
+        print(f"page at {page} with the tokens in {one_line(str(tokens))}")
         if sys.stdout.isatty():
             # A link for each role, with its first token. A recording has only viewers.
             for role, token in dict(reversed(guard.tokens)).items():
                 print(f"  {role}: {page}#{token}")
     else:
-        print(
-            f"page at {page}, " + ("with commands" if guard.role == "operator" else "to look only")
-        )
+        # No sign ends the link: terminals would take it for a part of it.
+        print(f"page at {page} {'with commands' if guard.role == 'operator' else 'to look only'}")
     sys.stdout.flush()
 
 

@@ -51,7 +51,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print each status as a line of JSON")
     parser.add_argument(
         "--timeout",
-        type=seconds,
+        type=seconds(),
         default=5.0,
         metavar="S",
         help="timeout for the daemon with --once [s] (default: %(default)s)",

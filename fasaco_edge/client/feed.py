@@ -62,7 +62,8 @@ class BusJoining(ABC):
             try:
                 bus = open_bus(self._settings)
             except BusUnavailable as error:
-                self.trouble = f"{', '.join(self._settings.connect)}: {error}"
+                places = ", ".join(self._settings.connect)
+                self.trouble = f"{places}: {str(error).removesuffix(f' to {places}')}"
                 self._ended.wait(RETRY_S)
                 continue
             with self._lock:

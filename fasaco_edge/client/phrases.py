@@ -76,15 +76,13 @@ def scale_words(scale: float) -> str:
 
 
 def figures(status: Status) -> str:
-    """Return state and progress in a line."""
-    coverage, path = status.coverage or CoverageReport(), status.path
-    revision, steps = (path.revision, path.remaining_steps) if path else (0, 0)
-    floor = f"{status.floor.swept_m2:.1f} m2 swept, " if status.floor else ""
-    return (
-        f"{one_line(status.state)}: {coverage.covered}/{coverage.coverable} cells, {floor}"
-        f"path {revision} ({steps} steps to go), {status.plan.plans} plans, "
-        f"last {status.latency_ms.plan or 0.0:.0f} ms"
-    )
+    """Return state and progress in a line that fits a terminal."""
+    coverage, path, to_go = status.coverage, status.path, time_to_go(status)
+    share = coverage and f"{percent(coverage.fraction)} of cells"
+    floor = coverage and status.floor and f"{status.floor.swept_m2:.1f} m2 swept"
+    number = path and path.steps and f"path {path.revision}"
+    parts = one_line(status.state), share, floor, to_go and f"{to_go} to go", number
+    return ", ".join(part for part in parts if part)
 
 
 def drive(report: DriveReport) -> str:

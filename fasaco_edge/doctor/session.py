@@ -117,6 +117,13 @@ def session(context: CheckContext) -> Finding:
         return fail(found, to_do, details)
 
 
+def lacking_inputs(status: Status) -> list[str]:
+    """Return the inputs that a daemon waits for; none while it loads: it looks at them later."""
+    if status.state == "loading":
+        return []
+    return [kind for kind in ("map", "pose") if getattr(status, kind) is None]
+
+
 def peers(context: CheckContext, listen_s: float = LISTEN_S) -> Finding:
     """Check the participants of the bus: daemon, other robots, and publishers of maps and poses.
 
@@ -166,8 +173,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
         found = f"{len(claims)} daemons have the name {keys.robot!r}, of which one plans; {found}"
         to_do = "stop those that wait, or give each a name of its own (robot.name)"
         return warn(found, to_do, details)
-    lacking = [kind for kind in ("map", "pose") if getattr(status, kind) is None]
-    if lacking:
+    if lacking := lacking_inputs(status):
         keys_lacking = ", ".join(key for kind in lacking for key in wanted[kind])
         found = f"{found}; it has no {' and '.join(lacking)}"
         come = all(received[kind] for kind in lacking)

@@ -42,11 +42,12 @@ from fasaco_edge.host.documents import StrictDocument, inspected
 from fasaco_edge.host.files import check_plain
 from fasaco_edge.host.plain_yaml import read_written
 from fasaco_edge.host.resources import folder
-from fasaco_edge.text import shown
+from fasaco_edge.text import nearest, shown, suggestion
 
 LOG = logging.getLogger(__name__)
 
 IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
+MAP_SUFFIXES = (".yaml", ".yml", ".npy", *IMAGE_SUFFIXES)
 # Thresholds of ROS 1's map_saver, by which its grey for unknown, 205, is not free.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
@@ -231,8 +232,18 @@ def find_map(name_or_path: str | Path) -> Path:
     if str(name_or_path) in names:
         return _maps() / f"{name_or_path}.yaml"
     raise MapFileError(
-        f"no map {str(name_or_path)!r}: neither a file nor a built-in map ({', '.join(names)})"
+        f"no map {str(name_or_path)!r}: neither a file nor a built-in map ({', '.join(names)})",
+        hint=suggestion(str(name_or_path), names) or _beside(path) or None,
     )
+
+
+def _beside(path: Path) -> str:
+    """Return a question for the map file that a missing file's name resembles; "" for none."""
+    try:
+        files = sorted(each.name for each in path.parent.iterdir() if each.suffix in MAP_SUFFIXES)
+    except (OSError, ValueError):
+        return ""
+    return "".join(f"did you mean {path.with_name(name)}?" for name in nearest(path.name, files))
 
 
 def builtin_maps() -> list[tuple[str, str]]:

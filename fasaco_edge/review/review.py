@@ -83,7 +83,7 @@ def read_review(
     # The number of the last batch's first sample approximates the number of samples.
     about = max(batch.place.first for batch in record.batches) + 1
     data = gather(_reported(samples, progress, "decoding", about), record.clock)
-    progress("following the robot", 0, 1)
+    progress("the robot's track", 0, 1)
     return review_of(record, data, samples.missing, others)
 
 

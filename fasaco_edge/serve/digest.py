@@ -55,7 +55,9 @@ def state(
     if status is None:
         return found
     mission, floor, battery = status.mission, status.floor, status.battery
-    if order is None and ordered is not None:
+    if mission.last_order is not None:
+        order = mission.last_order
+    elif order is None and ordered is not None:
         order = _order_of(view, ordered.mission)
     return found | {
         "state": status.state,

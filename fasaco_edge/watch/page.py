@@ -209,8 +209,7 @@ class RobotWatch(Watched):
             return "no status from the daemon yet"
         if view.silent_s(now):
             return "the daemon is silent"
-        fraction = status.coverage.fraction if status.coverage else 0.0
-        return f"{percent(fraction)} of cells  {phrases.figures(status)}"
+        return phrases.figures(status)
 
     def page(self, now: float, width: int, height: int) -> list[str]:
         return self._page.lines(self.view, now, width, height)

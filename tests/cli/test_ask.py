@@ -8,8 +8,7 @@ import pytest
 
 from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.cli import main
-from fasaco_edge.cli.ask import show
-from fasaco_edge.cli.console.rooms_table import show_rooms
+from fasaco_edge.cli.ask import show, show_rooms
 from fasaco_edge.wire.documents.json_text import encode_json
 from fasaco_edge.wire.documents.replies import TroubleReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
@@ -95,3 +94,9 @@ def test_troubles_are_shown_with_what_to_do(capsys):
     shown = " ".join(capsys.readouterr().out.split())
     assert "no ground beside keep-out far" in shown
     assert "move it" in shown
+
+
+@pytest.mark.parametrize(("reason", "shown"), [("path 7", False), ("paused by command", True)])
+def test_a_reason_is_shown_unless_it_is_the_number_of_a_path(capsys, reason, shown):
+    show("status", QueryReply(encode_json(Status(robot="r1", state="covering", reason=reason))))
+    assert ("reason" in capsys.readouterr().out) == shown

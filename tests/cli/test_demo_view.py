@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import sys
@@ -9,8 +10,12 @@ import time
 
 import pytest
 
+from fasaco_edge.cli.console.terminal import CleanConsole
+from fasaco_edge.cli.demo import view
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.wire.documents.json_text import decode_tolerant
+from fasaco_edge.wire.documents.status import Status
 from maps.map_writer import write_map
 from tests.cli.test_demo import processes_of
 from tests.support.processes import is_running, slowness
@@ -58,12 +63,26 @@ def test_the_demo_is_a_live_map_and_then_a_summary(folder):
         screen = "\n".join(shell.screen())
     assert screen.startswith("kernels ready")
     assert "q quits" not in screen
+    assert "\nthe mission is over: " in screen
     assert "\nroom: every reachable cell is covered\n" in screen
     assert re.search(r"floor swept +│ \d\.\d of \d\.\d m2", screen)
     for program in ("fasaco-edge review", "fasaco-edge serve", "rerun"):
         assert f"{program} demo/*.rrd\n" in screen
     # Its length is that of where this is installed.
     assert all(line.startswith("in another terminal: ") for line in shell.shown.wrapped)
+
+
+def test_a_line_of_progress_fits_a_terminal(monkeypatch, capsys):
+    monkeypatch.setattr(view, "err", lambda: CleanConsole(stderr=True))
+    path = {"revision": 47, "steps": 999, "remaining_steps": 199, "line_s": 9000.0}
+    covering = {"state": "covering", "path": path, "coverage": {"fraction": 0.72}}
+    for document in ({"state": "waiting for map"}, covering | {"floor": {"swept_m2": 1032.9}}):
+        shown = view.LinesView(["r1", "r2"])
+        shown.show(1, decode_tolerant(json.dumps(document).encode(), Status), 7205.7)
+    waits, goes = capsys.readouterr().err.splitlines()
+    assert waits == "7205.7 s  r2  waiting for map"
+    assert goes == "7205.7 s  r2  covering, 72.0 % of cells, 1032.9 m2 swept, 2.5 h to go, path 47"
+    assert len(goes) <= 80
 
 
 @pytest.mark.parametrize(

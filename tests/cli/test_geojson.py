@@ -6,8 +6,7 @@ from itertools import pairwise
 import pytest
 
 from fasaco_edge.cli import main
-from fasaco_edge.cli.geojson import drawn_order, is_geojson, rooms_collection
-from fasaco_edge.cli.order_file import read_order_file
+from fasaco_edge.cli.geojson import drawn_order, is_geojson, read_order_file, rooms_collection
 from fasaco_edge.errors import OrderError, together
 from fasaco_edge.mission.orders.order import order_of
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms

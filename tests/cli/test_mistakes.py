@@ -52,6 +52,9 @@ def folder(tmp_path, monkeypatch):
     [
         ("plan nowhere.yaml", 1, "no map 'nowhere.yaml'"),
         ("plan .", 1, "no map '.'"),
+        ("plan flatt", 1, "hint: did you mean flat?"),
+        ("plan ./maps.yaml", 1, "hint: did you mean map.yaml?"),
+        ("plan map.yml", 1, "hint: did you mean map.yaml?"),
         ("plan text.yaml", 1, "text.yaml"),
         ("plan text.npy", 1, "not readable as a .npy file"),
         ("plan numbers.npy", 1, "expected a bool array of two dimensions, got float64"),
@@ -118,7 +121,7 @@ def folder(tmp_path, monkeypatch):
         (f"simulate office --robot a/b --connect {NOBODY}", 78, "got 'a/b'"),
         ("simulate office --trail-out no/trail.csv", 78, "there is no folder no"),
         ("simulate office --connect office", 78, "'office': no protocol before the address"),
-        (f"record --out . --connect {NOBODY}", 1, "Unable to connect to any of"),
+        (f"record --out . --connect {NOBODY}", 1, f"cannot connect to {NOBODY}\n"),
         (f"record --out . --base /x --connect {NOBODY}", 78, "base: must be chunks"),
         (
             f"record --out . --quota-mb -5 --connect {NOBODY}",
@@ -154,7 +157,10 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("", "the following arguments are required: COMMAND"),
+        ("", "a command is missing; there are demo, plan, init"),
+        ("mission", "fasaco-edge mission: a command is missing; there are start, "),
+        ("--verison", "unrecognized arguments: --verison; did you mean --version?"),
+        ("plan --planer zigzag", "unrecognized arguments: --planer; did you mean --planner?"),
         ("dance", "invalid choice: 'dance'; there are demo, plan, init"),
         ("reviw a.rrd", "did you mean review?"),
         ("bench planer", "did you mean planners?"),
@@ -170,6 +176,9 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
         ("plan office --start 1,1 --start-xy 1,1", "not allowed with argument --start"),
         ("plan office --end there", "--end: must be anywhere, home or row,column, got 'there'"),
         ("plan office --cell wide", "argument --cell: invalid float value: 'wide'"),
+        ("plan office --cell 0,3", "invalid float value: '0,3'; did you mean 0.3?"),
+        ("ask status --timeout 2,5", "got '2,5'; did you mean 2.5?"),
+        ("plan office --planner colony-serch", "'colony-serch'; did you mean colony-search?"),
         ("review a.rrd --pint 1,2", "unrecognized arguments: --pint 1,2; did you mean --point?"),
         ("mission start --pases 2", "did you mean --passes?"),
         ("review a.rrd --format csv", "unrecognized arguments: --format csv"),

@@ -32,6 +32,7 @@ def place(tmp_path_factory):
         with Outsider(daemon.endpoint) as outsider:
             begin(outsider)
         (folder / "mine.yaml").write_text(f"bus: {{listen: [{daemon.endpoint}]}}")
+        (folder / "open.yaml").write_text("bus: {listen: ['tcp/0.0.0.0:7447']}")
         (folder / "other.yaml").write_text(f"bus: {{listen: [{free_endpoint()}]}}")
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
@@ -44,6 +45,8 @@ TO_THE_END = [
     ("warmup", {0}, "kernels ready"),
     ("check-config mine.yaml", {0}, "mine.yaml: in order"),
     # By the computer that the tests run on.
+    ("check-config open.yaml", {78}, "authentication"),
+    ("init wide.yaml --robot-radius 0.2 --tool-width 0.5 --map-by zenoh --force", {0}, "caution:"),
     ("doctor --config mine.yaml", {0, 1}, "the daemon runs: covering"),
     ("plan office --budget 0.1 --long", {0}, "walk recovered cells"),
     ("ask status", {0}, "covering"),
@@ -63,7 +66,7 @@ TO_THE_END = [
 ENDED = [
     ("run --config other.yaml --state other", "ready after", 0),
     ("follow", "looks for other followers", 0),
-    ("serve --listen 127.0.0.1:{}", "page at http://127.0.0.1:", 0),
+    ("serve --listen 127.0.0.1:{}", "/ to look only", 0),
     ("record --out .", "records into .; Ctrl-C ends it", 0),
     ("init new.yaml", "Radius of the disc", 130),
     ("bench planners --seeds 1000 --maps basement", "planners ━", 130),

@@ -247,8 +247,12 @@ def test_the_command_line(tmp_path):
         file.write_text("keep_out:\n  - [[1, 1], [2, 1], [2, 2]]\npasses: 3\n")
         mission = told(running, "start", "--order", str(file), "--yes")["mission"]
         assert (mission["passes"], mission["zones"]) == (3, [])
-        assert told(running, "reset")["reason"] == "reset: what was covered is forgotten"
-        assert told(running, "cancel")["state"] == "idle"
+        cancelled = told(running, "cancel")
+        assert cancelled["state"] == "idle"
+        assert cancelled["mission"]["last_order"]["passes"] == 3
+        reset = told(running, "reset")
+        assert reset["reason"] == "reset: what was covered is forgotten"
+        assert reset["mission"]["last_order"] is None
         refused = fasaco_edge("mission", "pause", "--connect", running.endpoint)
         assert refused.code == 1
         assert refused.out == ""
@@ -283,7 +287,7 @@ def begin_idle(outsider: Outsider) -> None:
         (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),
         (("start", "--zone", "a:0,0;1,1;1,0;0,1"), "zones[0].polygon: crosses or touches itself"),
         (("start", "--zone", "a:0,0;1,0;nan,1"), "zones[0].polygon[2]: must be finite"),
-        (("status",), "Unable to connect to any of"),
+        (("status",), "cannot connect to tcp/127.0.0.1:1\n"),
     ],
 )
 def test_mistakes_are_reported_without_a_daemon(tmp_path: Path, monkeypatch, capsys, words, said):

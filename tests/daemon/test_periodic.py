@@ -5,6 +5,10 @@ from __future__ import annotations
 import itertools
 from types import SimpleNamespace
 
+import numpy as np
+import pytest
+
+from fasaco_edge.daemon.loop.mission_reports import floor_report, room_progress
 from fasaco_edge.daemon.loop.periodic import (
     FLOOR_PERIOD_S,
     REPEAT_S,
@@ -20,6 +24,7 @@ from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
+from tests.mission.line_robot import LineRobot
 from tests.mission.test_room_orders import BOTH, IN_EAST, room_at, settled, start
 
 
@@ -86,6 +91,24 @@ def test_the_trail_is_sent_once_there_is_a_subscriber():
             ]
             value = int(grid.cells[row - row0, col - col0])
             assert (value // 25, value % 25 > 6) == (direction, True)
+
+
+def test_the_shares_of_rooms_are_of_floor_and_make_the_whole():
+    """By cells they were more: floor along walls did not count."""
+    pixels = np.full((64, 124), 100, np.int8)
+    pixels[2:-2, 2:-2] = 0
+    pixels[:24, 60:64] = pixels[40:, 60:64] = 100
+    robot, sent = LineRobot(pixels, (1.0, 1.0)), Sent()
+    publisher = RoomsPublisher(sent, robot.mission.rooms)
+    robot.wait(90.0, lambda _: False)
+    publisher.publish(robot.mission, robot.now)
+    west, east = decode_document(sent.messages[-1][1], Rooms).rooms
+    floor = floor_report(robot.mission)
+    m2 = west.swept * west.area_m2 + east.swept * east.area_m2
+    assert m2 == pytest.approx(floor.reached_m2, rel=0.05)
+    by_cells = room_progress(robot.mission)
+    m2 = sum(by_cells[room.id].share * room.area_m2 for room in (west, east))
+    assert m2 > 1.04 * floor.reached_m2
 
 
 def test_the_last_shares_of_an_order_do_not_wait():

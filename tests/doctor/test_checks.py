@@ -21,6 +21,7 @@ from fasaco_edge.kernels import manifest
 from fasaco_edge.kernels.folder import wanted_folder
 from fasaco_edge.planners.stages import STAGES
 from fasaco_edge.wire import topics
+from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 from fasaco_edge.wire.topics import QOS
 from tests.kernels.harm import HARMS
@@ -297,6 +298,11 @@ def test_maps_under_other_names_are_named(tmp_path):
         "a map elsewhere: key robot2/map",
     ]
     assert "ros2.namespace" in found.to_do
+
+
+def test_a_daemon_that_loads_lacks_nothing_yet():
+    assert session.lacking_inputs(Status(state="loading")) == []
+    assert session.lacking_inputs(Status(state="waiting for map")) == ["map", "pose"]
 
 
 def test_a_daemon_is_found_with_what_it_lacks(tmp_path):

@@ -174,7 +174,7 @@ def velocity(sample):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--pose-age", "nan"], "must be in 0.05..10 s"),
+        (["--pose-age", "nan"], "must be in (0.05, 10] s"),
         (["--speed", "0"], "--speed must be above 0"),
         (["--config", "/nowhere.yaml"], "/nowhere.yaml"),
         (["--robot", "a/b"], "must be chunks of letters"),

@@ -292,6 +292,7 @@ def test_a_stored_state_is_read_back(order_state):
         {"order": {"zones": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]}},
         {"keep_out": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]},
         {"keep_out": [{"name": "a", "polygon": SQUARE}] * 101},
+        {"last": {"zones": [{"name": "a", "polygon": [[0, 0], [0, 0], [0, 0]]}]}},
     ],
 )
 def test_a_note_that_cannot_be_right_is_refused(change):
@@ -301,6 +302,18 @@ def test_a_note_that_cannot_be_right_is_refused(change):
     for torn in ("", "{", "[]", "null", '{"version":1}'):
         with pytest.raises(OrderError):
             OrderState.from_json(torn)
+
+
+def test_a_cancelled_order_is_kept_until_another_or_another_place():
+    dropped = OrderState(TWO, zone=1).commanded(Command("cancel"))
+    for state in (dropped, dropped.commanded(Command("cancel"))):
+        assert OrderState.from_json(state.to_json()).last == TWO
+    assert OrderState(TWO, stage=Stage.OVER).commanded(Command("cancel")).last == TWO
+    begun = dropped.commanded(Command("start", EVERYTHING_ONCE))
+    assert (begun.order, begun.last) == (EVERYTHING_ONCE, None)
+    assert dropped.commanded(Command("reset")).last is None
+    assert dropped.in_other_building("elsewhere").last is None
+    assert OrderState.autostart().commanded(Command("cancel")).last is None
 
 
 def test_commands_may_come_twice():

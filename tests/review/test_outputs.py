@@ -10,6 +10,7 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from PIL import Image
@@ -280,3 +281,10 @@ def test_a_file_that_cannot_be_written_is_named(parts, tmp_path, capsys, option,
     (tmp_path / "file").touch()
     assert main(["review", *map(str, parts), option, str(tmp_path / name)]) == code
     assert said in capsys.readouterr().err
+
+
+def test_shares_that_were_never_reached_are_left_out(parts):
+    review = read_review(parts)
+    reached_s = {"50": 60.0, "90": None, "99": None, "100": None}
+    found = msgspec.structs.replace(document_of(review), reached_s=reached_s)
+    assert dict(screen_rows(review, found))["cells after"] == "50 % 1:00.0"

@@ -421,6 +421,9 @@ def draw_keep_out(tab: Tab, low: tuple[float, float], high: tuple[float, float])
     (x0, y0), (x1, y1) = tab.on_screen(*low), tab.on_screen(*high)
     tab.touch((x0, y0), ((x0 + x1) / 2, (y0 + y1) / 2), (x1, y1))
     until(lambda: tab.js("drafts.length") == count + 1)
+    # It is seen where it lies, and used from there.
+    assert tab.js("canvas.getBoundingClientRect().top") >= 0
+    assert button(tab, "Apply now")
 
 
 def button(tab: Tab, text: str) -> bool:

@@ -97,6 +97,11 @@ def test_an_earlier_order_can_be_repeated_from_the_status():
         "keep_covered": False,
     }
     read_order(again)
+    # A cancelled order is told as it was given.
+    cancelled = {"zones": [{"name": "den", "polygon": CORNERS}], "passes": ["edge"]}
+    view = ServedView(Keys())
+    tell(view, "status", {"state": "idle", "mission": {"last_order": cancelled}}, 2.0)
+    assert heard(view, "state", 2.0)["again"] == cancelled | {"keep_covered": False}
     # What the robot has begun by itself, Start does.
     itself = {"ordered": "itself", "stage": "over"}
     tell(view, "status", {"state": "done", "mission": itself}, 3.0)

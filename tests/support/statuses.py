@@ -54,6 +54,7 @@ FULL: dict[str, Any] = {
                 "keep_out": 1, "home": {"x": 1.0, "y": 1.0}, "tries": 1,
                 "waits_for_room": "kitchen", "left_out": ["bath"],
                 "time_left_s": 60.0, "first_from": 70,
+                "last_order": {"zones": [{"name": "hall"}]},
                 "unreached": {"cells": 2, "m2": 0.2, "areas_left_out": 1, "areas": [
                     {"cells": 2, "m2": 0.2, "x": 2.0, "y": 1.0, "reason": "narrow"}]}},
     "fleet": {"name": "hall", "division": 1, "part_cells": 3, "members": [

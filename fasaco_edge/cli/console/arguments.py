@@ -102,16 +102,20 @@ def pair_of_floats(text: str) -> tuple[float, float]:
     return x, y
 
 
-def seconds(text: str) -> float:
-    """Read a timeout [s]."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    # The comparison is negated to catch NaN.
-    if not 0 < value <= 3600:
-        raise argparse.ArgumentTypeError(f"must be in (0, 3600] s, got {text!r}")
-    return value
+def seconds(least: float = 0.0, most: float = 3600.0) -> Callable[[str], float]:
+    """Return a reader of a time above ``least``, up to ``most`` [s]."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = least
+        # The comparison is negated to catch NaN.
+        if not least < value <= most:
+            raise argparse.ArgumentTypeError(f"must be in ({least:g}, {most:g}] s, got {text!r}")
+        return value
+
+    return read
 
 
 def add_robot_on_bus(parser: argparse.ArgumentParser, *, config: bool = True) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from fasaco_edge.cli.console.help import HelpText
-from fasaco_edge.text import nearest
+from fasaco_edge.text import suggestion
 
 USAGE = 2
 """Exit code of a wrong command line."""
@@ -22,18 +22,30 @@ class Parser(argparse.ArgumentParser):
         super().__init__(**{"formatter_class": HelpText} | options)
         # A value such as -1,2 is a position, and no option.
         self._negative_number_matcher = re.compile(r"-\.?\d")
+        self._given: Sequence[str] = ()
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Return the arguments, and unknown words; ``parser``: parser of the innermost command."""
+        self._given = sys.argv[1:] if args is None else args
         found, unknown = super().parse_known_args(args, namespace)
         if not hasattr(found, "parser"):
             found.parser = self
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        """Print an error, and exit."""
+        """Print an error, and exit; a misspelt option comes before a missing argument."""
+        if "arguments are required" in message:
+            options = tuple(self._option_string_actions)
+            for word in self._given:
+                name = word.partition("=")[0]
+                if name.startswith("--") and not any(each.startswith(name) for each in options):
+                    self._given = ()
+                    self.refuse([name])
+        if message.endswith("required: COMMAND"):
+            groups = [each for each in self._actions if isinstance(each.choices, dict)]
+            message = f"a command is missing; there are {', '.join(groups[0].choices or ())}"
         print(f"{self.prog}: {message}\nsee: {self.prog} --help", file=sys.stderr)
         sys.exit(USAGE)
 
@@ -41,17 +53,20 @@ class Parser(argparse.ArgumentParser):
         """Print the unknown arguments and a suggestion, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
-        meant = _suggestion(names[0], options) if names else ""
+        meant = suggestion(names[0], options) if names else ""
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
+
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:  # noqa: ANN401
+        try:
+            return super()._get_value(action, arg_string)
+        except argparse.ArgumentError as error:
+            if re.fullmatch(r"-?\d*,\d+", arg_string):
+                error.message += f"; did you mean {arg_string.replace(',', '.')}?"
+            raise
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401
         if action.choices is None or value in action.choices:
             return
         names = [str(choice) for choice in action.choices]
-        meant = _suggestion(str(value), names) or f"there are {', '.join(names)}"
+        meant = suggestion(str(value), names) or f"there are {', '.join(names)}"
         raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {meant}")
-
-
-def _suggestion(word: str, names: Sequence[str]) -> str:
-    """Return a question for the name that ``word`` resembles; "" for none."""
-    return "".join(f"did you mean {name}?" for name in nearest(word, names)[:1])

@@ -36,9 +36,9 @@ def files_of_a_run(paths: Sequence[Path]) -> list[Path]:
             hint="name those of one robot at a time, or the one of their fleet",
         )
     if len(runs) > 1:
-        terminal.err().print(
+        terminal.say(
+            terminal.err(),
             f"{len(runs)} runs: this is the newest, {max(runs)}; for another one name its files, "
             f"such as {min(runs)}-*.rrd",
-            soft_wrap=True,
         )
     return [*(runs[max(runs)] if runs else []), *nameless]

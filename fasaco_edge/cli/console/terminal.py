@@ -8,6 +8,7 @@ import shutil
 import signal
 import sys
 import sysconfig
+import textwrap
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from functools import cache
@@ -38,6 +39,8 @@ from fasaco_edge.text import lines, one_line
 # [characters].
 USUAL_WIDTH, WIDE_BAR, NARROW_BAR, CLOCK, COUNT = 80, 32, 16, 7, 13
 LEAST_DESCRIPTION = 8
+# Least width of text beside an indent [characters].
+LEAST_ROOM = 24
 # Space for the ``^C`` that a terminal prints [characters].
 RIGHT_MARGIN = 2
 
@@ -188,6 +191,28 @@ def summary(rows: Iterable[tuple[str, str]]) -> Table:
     for name, words in rows:
         table.add_row(name, words)
     return table
+
+
+def wrapped(console: Console, text: str, begin: str = "", below: str = "") -> str:
+    """Return a line wrapped at words for a console that is a terminal, else as one line.
+
+    ``begin``, ``below``: what the first line and the others begin with.
+    """
+    room = max(console.width, len(below) + LEAST_ROOM) if console.is_terminal else sys.maxsize
+    rows = textwrap.wrap(
+        one_line(text),
+        room,
+        initial_indent=begin,
+        subsequent_indent=below,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(rows)
+
+
+def say(console: Console, text: str, begin: str = "", below: str = "") -> None:
+    """Print a line as ``wrapped``: whole words stay whole, and a file gets one line."""
+    console.print(Text(wrapped(console, text, begin, below)), soft_wrap=True)
 
 
 def command(name: str = "fasaco-edge") -> str:

@@ -124,6 +124,9 @@ def run(args: argparse.Namespace) -> int:
             )
     with DemoMission(args, robots) as mission:
         ending = mission.watch()
+        if ending is not None:
+            # A slow or busy computer needs a minute for that.
+            err().print("the mission is over: recording and picture are being finished")
     if ending is None:
         return Exit.OK
     summary = summarise(args, out, robots, ending)

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli.console.streams import printed_by
-from fasaco_edge.cli.console.terminal import can_draw, err
+from fasaco_edge.cli.console.terminal import can_draw, err, say
 from fasaco_edge.cli.demo.robots import FLEET
 from fasaco_edge.client import phrases
 from fasaco_edge.client.phrases import ORDER
-from fasaco_edge.text import percent
 from fasaco_edge.wire.documents.status import Status
 from fasaco_edge.wire.keys import Keys
 
@@ -82,9 +81,7 @@ class LinesView:
             return
         self._printed_at[robot] = now
         name = f"{self._names[robot]}  " if len(self._names) > 1 else ""
-        share = percent(status.coverage.fraction if status.coverage else 0.0)
-        words = f"{share:>7} of cells  {phrases.figures(status)}"
-        err().print(f"{elapsed_s:6.1f} s  {name}{words}", soft_wrap=True)
+        say(err(), name + phrases.figures(status), f"{elapsed_s:6.1f} s  ", " " * 10)
 
 
 class LiveView:

@@ -13,6 +13,7 @@ from fasaco_edge.cli.console.arguments import Command, Exit, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
+from fasaco_edge.cli.geojson import read_order_file
 from fasaco_edge.cli.mission.keep_outs import (
     add_actions,
     asked_by,
@@ -20,7 +21,6 @@ from fasaco_edge.cli.mission.keep_outs import (
     polygon,
     show_keep_outs,
 )
-from fasaco_edge.cli.order_file import read_order_file
 from fasaco_edge.errors import OrderError, WouldForget
 from fasaco_edge.mission.orders.commands import FORGETFUL
 from fasaco_edge.mission.orders.order import order_document, read_order

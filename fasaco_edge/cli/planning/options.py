@@ -23,6 +23,7 @@ from fasaco_edge.planners.own.loading import SHAPE, is_place
 from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S
 from fasaco_edge.planners.passes import MOST_ANGLE_DEG
 from fasaco_edge.planners.registry import PLANNER_NAMES, PLANNERS
+from fasaco_edge.text import suggestion
 
 EPILOG = """\
 your building and robot:
@@ -285,7 +286,9 @@ def _planner(text: str) -> str:
     """Read the name of a planner, or the place of a user's own planner."""
     if text not in PLANNER_NAMES and not is_place(text):
         names = ", ".join(PLANNER_NAMES)
-        raise argparse.ArgumentTypeError(f"must be {names}, {SHAPE}, got {text!r}")
+        meant = suggestion(text, PLANNER_NAMES)
+        said = f"must be {names}, {SHAPE}, got {text!r}{meant and f'; {meant}'}"
+        raise argparse.ArgumentTypeError(said)
     return text
 
 

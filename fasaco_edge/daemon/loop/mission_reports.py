@@ -11,6 +11,7 @@ import numpy as np
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.map.placing import left_out
+from fasaco_edge.mission.orders.order import order_document
 from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.wire.documents.replies import (
     CoverageReport,
@@ -197,6 +198,7 @@ def mission_report(
         left_out=() if order is None else left_out(order.zones),
         time_left_s=rounded(mission.time_limit.left_s) if mission else None,
         first_from=mission.orders.scope.worth.least or None if mission else None,
+        last_order=order_document(order_state.last) if order_state.last else None,
     )
 
 
@@ -262,16 +264,23 @@ def zone_progress(mission: Mission) -> list[ZoneProgress]:
     return progress.zone_progress(mission.order_state, mission.map.area, mission.covered)
 
 
+def ahead_s(mission: Mission) -> float:
+    """Return the time of the path ahead [s]: of its line, or of its walk where cells are driven."""
+    line = mission.line.ahead()
+    if line is None:
+        return mission.orders.scope.walk_s(mission.route.path.ahead)
+    return line.seconds
+
+
 def room_progress(mission: Mission) -> dict[int, RoomProgress]:
     """Return the progress in each room, by its number."""
     from fasaco_edge.mission.work import progress  # noqa: PLC0415
 
-    area, ahead, line = mission.map.area, mission.route.path.ahead, mission.line.ahead()
+    area, ahead = mission.map.area, mission.route.path.ahead
     rooms = None if area is None else mission.room_cells.on(area.lattice)
     to_go_s: dict[int, float] = {}
     if area is not None and rooms is not None:
-        ahead_s = mission.orders.scope.walk_s(ahead) if line is None else line.seconds
-        to_go_s = progress.seconds_in(rooms, area.lattice.window, ahead, ahead_s)
+        to_go_s = progress.seconds_in(rooms, area.lattice.window, ahead, ahead_s(mission))
     deg = mission.rotation.deg
     return progress.room_progress(mission.rooms, deg, area, mission.covered, to_go_s)
 

@@ -12,6 +12,7 @@ import numpy as np
 from fasaco_edge.bus.queries import QueryReply
 from fasaco_edge.daemon.loop.mission_reports import room_progress, unswept
 from fasaco_edge.daemon.loop.outbox import Outbox
+from fasaco_edge.daemon.loop.room_shares import RoomShares
 from fasaco_edge.grid.geometry import GridGeometry
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rotation import rotated_geometry
@@ -241,6 +242,7 @@ class RoomsPublisher:
         self._version = -1
         self._progress: object = None
         self._order: object = None
+        self._shares = RoomShares()
 
     def publish(self, mission: Mission | None, now: float) -> None:
         """Publish the rooms if that is due."""
@@ -257,18 +259,25 @@ class RoomsPublisher:
         self._published_at, self._version, self._progress = now, book.version, progress_id
         self._order = order
         progress = {} if mission is None else room_progress(mission)
-        rooms = tuple(_report(room, progress.get(room.id)) for room in book.rooms)
+        shares = {} if mission is None else self._shares.of(mission)
+        rooms = tuple(
+            _report(room, progress.get(room.id), shares.get(room.id)) for room in book.rooms
+        )
         self._outbox.send(ROOMS, encode_json(Rooms(book.frame, book.version, rooms)))
 
 
-def _progress_of(mission: Mission) -> tuple[object, int, bool]:
+def _progress_of(mission: Mission) -> tuple[object, int, int, bool]:
     """Return a key that changes with shares and times to go."""
     route = mission.route
-    return mission.covered.version, route.revision, len(route.path.ahead) > 1
+    floor = mission.covered.floor.changes
+    return mission.covered.version, floor, route.revision, len(route.path.ahead) > 1
 
 
-def _report(room: Room, progress: RoomProgress | None) -> RoomReport:
+def _report(room: Room, progress: RoomProgress | None, share: float | None) -> RoomReport:
+    """Return the report of a room; ``share``: of its floor that is swept, None where not known."""
     settings = room.settings
+    if share is None and progress is not None:
+        share = progress.share
     passes = None if settings.passes is None else passes_document(settings.passes, settings.kinds)
     return RoomReport(
         id=room.id,
@@ -277,7 +286,7 @@ def _report(room: Room, progress: RoomProgress | None) -> RoomReport:
         area_m2=room.area_m2,
         neighbours=room.neighbours,
         encloses=room.encloses,
-        swept=None if progress is None else progress.share,
+        swept=None if share is None else round(share, 4),
         to_go_s=None if progress is None else progress.to_go_s,
         passes=tuple(passes) if isinstance(passes, list) else passes,  # type: ignore[arg-type]
         skip=settings.skip,

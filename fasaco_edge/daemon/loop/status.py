@@ -17,6 +17,7 @@ from fasaco_edge.daemon.counters import CycleTimes, FaultCounter
 from fasaco_edge.daemon.fleet_wing import report_of
 from fasaco_edge.daemon.loop.answers import config_document
 from fasaco_edge.daemon.loop.mission_reports import (
+    ahead_s,
     battery_report,
     coverage_report,
     drive_report,
@@ -228,7 +229,7 @@ def path_report(path: PublishedPath | None, mission: Mission | None) -> PathRepo
         steps=path.steps,
         # The mission may hold back a longer path until the robot comes near its change.
         remaining_steps=min(max(len(mission.route.path.ahead) - 1, 0), path.steps),
-        line_s=None if line is None else round(line.seconds, 1),
+        line_s=round(ahead_s(mission), 1),
         line_gap=None if gap is None else round(gap, 4),
         reason=path.reason,
     )

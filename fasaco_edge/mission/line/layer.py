@@ -197,6 +197,23 @@ class LineLayer:
             return None
         return floor.geometry, self._ahead.tally.unswept()
 
+    def asked_floor(
+        self, most: int
+    ) -> tuple[GridGeometry, NDArray[np.bool_], NDArray[np.bool_]] | None:
+        """Return which squares of the floor are asked for, and which of these are swept, bool.
+
+        None without a floor. ``most``: limit on the squares; larger ones stand for their centres.
+        """
+        floor = self._map.floor
+        if floor is None or self._ahead is None or self.left.areas is None:
+            return None
+        whole = floor.geometry
+        step = math.ceil(math.sqrt(max(whole.rows * whole.cols / most, 1.0)))
+        asked, swept = self._ahead.tally.sampled(step)
+        rows, cols = asked.shape
+        square_m = whole.resolution * step
+        return replace(whole, rows=rows, cols=cols, resolution=square_m), asked, swept
+
     def ahead(self) -> AheadFigures | None:
         """Return figures of the line ahead; None without a line."""
         to_sweep, floor = self.left.areas, self._map.floor

@@ -163,6 +163,11 @@ class SweepTally:
         causes -= (self.sweeps.counts == 0).view(np.uint8)
         return causes
 
+    def sampled(self, step: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which of every ``step``-th pixel is asked for, and which is swept, too."""
+        state = self._state[step // 2 :: step, step // 2 :: step]
+        return state & WANTED != 0, state & (WANTED | SWEPT) == WANTED | SWEPT
+
     def open_in_m2(self, part: Window) -> float:
         """Return the open area in a window, whether the line ahead sweeps it or not [m2]."""
         state = self._state[part.row0 : part.row1, part.col0 : part.col1]

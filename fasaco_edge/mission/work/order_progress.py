@@ -47,6 +47,7 @@ class OrderProgress:
             file, None in a mission.
         spent_s: the robot's time since the order began, if it has a limit [s].
         late: why it ends before all is covered; "" if it does not.
+        last: while there is no order, the cancelled one, to be given again; None for none.
     """
 
     order: MissionOrder | None = None
@@ -66,6 +67,7 @@ class OrderProgress:
     reached: ReachedCells | None = None
     spent_s: float = field(default=0.0, compare=False)
     late: str = ""
+    last: MissionOrder | None = field(default=None, compare=False)
 
     @property
     def current_zone(self) -> Zone | None:

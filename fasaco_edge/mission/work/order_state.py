@@ -130,7 +130,7 @@ class OrderState(OrderProgress):
         # The errand led to a place in the previous building.
         is_paused = self.paused and not self.errand
         here = replace(self, home=None, errand="", paused=is_paused)
-        return replace(here, frame="", keep_out=())
+        return replace(here, frame="", keep_out=(), last=None)
 
     def in_other_frame(self, why: str) -> OrderState:
         """Return the state in another frame, before anything was covered.
@@ -168,19 +168,20 @@ class OrderState(OrderProgress):
         errand: Errand = "" if self.errand == "home" else self.errand
         if same and self.stage is not Stage.OVER:
             return replace(self, paused=False, errand=errand, why="")
-        return replace(self._without_order(""), order=order, errand=errand)
+        return replace(self._without_order(""), order=order, errand=errand, last=None)
 
     def _without_order(self, why: str) -> OrderState:
         """Return the state without an order on the same map: home and keep-outs stay."""
         here = OrderState(why=why, home=self.home, keep_out=self.keep_out)
-        return replace(here, frame=self.frame, places=self.places)
+        last = self.last if self.order is None or self.automatic else self.order
+        return replace(here, frame=self.frame, places=self.places, last=last)
 
     def to_json(self) -> str:
         """Return the state as JSON, for the ledger's file."""
         state = {each.name: getattr(self, each.name) for each in fields(self)}
-        order = None if self.order is None else order_document(self.order)
+        order, last = (order_document(each) if each else None for each in (self.order, self.last))
         keep_out = msgspec.convert(list(map(keep_out_document, self.keep_out)), _KeepOuts)
-        note = _Note(**state | {"version": 1, "order": order, "keep_out": keep_out})
+        note = _Note(**state | {"version": 1, "order": order, "last": last, "keep_out": keep_out})
         return msgspec.json.encode(note).decode()
 
     @classmethod
@@ -199,6 +200,7 @@ class OrderState(OrderProgress):
         for fault in misfits(kept, OrderError):
             raise fault
         order = None if kept.order is None else order_of(kept.order)
+        last = None if kept.last is None else order_of(kept.last)
         if order is not None and not (
             kept.zone < len(order.zones) and kept.pass_number <= order.zones[kept.zone].passes
         ):
@@ -207,7 +209,7 @@ class OrderState(OrderProgress):
                 hint=_START_AGAIN,
             )
         keep_out = tuple(map(keep_out_of, kept.keep_out))
-        state = msgspec.structs.asdict(kept) | {"order": order, "keep_out": keep_out}
+        state = msgspec.structs.asdict(kept) | {"order": order, "last": last, "keep_out": keep_out}
         del state["version"]
         return cls(**state)
 
@@ -220,8 +222,8 @@ class _Note(
 ):
     """An order state as kept on disk, with the files' member names.
 
-    Older daemons can read it only without errand, keep-outs, frame, places, reached cells and time
-    limit.
+    Older daemons can read it only without errand, keep-outs, frame, places, reached cells, time
+    limit and cancelled order.
     """
 
     version: Literal[1]
@@ -242,3 +244,4 @@ class _Note(
     reached: ReachedCells | None = None
     spent_s: Annotated[float, Meta(ge=0)] = 0.0
     late: str = ""
+    last: OrderDocument | None = None

@@ -118,9 +118,8 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
     config, grid = document.config, document.map
     sides = "" if grid is None else "{:.1f} x {:.1f} m, ".format(*grid.sides_m)
     planner = config.get("planner.name", "planner not recorded")
-    reached = [
-        f"{percent} % {by_name[f'{percent} % of cells covered after']}" for percent in MILESTONES
-    ]
+    after = {percent: by_name[f"{percent} % of cells covered after"] for percent in MILESTONES}
+    reached = [f"{percent} % {at}" for percent, at in after.items() if at != "never"]
     replans = f"{document.replans}"
     for slowest in review.replans.slowest_first[:1]:
         replans += f", {amount(document.replan_ms_p50, 'ms')} in the median"

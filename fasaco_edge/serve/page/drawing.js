@@ -46,11 +46,19 @@ function finish(corners) {
   const what = WHAT[kind];
   let number = 1;
   while (taken.has(`${what} ${number}`)) number++;
-  drafts.push({ kind, polygon: rounded(corners), name: `${what} ${number}` });
+  drawn = { kind, polygon: rounded(corners), name: `${what} ${number}` };
+  drafts.push(drawn);
   Object.assign(drawing, { kind: "", corners: [] });
   showDrafts();
-  document.getElementById("drafts").scrollIntoView({ block: "nearest" });
 }
+
+// What was drawn last: the row below the map offers to use it.
+let drawn = null;
+document.getElementById("usedrawn").addEventListener("click", () => {
+  if (drawn.kind === "keepout") apply(drawn);
+  else start(order());
+});
+document.getElementById("undrawn").addEventListener("click", () => { drawn = null; showBars(); });
 
 // Keep-outs in force. A keep-out with a name is the operator's: a tap on it offers to remove it.
 const keptOut = () => (model.areas && model.areas.keep_out) || [];
@@ -67,6 +75,7 @@ function isInside([x, y], polygon) {
 
 function pick(at) {
   const area = keptOut().find((each) => each.name && isInside(toMap(...at), each.polygon));
+  drawn = null;
   picked = area && model.role === "operator" ? area.name : "";
   if (picked) scrollToMap();
   showPicked();
@@ -79,9 +88,14 @@ function showPicked() {
   showBars();
 }
 
-// The row below the map: drawing, a keep-out, unswept floor, else the tools.
+// The row below the map: drawing, what was drawn, a keep-out, unswept floor, else the tools.
 function showBars() {
-  const bars = { drawbar: drawing.kind, pickbar: picked, roombar: pickedRoom, leftbar: model.left, tools: true };
+  drawn = drafts.includes(drawn) ? drawn : null;
+  if (drawn) {
+    document.getElementById("drawnname").textContent = drawn.name;
+    document.getElementById("usedrawn").textContent = drawn.kind === "keepout" ? "Apply now" : document.getElementById("order").textContent;
+  }
+  const bars = { drawbar: drawing.kind, drawnbar: drawn, pickbar: picked, roombar: pickedRoom, leftbar: model.left, tools: true };
   let taken = false;
   for (const [name, wanted] of Object.entries(bars)) {
     document.getElementById(name).hidden = taken || !wanted;

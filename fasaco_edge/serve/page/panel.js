@@ -199,7 +199,7 @@ function showDrafts() {
     name.value = draft.name;
     name.maxLength = 64;
     name.setAttribute("aria-label", isZone ? "name of the area" : "name of the keep-out");
-    name.addEventListener("input", () => { draft.name = name.value; keepDrafts(); redraw(); });
+    name.addEventListener("input", () => { draft.name = name.value; keepDrafts(); showBars(); });
     const remove = action("Remove", () => { drafts.splice(index, 1); showDrafts(); redraw(); });
     const now = isZone ? [] : [action("Apply now", () => apply(draft), "primary")];
     lines.push(draftLine(isZone ? "" : "out", name, ...now, remove));
@@ -207,6 +207,7 @@ function showDrafts() {
   find("drafts").replaceChildren(...lines);
   keepDrafts();
   showCommands();
+  showBars();
 }
 
 // Areas drawn and rooms chosen, but not ordered yet, survive a reload of the page.

@@ -93,7 +93,7 @@ class PathReport(PlanFigures, frozen=True):
         revision: counts the published paths.
         steps: as published.
         remaining_steps: still to drive.
-        line_s: seconds that the line ahead takes; null where cells are counted.
+        line_s: seconds that the path ahead takes.
         line_gap: line_s / bound - 1, bound being the least time of any line that sweeps as much
             floor; null if the line sweeps none.
         reason: why it replaced the previous one.

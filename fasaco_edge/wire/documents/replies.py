@@ -176,6 +176,7 @@ class MissionReport(Document, frozen=True):
         time_left_s: time until the order ends with the robot at home [s]; null without a limit.
         first_from: least priority of the floor that is planned now, if time or battery do not
             suffice for all; null otherwise.
+        last_order: while there is no order, the cancelled one, as it was given; null for none.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None
@@ -198,6 +199,10 @@ class MissionReport(Document, frozen=True):
     left_out: Annotated[tuple[str, ...], allowed(maxItems=250)] = ()
     time_left_s: Amount | None = None
     first_from: Annotated[int, Meta(ge=1, le=100)] | None = None
+    last_order: (
+        Annotated[dict[str, object], allowed(**{"$ref": "mission.json#/$defs/OrderDocument"})]
+        | None
+    ) = None
 
 
 class TroubleReport(Document, frozen=True):
