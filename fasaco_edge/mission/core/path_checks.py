@@ -106,6 +106,11 @@ class PathChecks:
         if not self._line.left.is_worth_driving and not self._orders.scope.is_any_planned_left:
             route.want("others have swept what lay ahead")
 
+    def check_room(self, cell: Cell) -> None:
+        """Want a new plan for a robot whose room has become known, to finish it first."""
+        if not self._has_plan_due and self._orders.scope.is_in_new_room(cell):
+            self._route.want("the room that the robot is in first")
+
     def check_time(self, now: float) -> None:
         """Want a new plan with the most worthwhile floor first if time or battery do not suffice
         for the path."""
