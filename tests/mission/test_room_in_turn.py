@@ -72,7 +72,7 @@ def test_once_rooms_are_known_the_robot_finishes_its_own():
     drive.plan()
     while drive.request is None:
         drive.tell(pose_at(*drive.cell), after=1.0)
-    assert drive.request.reason == "the room that the robot is in first"
+    assert drive.request.reason == "rooms have changed: another one first"
     assert planned(drive) == (89, 0)
     drive.finish()
     assert rooms_swept(drive) == ["west", "east"]
@@ -129,6 +129,18 @@ def test_the_order_is_done_while_people_change_the_rooms(change):
     assert len(visited(drive, WEST_COLUMNS)) + len(visited(drive, EAST_COLUMNS)) == 180
     if change != "merge":
         assert rooms_swept(drive) == ["west", "east"]
+
+
+def test_if_the_robot_turns_out_to_be_in_a_new_room_it_finishes_that_first():
+    drive = settled(*BOTH, config=ALWAYS)
+    drive.command("start")
+    drive.plan()
+    cut = ((0.0, 1.0), (2.5, 1.0))
+    drive.command("room_split", room=RoomRequest(room_at(drive, *IN_WEST).id, cut=cut))
+    drive.tell(pose_at(*drive.cell))
+    assert drive.request.reason == "rooms have changed: another one first"
+    assert planned(drive) == (4 * len(WEST_COLUMNS) - 1, 0), "the smaller part, with a new number"
+    drive.finish()
 
 
 def test_priority_comes_before_the_room_that_the_robot_is_in():

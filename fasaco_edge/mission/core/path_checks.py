@@ -107,9 +107,9 @@ class PathChecks:
             route.want("others have swept what lay ahead")
 
     def check_room(self, cell: Cell) -> None:
-        """Want a new plan for a robot whose room has become known, to finish it first."""
-        if not self._has_plan_due and self._orders.scope.is_in_new_room(cell):
-            self._route.want("the room that the robot is in first")
+        """Want a new plan if new rooms show that the robot has another room to finish first."""
+        if not self._has_plan_due and self._orders.scope.is_in_other_room(cell):
+            self._route.want("rooms have changed: another one first")
 
     def check_time(self, now: float) -> None:
         """Want a new plan with the most worthwhile floor first if time or battery do not suffice

@@ -134,14 +134,13 @@ class PlanScope:
             self.worth.give_up()
         return is_limited
 
-    def is_in_new_room(self, cell: Cell) -> bool:
-        """Return whether the robot's room has become known, and is to be finished first."""
+    def is_in_other_room(self, cell: Cell) -> bool:
+        """Return whether new rooms on the map show that another room is to be finished first."""
         area = self._map.area
-        if area is None or not self._room.has_come(area.lattice):
+        if area is None or not self._room.is_due(area.lattice):
             return False
         left = self._cells.open_to_me(area) & area.reachable
-        first = self.worth.first(left, area.lattice.window)
-        return self._room.choose(first, area, cell) > 0
+        return self._room.choose(self.worth.first(left, area.lattice.window), area, cell)
 
     def _first(self, cells: NDArray[np.bool_], lattice: CoverageLattice) -> NDArray[np.bool_]:
         return self._room.first(self.worth.first(cells, lattice.window), lattice)

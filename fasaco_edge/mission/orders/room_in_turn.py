@@ -17,7 +17,8 @@ NONE = -1
 class RoomInTurn:
     """Chooses a room: the robot's own, or else the nearest one with floor left.
 
-    It stays chosen until none of its floor is left. Floor that is in no room yet counts as room 0.
+    It stays chosen until none of its floor is left, or it turns out that the robot is in another
+    room: new rooms are known late. Floor that is in no room yet counts as room 0.
 
     Args:
         cells: the room of each cell.
@@ -29,8 +30,9 @@ class RoomInTurn:
         self._room = NONE
         # Rooms with cells that were tried in vain: they come after all others.
         self._given_up: set[int] = set()
-        # The rooms of cells at the last choice.
+        # The rooms of cells at the last choice, and the highest number so far.
         self._seen: NDArray[np.uint16] | None = None
+        self._newest = 0
 
     def begin(self) -> None:
         """Note that a pass begins."""
@@ -47,28 +49,34 @@ class RoomInTurn:
         rooms = None if self._room == NONE else self._on(lattice)
         return cells if rooms is None else cells & (rooms == self._room)
 
-    def has_come(self, lattice: CoverageLattice) -> bool:
-        """Return whether rooms have changed since a choice that found none."""
-        return self._room < 1 and self._on(lattice) is not self._seen
+    def is_due(self, lattice: CoverageLattice) -> bool:
+        """Return whether rooms have changed since the last choice."""
+        return self._on(lattice) is not self._seen
 
-    def choose(self, cells: NDArray[np.bool_], area: ReachableArea, cell: Cell) -> int:
-        """Return the room that the next plan covers, see ``first``; ``NONE`` for all floor.
+    def choose(self, cells: NDArray[np.bool_], area: ReachableArea, cell: Cell) -> bool:
+        """Choose the room that the next plan covers, see ``first``; return whether it is another.
 
         Args:
             cells: the reachable cells to cover, bool (rows, cols) of the area.
             area: the reachable area.
             cell: the robot's cell.
         """
-        rooms = self._seen = self._on(area.lattice)
+        before, rooms = self._room, self._on(area.lattice)
         left = set[int]() if rooms is None else {*np.unique(rooms[cells]).tolist()}
         left -= self._given_up
         if rooms is None or not left:
             self._room = NONE
-        elif self._room < 1 or self._room not in left:
+        else:
             here = int(area.lattice.window.values_at(rooms, np.array([cell], np.int32), 0)[0])
-            ways = {room: _way(cells & (rooms == room), area, cell) for room in left - {here}}
-            self._room = here if here in left else min(sorted(ways), key=ways.__getitem__)
-        return self._room
+            is_over = self._room < 1 or self._room not in left
+            if here in left and (is_over or here > self._newest):
+                self._room = here
+            elif is_over:
+                ways = {room: _way(cells & (rooms == room), area, cell) for room in left}
+                self._room = min(sorted(left), key=ways.__getitem__)
+            self._newest = max(self._newest, int(rooms.max()))
+        self._seen = rooms
+        return self._room not in (before, NONE)
 
     def _on(self, lattice: CoverageLattice) -> NDArray[np.uint16] | None:
         return self._cells.on(lattice) if self._applies() else None
