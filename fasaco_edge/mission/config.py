@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 LONGEST_FRAME = 255
 
-ByRoom = Literal["never", "auto"]
+ByRoom = Literal["never", "auto", "always"]
 Period = Annotated[float, Meta(ge=0, le=86_400)]
 Coordinate = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 
@@ -72,7 +72,8 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         dock: where it charges; None if it does not.
         map_frame: frame of the map to which zones, keep_out, a mask of a file, home and dock
             belong; "" for the first map used with them.
-        by_room: whether a room is finished before the next is begun, if that costs little.
+        by_room: whether a room is finished before the next is begun: if that costs little, or
+            always; with other robots, "always" is as "auto".
     """
 
     autostart: bool = True

@@ -461,7 +461,7 @@ class Senseless:
             "robot": {"quarter_turn_s": self._rng.choice([1.5, 0.0])},
             "mission": {
                 "retries": self._rng.choice([0, 2]),
-                "by_room": self._rng.choice(["never", "auto"]),
+                "by_room": self._rng.choice(["never", "auto", "always"]),
                 "retry_s": self._rng.choice([0.2, 30.0]),
                 "lost_pose_s": self._rng.choice([0.0, 1.0, 3.0]),
                 "stale_map_s": self._rng.choice([0.0, 0.0, 2.0]),

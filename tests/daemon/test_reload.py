@@ -54,7 +54,7 @@ def taken_by(reload: Reload) -> tuple[DaemonConfig, list[BadConfiguration]]:
         {"planner": {"ants": 50, "seed": 3}},
         {"map": {"free_at_most": 10}},
         {"mission": {"retries": 5, "retry_s": 1.0, "lost_pose_s": 9.0, "stale_map_s": 8.0}},
-        {"mission": {"until_min": 5.0, "by_room": "never"}},
+        {"mission": {"until_min": 5.0, "by_room": "always"}},
         {"mission": {"keep_out": [[[0, 0], [1, 0], [1, 1]]], "keep_out_mask": "a.yaml"}},
         {"robot": {"speed_m_s": 1.0, "quarter_turn_s": 0.0}},
     ],

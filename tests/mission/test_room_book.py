@@ -208,6 +208,24 @@ def test_a_named_room_is_neither_parted_nor_joined_by_a_map():
     assert len(book.rooms) == 2
 
 
+def test_a_room_named_half_seen_gives_up_its_part_of_another():
+    """Two rooms were seen through their doors as one; most of the second one came later."""
+    joined = regions(*["aaaaaaa..."] * 3)
+    told_apart = regions("aaa#bbbbbb", "aaa#bbbbbb", "aaaabbbbbb")
+    for is_by_hand in False, True:
+        book = shown(known(joined), joined, 3 * HOLD_CHANGE)
+        if is_by_hand:
+            split(book, 1, ((2.5, -0.5), (2.5, 3.5)))
+            merge(book, [1, 2])
+        book.name(1, "kitchen")
+        shown(book, joined, 3 * HOLD_CHANGE)
+        for _ in range(2 * HOLD_CHANGE):
+            shown(book, told_apart)
+            assert is_by_hand or book.room("kitchen").area_m2 < 22.0, "new floor of the other room"
+        assert at(book, 0.5, 1.5) == book.room("kitchen").id == 1
+        assert (at(book, 4.5, 1.5) == 1) == (at(book, 8.5, 1.5) == 1) == is_by_hand
+
+
 def test_rooms_beyond_a_smaller_map_are_remembered():
     book = known(FLAT)
     before = [room.id for room in book.rooms]

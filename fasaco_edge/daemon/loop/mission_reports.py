@@ -129,7 +129,7 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
     is_planned = mission.route.revision > 0 or mission.orders.is_over
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
-    comes_later = (is_aside and order.is_open) or mission.orders.scope.worth.least
+    comes_later = (is_aside and order.is_open) or mission.orders.scope.is_part
     beside = to_come if comes_later else BESIDE
     beside = beside if is_planned else unplanned
     left = _largest_first(

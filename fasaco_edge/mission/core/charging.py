@@ -311,7 +311,7 @@ class Charging:
         is_last = (
             state.is_open and state.next_pass() is state and not self.orders.cells.is_exploring
         )
-        is_last = is_last and not self.orders.scope.worth.least
+        is_last = is_last and not self.orders.scope.is_part
         if not is_last or area is None or goal is None or cells is None or not len(cells):
             return None
         ends = [(int(row), int(col)) for row, col in (cells[0], cells[-1])]

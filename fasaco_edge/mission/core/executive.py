@@ -178,6 +178,7 @@ class Executive:
             self._checks.check_worth(now)
         if self._state is State.COVERING:
             self._checks.check_time(now)
+            self._checks.check_room(cell)
         if reason := self.orders.begin(cell, now):
             self.route.want(reason)
         if reason := self._work.share(cell, now):

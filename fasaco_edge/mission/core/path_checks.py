@@ -94,6 +94,11 @@ class PathChecks:
         if not self._line.left.is_worth_driving and not self._orders.scope.is_any_planned_left:
             route.want("others have swept what lay ahead")
 
+    def check_room(self, cell: Cell) -> None:
+        """Want a new plan if new rooms show that the robot has another room to finish first."""
+        if not self._has_plan_due and self._orders.scope.is_in_other_room(cell):
+            self._route.want("rooms have changed: another one first")
+
     def check_time(self, now: float) -> None:
         """Want a new plan with the most worthwhile floor first if time or battery do not suffice
         for the path."""

@@ -10,9 +10,10 @@ grows over new floor of its region. Other changes must last:
 
 An update without the change counts twice against it, so that a flickering change never lasts. A
 room that joined another and separates again gets its number back. Rooms that people have named,
-set, split or merged are kept: maps neither split nor join them. Two kept rooms in one region stay
-divided as before; split or merged ones keep their parts. Squares that only the newest maps have
-added do not decide which region shows a room. Rooms that the map does not show stay unchanged.
+set, split or merged are kept: maps do not join them, and split from them only parts with much new
+floor; split or merged ones keep all parts. Two kept rooms in one region stay divided as before.
+Squares that only the newest maps have added do not decide which region shows a room. Rooms that the
+map does not show stay unchanged.
 """
 
 from __future__ import annotations
@@ -210,9 +211,14 @@ class Matching:
         parent, half = 0, 0.5 * self._areas[label]
         if self._counts[label, 1:].max(initial=0) >= half:
             parent = int(self._counts[label, 1:].argmax()) + 1
+        is_kept = parent > 0 and self._room(parent).is_kept
+        # A kept room loses no part that it has had for long. But it may have got its name when it
+        # and another room were half seen, as one region.
+        least = half if parent and self._room(parent).is_by_hand else WHOLE * self._areas[label]
+        is_firm = parent > 0 and bool(self._firm[label, parent] >= least)
+        if parent and (is_firm or not is_kept):
             self._becomes[label, 0] = self._rooms[parent]
-        # Squares added lately to a kept room may turn out to be another room.
-        if parent and self._room(parent).is_kept and self._firm[label, parent] >= half:
+        if is_kept and is_firm:
             return
         if self._m2(self._areas[label]) >= LEAST_M2 and len(self._regions) < MOST_ROOMS:
             self._regions.append(_Region(label, HOLD_CHANGE if parent else HOLD_NEW))

@@ -1,4 +1,4 @@
-"""Rooms one by one: a price of steps from one room into another.
+"""Price of steps from one room into another, so that rooms are finished one by one.
 
 Many walks take nearly the same time, and most of them leave rooms half done. With the price, the
 search chooses a walk that finishes each room before the next.
@@ -26,11 +26,11 @@ class RoomPrice:
     """
 
     def __init__(self, by_room: ByRoom, cells: RoomCells) -> None:
-        self._price, self._cells = PRICE if by_room == "auto" else 0.0, cells
+        self._price, self.cells = 0.0 if by_room == "never" else PRICE, cells
 
     def added_to(self, problem: CoverageProblem) -> CoverageProblem:
         """Return a problem with the rooms of its cells, and the price of steps between them."""
-        rooms = self._cells.on(problem.lattice) if self._price else None
+        rooms = self.cells.on(problem.lattice) if self._price else None
         if rooms is None:
             return problem
         cost = problem.cost

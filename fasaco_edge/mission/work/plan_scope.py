@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
@@ -17,16 +17,17 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.work.by_room import RoomPrice
 from fasaco_edge.mission.work.cells_left import CellsLeft, visits_due
 from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.room_in_turn import RoomInTurn
 from fasaco_edge.mission.work.worth import WorthFirst
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
 
 
 class PlanScope:
-    """Poses the planning problems of an order, floor of high priority first. Times are [s].
+    """Poses the planning problems of an order, what comes first alone. Times are [s].
 
     Attributes:
-        worth: which cells are planned first.
+        worth: which cells are planned first, by priority.
     """
 
     def __init__(
@@ -45,6 +46,13 @@ class PlanScope:
             lambda: state().current_zone,
             lambda: map_state.grid.frame if map_state.grid is not None else "",
         )
+        self._room = RoomInTurn(room_price.cells, self._takes_rooms_in_turn)
+
+    def _takes_rooms_in_turn(self) -> bool:
+        zone = self._state().current_zone
+        is_one_room = zone is None or zone.room > 0
+        always = self._config.policy.by_room == "always"
+        return always and not is_one_room and not self._company.has_members
 
     def problem(
         self, cell: Cell, before: NDArray[np.int32], home: Cell | None, attempt: int
@@ -65,15 +73,19 @@ class PlanScope:
         free = self.passable(area, cell)
         lattice, reachable = free.lattice, free.reachable
         to_cover = self._cells.open_to_me(area)
+        left = to_cover & reachable
         if not attempt and self.worth.is_limited:
-            self.worth.choose(to_cover & reachable, lattice.window)
+            self.worth.choose(left, lattice.window)
+        if not attempt:
+            self._room.choose(self.worth.first(left, lattice.window), free, cell)
+        first = self._first(to_cover, lattice)
         ends_home = home is not None and state.returns_home_next and area.contains(home)
         ends_home = ends_home and home is not None and bool(reachable[lattice.local(home)])
         problem = CoverageProblem.of(
             lattice,
             cell,
-            covered=~self.worth.first(to_cover, lattice.window),
-            end=home if ends_home and not self.worth.least else None,
+            covered=~first,
+            end=home if ends_home and not (left & ~first).any() else None,
             cost=self._cost(),
             before=before,
             attempt=attempt,
@@ -103,22 +115,61 @@ class PlanScope:
         if area is None:
             return False
         open_cells = self._cells.open_to_me(area) & area.reachable
+        all_rooms = self.worth.first(open_cells, area.lattice.window)
+        planned = int(np.count_nonzero(self._room.first(all_rooms, area.lattice)))
+        ahead_s *= int(np.count_nonzero(all_rooms)) / max(planned, 1)
         return self.worth.puts_other_first(open_cells, area.lattice.window, ahead_s)
+
+    def begin(self) -> None:
+        """Note that a pass begins."""
+        self.worth.begin()
+        self._room.begin()
+
+    def give_up_first(self) -> bool:
+        """Leave what is planned first until all else is done; return False if all is planned."""
+        if self._room.give_up():
+            return True
+        is_limited = self.worth.least > 0
+        if is_limited:
+            self.worth.give_up()
+        return is_limited
+
+    def is_in_other_room(self, cell: Cell) -> bool:
+        """Return whether new rooms on the map show that another room is to be finished first."""
+        area = self._map.area
+        if area is None or not self._room.is_due(area.lattice):
+            return False
+        left = self._cells.open_to_me(area) & area.reachable
+        return self._room.choose(self.worth.first(left, area.lattice.window), area, cell)
+
+    def _first(self, cells: NDArray[np.bool_], lattice: CoverageLattice) -> NDArray[np.bool_]:
+        return self._room.first(self.worth.first(cells, lattice.window), lattice)
+
+    def _counts(self) -> tuple[int, int]:
+        """Return the number of cells that this robot has to visit, planned now and in all."""
+        area = self._map.area
+        if area is None:
+            return 0, 0
+        left = self._cells.open_to_me(area) & area.reachable
+        first = self._first(left, area.lattice)
+        return int(np.count_nonzero(first)), int(np.count_nonzero(left))
 
     @property
     def is_any_planned_left(self) -> bool:
         """Whether this robot has to visit any of the cells that are planned now."""
-        area = self._map.area
-        if area is None:
-            return False
-        open_cells = self._cells.open_to_me(area) & area.reachable
-        return bool(self.worth.first(open_cells, area.lattice.window).any())
+        return self._counts()[0] > 0
+
+    @property
+    def is_part(self) -> bool:
+        """Whether other cells are left than those planned now."""
+        first, left = self._counts()
+        return left > first
 
     @property
     def is_first_done(self) -> bool:
         """Whether the cells planned first are covered, and other cells are left."""
-        is_limited = self.worth.least > 0 and self._cells.left_to_me() > 0
-        return is_limited and not self.is_any_planned_left
+        first, left = self._counts()
+        return left > 0 and not first
 
     def by_priority(self, ledger: MissionLedger) -> OrderState:
         """Return the order, its remaining zones sorted by priority if time does not allow all.

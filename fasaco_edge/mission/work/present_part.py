@@ -74,7 +74,7 @@ class PresentPart:
         """Reset exploration, counts and worth for another part."""
         self._exploration, self._has_new_lanes = Exploration(), False
         self._done, self._in_vain = -1, 0
-        self.scope.worth.begin()
+        self.scope.begin()
 
     @property
     def reached(self) -> ReachedCells | None:
@@ -180,8 +180,7 @@ class PresentPart:
         is_given_up = cells > 0 and self._in_vain > MAX_IN_VAIN
         if is_given_up and self._exploration.skip_viewpoint():
             return False
-        if is_given_up and self.scope.worth.least:
-            self.scope.worth.give_up()
+        if is_given_up and self.scope.give_up_first():
             return False
         if is_given_up and self._company.has_company:
             # Parts that other robots may leave unswept come before a retry.

@@ -125,7 +125,7 @@ class Sequencer(PresentPart):
         if state.begun or state.order is None or state.stage is Stage.OVER or state.waits_for:
             return ""
         zone = state.current_zone
-        self.scope.worth.begin()
+        self.scope.begin()
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             self._forget(zone, state)
         self._has_new_lanes = zone is not None and bool(zone.kinds)
@@ -211,7 +211,7 @@ class Sequencer(PresentPart):
         The robot drives home first, unless it is on an errand or was sent home.
         """
         self._retry_at = None
-        self.scope.worth.begin()
+        self.scope.begin()
         state = self.order_state = self.order_state.out_of_time(minutes)
         is_sent_home = state.paused and state.why == AT_HOME
         if state.errand or is_sent_home:
