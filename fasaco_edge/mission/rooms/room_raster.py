@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import GridGeometry, Point, Window
+from fasaco_edge.mission.coverage.floor_tiles import centres
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.rooms import FoundRooms
-    from fasaco_edge.mission.coverage.floor_tiles import centres
-from fasaco_edge.mission.coverage.loop_closure import Motion
+    from fasaco_edge.mission.coverage.loop_closure import Motion
 
 # Limit on the squares of a raster; a larger building gets wider squares.
 MOST_SQUARES = 1_000_000
