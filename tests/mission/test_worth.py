@@ -146,9 +146,9 @@ def test_unreachable_floor_of_high_priority_is_given_up():
     drive.plan()
     orders = drive.mission.orders
     for _ in range(MAX_IN_VAIN):
-        assert not orders.note_path_end("")
+        assert not orders.part.note_path_end("")
         assert drive.mission.orders.scope.worth.least == 80
-    assert not orders.note_path_end("")
+    assert not orders.part.note_path_end("")
     assert drive.mission.orders.scope.worth.least == 0
     problem = drive.command("replan").plan.problem
     assert np.count_nonzero(problem.to_cover) > 150, "the other room, too"

@@ -39,7 +39,7 @@ class EventHandler:
         self.map, self.ledger, self.monitor = parts.map, parts.ledger, parts.monitor
         self.orders, self.route, self.line = parts.orders, parts.route, parts.line
         self.trail, self.company, self.changes = parts.trail, parts.company, parts.changes
-        self.way_out, self.blocked = parts.way_out, parts.blocked
+        self.way_out, self.blocked, self.motion = parts.way_out, parts.blocked, parts.motion
         self.drive, self.battery = parts.lasting.drive, parts.lasting.battery
         self.rooms = parts.lasting.rooms
         self._now = 0.0
@@ -143,10 +143,7 @@ class EventHandler:
         self.route.note_map()
         before = self._compare_buildings()
         if before is not None and (self.map.has_moved or self.map.building.is_foreign):
-            self.ledger.note_map_motion(before)
-            self.orders.reach.note_map_motion()
-            self.trail.note_map_motion()
-            self.route.note_map_motion()
+            self.motion.receive_map(before)
             self.way_out.begin_anew()
         else:
             self._record_again()  # the pose may have come before the map
@@ -211,6 +208,7 @@ class EventHandler:
         self.orders.scope.worth.take(None)
         self._path = self.route.stop(str(misfit), self._now) or self._path
         self.trail.begin_anew()
+        self.motion.reset()
         self.changes.begin(self.orders.order_state.in_other_building(str(misfit)))
         self.route.want(self.ledger.first_plan_reason)
         raise misfit
@@ -242,6 +240,7 @@ class EventHandler:
         self.route.abandon()
         self.monitor.forget_pose(self._now)
         self.trail.begin_anew()
+        self.motion.reset()
         self.way_out.begin_anew()
 
     def _take_pose(self, stamped: StampedPose, at: float | None = None) -> None:
@@ -258,15 +257,10 @@ class EventHandler:
                 self.map.building.note_jump(before.pose, stamped.pose, self._now)
         self.drive.note(stamped)
         self.way_out.note_pose(stamped.pose)
-        motion, uncertain = None, 0
         # While the map shows another building, poses are invalid: no floor under them is swept.
         is_known = self.map.building.note_pose(stamped.pose, self._now)
         if is_known:
-            motion = self.ledger.map_motion(stamped.pose)
-            self.trail.note_motion(motion)
-            uncertain = self.ledger.forget_uncertain(stamped.pose)
-            if motion is not None:
-                self.orders.move_reached(motion)
+            if (motion := self.motion.receive_pose(stamped.pose)) is not None:
                 if self.map.building.take_closure():
                     self.orders.move_home(motion)
                     self.rooms.move(motion, self.changes.lattice_deg)
@@ -281,11 +275,8 @@ class EventHandler:
             return
         if has_jumped or self.map.area is None or not self.map.area.contains(cell):
             self.changes.update_area()
-        if is_known:
-            self._path = self.route.note_motion(motion, self._now) or self._path
-        if uncertain:
-            self.route.want(f"map and pose moved: {uncertain} cells to be covered again")
-        self.orders.note_cell(cell)
+        self._path = self.motion.move_path(self._now) or self._path
+        self.orders.part.note_cell(cell)
         self.route.follow(cell, self.ledger.current.has_visited)
         self.trail.note_drive()
 
@@ -339,6 +330,7 @@ class EventHandler:
             self.line.note_map()
         self.ledger.reset(self.map.frames.active)
         self.trail.begin_anew()
+        self.motion.reset()
         self.map.building.begin_anew()
         self._compare_buildings()
         self.route.forget_failure()

@@ -16,6 +16,7 @@ from fasaco_edge.mission.map.placing import placed, rotated_order
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.path.map_motion import MapMotion
 from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.rooms.room_commands import carry_out
 from fasaco_edge.mission.rooms.room_watch import RoomWatch
@@ -36,6 +37,7 @@ class OrderChanges:
     orders: Sequencer
     route: Route
     line: LineLayer
+    motion: MapMotion
     rooms: RoomWatch
     # Whether the robot is in no fleet: the robots of a fleet have the same cells.
     is_alone: bool
@@ -56,6 +58,7 @@ class OrderChanges:
     def begin(self, order: OrderState) -> None:
         """Begin another order; or end the present one, if the new state has none."""
         self.route.abandon()
+        self.motion.forget_order()
         self._keep_out(order)
         self.orders.start(order)
         self.update_area()
@@ -189,7 +192,7 @@ class OrderChanges:
         if self.map.area is None or self.map.robot_cell() is None:
             hint = "drive the robot to free floor, or check map, pose and robot radius"
             raise CommandError(f"nothing to plan: {self.map.why_misplaced()}", hint=hint)
-        if not self.orders.can_plan:
+        if not self.orders.part.can_plan:
             hint = "the floor in reach is covered: `mission start` covers it again"
             raise CommandError("nothing to plan: no reachable cell is left to cover", hint=hint)
         return self.route.want_full("asked for")

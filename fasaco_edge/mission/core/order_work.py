@@ -35,10 +35,10 @@ class OrderWork:
         stands = state is State.COVERING and not len(route.path.cells)
         self.share(cell, now, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:
-            if why := orders.why_standing(now):
+            if why := orders.part.why_standing(now):
                 return self._stand_by(why, update, now)
             try:
-                problem = orders.problem(cell, route.path_to_keep)
+                problem = orders.part.problem(cell, route.path_to_keep, orders.goal())
             except NothingToCover:
                 if ended := self._go_on_elsewhere(cell, update, now):
                     return ended
@@ -58,14 +58,14 @@ class OrderWork:
         route, orders, area = self.route, self.orders, self.map.area
         if area is not None and (why := self.way_out.why_shut_in(area)):
             return self.way_out.lead_out(why, update, now)
-        if reason := orders.explore(cell):
+        if reason := orders.part.explore(cell):
             route.want(reason)
             return None
-        if why := orders.why_looking(cell, now):
+        if why := orders.part.why_looking(cell, now):
             return self._stand_by(why, update, now)
         if self.line.left.open_missed():
             return None
-        if orders.pass_over_unreachable():
+        if orders.part.pass_over_unreachable():
             self.share(cell, now, at_once=True)
             return None
         return self._next_stage(cell, update, now)

@@ -57,7 +57,7 @@ class PathChecks:
     def _end_path(self, now: float, why: str = "") -> None:
         if self._orders.scope.is_first_done:
             self._route.want("what comes first is done: the rest")
-        elif self._orders.note_path_end(why):
+        elif self._orders.part.note_path_end(why):
             self._orders.advance(now)
         else:
             self._route.want("cells left over")
@@ -73,7 +73,7 @@ class PathChecks:
             and now - max(self._progress[1], self._route.begun_at) < VAIN_S
         ):
             return False
-        before, covered = self._progress, self._orders.done
+        before, covered = self._progress, self._orders.part.done
         self._progress = covered, now
         return before is not None and covered <= before[0]
 

@@ -136,8 +136,6 @@ class MissionLedger:
         self._opened_again: Counter[Cell] = Counter()
         # The ledger from before a restart; None once a map has confirmed it.
         self._resumed: LedgerSnapshot | None = None
-        # The robot's last pose before the map moved.
-        self._pose_before_motion: Pose2D | None = None
 
     @property
     def version(self) -> tuple[int, int, int]:
@@ -228,22 +226,13 @@ class MissionLedger:
         self.current.break_track()
         self.floor.break_track()
 
-    def note_map_motion(self, pose: Pose2D) -> None:
-        """Note that the map has moved under a robot at ``pose``; the next pose shows how."""
-        self._pose_before_motion = pose
+    def lift_tool(self) -> None:
+        """Note that the map has moved: track and cells under the tool are unknown."""
         self.current.lift_tool()
         self.floor.break_track()
 
-    def map_motion(self, pose: Pose2D) -> Motion | None:
-        """Return the map's motion by the first pose after it; None if no motion was noted."""
-        start = self._pose_before_motion
-        return None if start is None else Motion(start, pose)
-
-    def forget_uncertain(self, pose: Pose2D) -> int:
+    def forget_uncertain(self, motion: Motion) -> int:
         """Forget cells that a motion of the map makes uncertain; return their number."""
-        motion, self._pose_before_motion = self.map_motion(pose), None
-        if motion is None or motion.is_still:
-            return 0
         self._forget_passed()
         before = self.snapshot()
         cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
@@ -334,7 +323,7 @@ class MissionLedger:
 
     def _replace(self, frame: str) -> None:
         self.current, self.floor = self._nothing(frame)
-        self._resumed = self._pose_before_motion = self.before = None
+        self._resumed = self.before = None
         self._forget_passed()
         self.shared.note_forgotten()
 

@@ -109,10 +109,10 @@ class Attempt:
             return None
         row, col = path.cells[path.index].tolist()
         try:
-            problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
+            whole = orders.part.problem((row, col), path.ahead, orders.goal(), attempt=number)
+            problem = replace(whole.after(HELD_CELLS), is_full=is_full)
         except FasacoError:
             return None  # the map has changed: a repair is due
-        problem = replace(problem, is_full=is_full)
         return cls(numbering, path.index, joint, problem)
 
     def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:

@@ -57,9 +57,6 @@ class Route(PlanRequests):
         self.aside: NDArray[np.int32] | None = None
         # Heading at the end of the path [rad]; None for the heading of the last segment.
         self._end_yaw: float | None = None
-        # The path before a motion of the map, until the first pose on the moved map shows the
-        # motion.
-        self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
         # Numbers of the path and of its walk (a new path over the same cells is the same walk), and
         # of the last walk that was searched as a whole.
@@ -101,7 +98,7 @@ class Route(PlanRequests):
     def abandon(self) -> None:
         """Cancel the wanted plan, and discard the pending one: it is for another order."""
         super().abandon()
-        self._kept, self._before_motion, self.aside = PathProgress(NO_CELLS), None, None
+        self._kept, self.aside = PathProgress(NO_CELLS), None
 
     def set_aside(self) -> bool:
         """Keep the path during an errand; return False if a path is kept already."""
@@ -126,7 +123,12 @@ class Route(PlanRequests):
         A path that has to end at home is not reversed: the saved way would be driven at the end.
         """
         area, cell = self._map.area, self._map.robot_cell()
-        if area is None or cell is None or not len(cells) or self._orders.ends_home:
+        if (
+            area is None
+            or cell is None
+            or not len(cells)
+            or self._orders.order_state.returns_home_next
+        ):
             return cells
         ends = [area.shortest_path(cell, (int(row), int(col))) for row, col in cells[[0, -1]]]
         is_nearer = 0 < len(ends[1]) < len(ends[0])
@@ -147,19 +149,12 @@ class Route(PlanRequests):
         self.want("resumed")
         return None
 
-    def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` gets the motion."""
-        if self._before_motion is None:
-            self._before_motion = self.path_to_keep
-
-    def note_motion(self, motion: Motion | None, now: float) -> PathUpdate | None:
+    def move(self, before: NDArray[np.int32], motion: Motion, now: float) -> PathUpdate | None:
         """Move the path with the map, and want a plan that repairs it.
 
         Its drivable part is published at once: the robot must not follow the old position.
+        ``before``: int32 (n, 2), n >= 1, ``path_to_keep`` before the map moved.
         """
-        before, self._before_motion = self._before_motion, None
-        if before is None or motion is None or motion.is_still or not len(before):
-            return None
         self.discard_pending()
         self.want("map and pose moved")
         assert self._map.lattice is not None

@@ -29,9 +29,6 @@ class TrailLayer:
         self._lattice: CoverageLattice | None = None
         # The robot's last path, and its index on it.
         self._path, self._index = NO_CELLS, 0
-        # The trail before a motion of the map, until the first pose on the moved map shows the
-        # motion.
-        self._before_motion: TrailSnapshot | None = None
 
     @property
     def trail(self) -> LivingTrail:
@@ -62,18 +59,9 @@ class TrailLayer:
     def begin_anew(self) -> None:
         """Clear the trail: it belongs to another place."""
         self._trail, self._lattice = LivingTrail(self._config.trail), None
-        self._before_motion = None
 
-    def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` gets the motion."""
-        if self._before_motion is None:
-            self._before_motion = self._trail.snapshot()
-
-    def note_motion(self, motion: Motion | None) -> None:
-        """Move the trail with the map; ``motion`` is None if the map has not moved."""
-        before, self._before_motion = self._before_motion, None
-        if before is None or motion is None or motion.is_still:
-            return
+    def move(self, before: TrailSnapshot, motion: Motion) -> None:
+        """Move the trail with the map; ``before``: the trail before it moved."""
         self._follow_map()
         turn = math.remainder(motion.end.yaw - motion.start.yaw, math.tau)
         turns = round(turn / (0.5 * math.pi))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import get_args
 
@@ -20,8 +19,8 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from fasaco_edge.mission.orders.zones import in_zones
-from fasaco_edge.mission.work.exploration import Exploration, frontier, is_in_reach
-from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.exploration import frontier, is_in_reach
+from fasaco_edge.mission.work.present_order import PresentOrder
 from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
 
@@ -30,8 +29,7 @@ class CellsLeft:
 
     Args:
         config, map_state, ledger, company: the sources of the cells.
-        state: the order and its progress.
-        exploration: the viewpoints.
+        order: the order and its viewpoints.
     """
 
     def __init__(
@@ -40,18 +38,17 @@ class CellsLeft:
         map_state: MapState,
         ledger: MissionLedger,
         company: Company,
-        state: Callable[[], OrderState],
-        exploration: Callable[[], Exploration],
+        order: PresentOrder,
     ) -> None:
         self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
-        self._state, self._exploration = state, exploration
+        self._order = order
         # The last area, and its edge cells.
         self._edge: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
         open_cells = self.unswept(window)
-        self._exploration().mark(open_cells, window)
+        self._order.exploration.mark(open_cells, window)
         return open_cells
 
     def unswept(self, window: Window) -> NDArray[np.bool_]:
@@ -64,7 +61,7 @@ class CellsLeft:
         """Return the cells that this robot (in a fleet: in its part) still has to visit."""
         window = area.lattice.window
         cells = self._company.mine(self.unswept(window), area).copy()
-        self._exploration().mark(cells, window)
+        self._order.exploration.mark(cells, window)
         return cells
 
     @property
@@ -101,7 +98,7 @@ class CellsLeft:
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
         """Return the cells of ``window`` that this robot has to cover, or has covered."""
-        state = self._state()
+        state = self._order.state
         zone, order = state.current_zone, state.order
         due = (zone,) if zone is not None else order.zones if order is not None else ()
         inside = in_zones(due, window, self._config.footprint.cell_m)
@@ -113,7 +110,7 @@ class CellsLeft:
     @property
     def is_at_edge(self) -> bool:
         """Whether only cells along walls and furniture are due."""
-        return self._state().current_pass.covers == "edge"
+        return self._order.state.current_pass.covers == "edge"
 
     def edge(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` lie along walls and furniture, bool (rows, cols)."""

@@ -80,6 +80,10 @@ class Exploration:
         self.looked.clear()
         self.is_shut, self._shut_since = False, None
 
+    def aim_at(self, viewpoints: set[Cell]) -> None:
+        """Replace the viewpoints."""
+        self.viewpoints = viewpoints
+
     def note_cell(self, cell: Cell) -> None:
         """Note that the robot is in ``cell``."""
         if cell in self.viewpoints:

@@ -13,6 +13,9 @@ from fasaco_edge.mission.coverage.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.work.reached_cells import ReachedCells
 
+CellsOn = tuple[Window, NDArray[np.bool_]]
+"""Cells, bool (rows, cols), of a window."""
+
 
 class OrderReach:
     """Remembers which cells have been reachable since an order began.
@@ -24,18 +27,17 @@ class OrderReach:
         self._map = map_state
         self._newest: ReachableArea | None = None
         # A window around all maps received, and which of its cells have ever been reachable.
-        self._once: tuple[Window, NDArray[np.bool_]] | None = None
-        # ``_once`` before the map moved; and whether its cells have moved since the newest area.
-        self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
+        self._once: CellsOn | None = None
+        # Whether these cells have moved since the newest area.
         self._have_moved = False
         # Cells that keep-out zones drawn during the order have cut off.
-        self._cut_off: tuple[Window, NDArray[np.bool_]] | None = None
+        self._cut_off: CellsOn | None = None
 
     def begin(self, reached: ReachedCells | None) -> None:
         """Start another order, or continue one with the cells reached before a restart."""
         self._newest = None
         self._once = None if reached is None else (reached.window, reached.mask)
-        self._before_motion = self._cut_off = None
+        self._cut_off = None
         self._have_moved = reached is not None and reached.have_moved
         self.note_area()
 
@@ -43,6 +45,11 @@ class OrderReach:
         """Take over the reach of another mission with the same order on the same cells."""
         self._newest, self._once = before._newest, before._once
         self._cut_off = before._cut_off
+
+    @property
+    def reached(self) -> CellsOn | None:
+        """A window around all maps received, and which of its cells have ever been reachable."""
+        return self._once
 
     @property
     def cells(self) -> ReachedCells | None:
@@ -77,13 +84,11 @@ class OrderReach:
             still = _on(window, self._cut_off) & self.without_keep_outs(area)
             self._cut_off = window, lost | still
 
-    def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``move`` follows with the motion."""
-        self._before_motion = self._before_motion or self._once
+    def move(self, before: CellsOn | None, motion: Motion) -> None:
+        """Move the cells with the map; drop what was noted since it moved: the pose was old.
 
-    def move(self, motion: Motion) -> None:
-        """Move the cells with the map; drop what was noted since it moved: the pose was old."""
-        before, self._before_motion = self._before_motion, None
+        ``before``: the cells before it moved.
+        """
         if before is not None and not motion.is_still:
             lattice = self._map.lattice
             assert lattice is not None
@@ -154,7 +159,7 @@ def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return widened
 
 
-def _on(window: Window, cells: tuple[Window, NDArray[np.bool_]] | None) -> NDArray[np.bool_]:
+def _on(window: Window, cells: CellsOn | None) -> NDArray[np.bool_]:
     """Return a copy of cells, given with their window, on another window; None: no cells."""
     if cells is None:
         return np.zeros((window.rows, window.cols), bool)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -18,7 +17,8 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.mission.work.order_reach import OrderReach
-from fasaco_edge.mission.work.order_state import OrderState, Stage
+from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.mission.work.present_order import PresentOrder
 
 # Limit on the areas listed, the largest first; the rest are only counted.
 MOST_AREAS = 20
@@ -97,7 +97,7 @@ class UncoveredCells:
     Args:
         map_state, ledger: the map, and the covered cells.
         reach: the cells that have been reachable since the order began.
-        state: returns the order and its progress.
+        order: the order and its progress.
 
     Masks are bool (rows, cols) on the lattice of the area.
     """
@@ -107,9 +107,9 @@ class UncoveredCells:
         map_state: MapState,
         ledger: MissionLedger,
         reach: OrderReach,
-        state: Callable[[], OrderState],
+        order: PresentOrder,
     ) -> None:
-        self._map, self._ledger, self._reach, self._state = map_state, ledger, reach, state
+        self._map, self._ledger, self._reach, self._order = map_state, ledger, reach, order
         # Number of paths that left cells over, and why the last path did; "" if unknown.
         self._failures, self._why_left = 0, ""
         self._found: tuple[object, UncoveredAreas] = (None, UncoveredAreas())
@@ -131,7 +131,7 @@ class UncoveredCells:
 
         While the robot is on no coverable cell, the last result is returned.
         """
-        area, state = self._map.area, self._state()
+        area, state = self._map.area, self._order.state
         if state.order is None:
             return UncoveredAreas()
         key = (area, self._ledger.version, state)
@@ -152,7 +152,7 @@ class UncoveredCells:
 
     def outcome(self) -> str:
         """Return as text how much of the order is covered, and why the rest is not."""
-        order, area, lattice = self._state().order, self._map.area, self._map.lattice
+        order, area, lattice = self._order.state.order, self._map.area, self._map.lattice
         if order is None or lattice is None:
             return "the order was carried out"
         zones = "" if order.zones[0].polygon is None else " of the zones"
@@ -182,7 +182,7 @@ class UncoveredCells:
 
     def is_any_left(self) -> bool:
         """Return whether any ordered cell is left that was ever reachable."""
-        lattice, state = self._map.lattice, self._state()
+        lattice, state = self._map.lattice, self._order.state
         if state.order is None or state.next_pass() is not state:
             return True
         assert lattice is not None
@@ -203,7 +203,7 @@ class UncoveredCells:
         return asked
 
     def _reason(self, cause: Cause) -> str:
-        if self._state().late and cause is Cause.LEFT_OVER:
+        if self._order.state.late and cause is Cause.LEFT_OVER:
             return NO_TIME
         tries = "1 try" if self._failures == 1 else f"{self._failures} tries"
         why = f", {self._why_left}" if self._why_left else ""
@@ -211,7 +211,7 @@ class UncoveredCells:
 
     def viewpoints(self) -> set[Cell]:
         """Return the cells (row, col) from which the robot can look at closed areas."""
-        order, area = self._state().order, self._map.area
+        order, area = self._order.state.order, self._map.area
         if order is None or area is None:
             return set()
         window = area.lattice.window
@@ -246,7 +246,7 @@ class UncoveredCells:
             causes[free.coverable & (lattice.states == BLOCKED)] = Cause.KEPT_OUT
         behind = self._reach.without_keep_outs(area) & lattice.coverable & ~reachable
         causes[behind] = Cause.BEHIND_KEEP_OUT
-        if self._state().stage is not Stage.COVERING:
+        if self._order.state.stage is not Stage.COVERING:
             # While covering, reachable cells are still to come.
             causes[reachable] = Cause.LEFT_OVER
         causes[~self._uncovered(order, area)] = 0

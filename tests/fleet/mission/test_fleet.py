@@ -22,6 +22,7 @@ from fasaco_edge.fleet.mission.shared_work import MOST_AHEAD
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES, SweptQueue
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.loop_closure import Motion
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
@@ -229,8 +230,8 @@ def test_after_a_loop_closure_nothing_uncertain_is_given_back():
     )
     ledger.shared.begin(5)
     ledger.shared.receive("r2", 1, tiles_of(block))
-    ledger.note_map_motion(Pose2D(1.5, 1.5))
-    ledger.forget_uncertain(Pose2D(2.1, 1.5))
+    ledger.lift_tool()
+    ledger.forget_uncertain(Motion(Pose2D(1.5, 1.5), Pose2D(2.1, 1.5)))
     left = ledger.shared.swept(Window(0, 0, 10, 10))
     # It was there wherever between its two places the map lay.
     assert left[:, 2:].all()
