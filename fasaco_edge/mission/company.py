@@ -102,7 +102,7 @@ class Waiting:
 
     waits_for = ""
 
-    def succeed(self, before: Waiting) -> None:
+    def continue_from(self, before: Waiting) -> None:
         """Take over the state of a predecessor."""
 
     def decide(self, state: State, now: float, *, may_drive: bool) -> Doing | None:

@@ -97,7 +97,7 @@ class GivingWay(Waiting):
         # Reason and time of its last wait.
         self._waited, self._waited_at = "", -math.inf
 
-    def succeed(self, before: Waiting) -> None:
+    def continue_from(self, before: Waiting) -> None:
         """Take over the state of a predecessor: where the robot stays, and why it waited."""
         if not isinstance(before, GivingWay):
             return

@@ -40,9 +40,9 @@ class Executive:
         self._cell: Cell = 0, 0
         self._update: PathUpdate | None = None
 
-    def succeed(self, before: Executive) -> None:
+    def continue_from(self, before: Executive) -> None:
         """Continue where another mission ended; a docked robot stays docked."""
-        self.troubles.succeed(before.troubles)
+        self.troubles.continue_from(before.troubles)
         if before._state is State.CHARGING:
             self._state, self._reason = before._state, before._reason
 
@@ -64,10 +64,10 @@ class Executive:
     def decide(self, now: float) -> Decision:
         """Return the decision at ``now`` [s]: that of the first rule that returns an activity."""
         self._now, self._update = now, None
-        self.way_out.end()
+        self.way_out.forget_why()
         doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
         self._state, self._reason = doing.state, doing.reason
-        self.troubles.look(self.doing, now)
+        self.troubles.update(self.doing, now)
         return Decision(plan=doing.plan, path=doing.path)
 
     def _charge_in_time(self) -> None:
@@ -100,7 +100,7 @@ class Executive:
         if resting is None:
             return None
         if resting[0] in STOPPED:
-            self._standing.begin_anew()
+            self._standing.reset()
         return Doing(*resting, self._update)
 
     def _why_rest(self) -> tuple[State, str] | None:
@@ -151,7 +151,7 @@ class Executive:
             self.map.forget_area()
             return self.way_out.lead_out(self.map.why_misplaced(), None, self._now)
         self._cell = cell
-        self._standing.look(cell, self._now)
+        self._standing.update(cell, self._now)
         if not len(route.path.cells):
             self.monitor.clear_doubt()  # without a path there is no doubt about it
         self._update = route.truncate(self._now)
@@ -178,7 +178,7 @@ class Executive:
             self._checks.check_worth(now)
         if self._state is State.COVERING:
             self._checks.check_time(now)
-        if reason := self.orders.begin(cell, now):
+        if reason := self.orders.begin_stage(cell, now):
             self.route.want(reason)
         if reason := self._work.share(cell, now):
             self.route.want(reason)
@@ -218,7 +218,7 @@ class Executive:
             update = route.publish_anew(why, now)
         if self._standing.is_on_path and update is None:
             update = route.publish(route.path.ahead, "robot stands", now)
-            self._standing.note_again()
+            self._standing.record_try()
         is_free = state is State.COVERING and route.pending is None and not route.wanted
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
 

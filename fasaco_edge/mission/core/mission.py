@@ -108,7 +108,7 @@ class Mission:
         if rooms is not None:
             self._rooms.book = rooms
         order = order or self.order_state
-        if before is not None and self._layout.resume(before, order.current_pass):
+        if before is not None and self._layout.restore(before, order.current_pass):
             self._lay_cells()
         self._continue(order, before, restart=before)
 
@@ -127,28 +127,28 @@ class Mission:
             rotated_by_deg, scale = deg - before.lattice_deg, cell_m / before.cell_m
         if before is not None and not before.is_empty:
             before = relaid_ledger(before, deg, cell_m)
-            self.covered.resume(before, is_confirmed=is_confirmed)
-            self._trail.resume(before.trail)
+            self.covered.restore(before, is_confirmed=is_confirmed)
+            self._trail.restore(before.trail)
             self.map.frames.activate(before.frame)
             if restart is not None and order.stage is not Stage.OVER:
-                self.covered.note_restart(relaid_ledger(restart, deg, cell_m))
-        self.map.places.resume(order.places)
+                self.covered.record_restart(relaid_ledger(restart, deg, cell_m))
+        self.map.places.restore(order.places)
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
-        self._changes.begin(self._rotation.order(order, rotated_by_deg, scale))
+        self._changes.begin_order(self._rotation.order(order, rotated_by_deg, scale))
         self.state, self.reason = self._executive.status()
 
-    def succeed(self, before: Mission) -> None:
+    def continue_from(self, before: Mission) -> None:
         """Take over a predecessor's state of robot and inputs, and its doubt about the building.
 
         To be called before the first step, which gets the events of the predecessor's ``held``.
         """
-        self._executive.succeed(before._executive)
+        self._executive.continue_from(before._executive)
         if before.rotation != self.rotation or before._layout.cell_m != self._layout.cell_m:
             return
-        self.orders.reach.succeed(before.orders.reach)
-        self.orders.uncovered.succeed(before.orders.uncovered)
-        self._executive.way_out.succeed(before._executive.way_out)
+        self.orders.reach.continue_from(before.orders.reach)
+        self.orders.uncovered.continue_from(before.orders.uncovered)
+        self._executive.way_out.continue_from(before._executive.way_out)
         if before.is_in_doubt:
             self.map.watch_on(before.map.building)
 
@@ -178,7 +178,7 @@ class Mission:
         events = list(events)
         begun = self._make_room(events, now)
         happened = self._align(self._handle(events, now), now)
-        happened = self._look_for_rooms(happened, now)
+        happened = self._find_rooms(happened, now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
         stop = self.route.stop(self.reason, now) if self.state.is_at_rest else None
@@ -192,14 +192,14 @@ class Mission:
         plan = decided.plan and self._trail.posed(decided.plan)
         return replace(happened, plan=plan, path=path)
 
-    def _look_for_rooms(self, happened: Decision, now: float) -> Decision:
+    def _find_rooms(self, happened: Decision, now: float) -> Decision:
         """Find rooms if due, and let the order follow them; return the decision. A failure is
         reported as a fault, as the robot can sweep without rooms."""
         if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
             self._rooms.leave_building()
         try:
             if self.grid is not None and not self.is_in_doubt:
-                self._rooms.look(self.grid, now)
+                self._rooms.update(self.grid, now)
         except NotPublished as fault:
             happened = replace(happened, faults=(*happened.faults, fault))
         self._changes.follow_rooms()
@@ -211,7 +211,7 @@ class Mission:
     def _align(self, happened: Decision, now: float) -> Decision:
         """Lay other cells if the pass or the walls require them; return the combined decision."""
         state, grid, pose = self.order_state, self.grid, self.pose
-        self._layout.note_faults(happened.faults)
+        self._layout.receive_faults(happened.faults)
         # Keep the cells in an errand (the kept path needs them), and while the building is in
         # doubt.
         if state.errand or self.is_in_doubt or grid is None or pose is None:
@@ -237,8 +237,8 @@ class Mission:
         stop = route.stop(why, now)
         self._lay_cells()
         self._continue(order, before, restart=restart, is_confirmed=is_confirmed)
-        self.route.succeed(route)
-        self._executive.succeed(executive)
+        self.route.continue_from(route)
+        self._executive.continue_from(executive)
         self.drive.break_track()
         self._handle(held, now)
         self.route.want(why)
@@ -263,7 +263,7 @@ class Mission:
             return ""
         is_theirs = not self.map.places.why
         order = self.orders.order_state
-        return self._idle.look(self.grid, self.map_revision, order, now, is_theirs=is_theirs)
+        return self._idle.find(self.grid, self.map_revision, order, now, is_theirs=is_theirs)
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""

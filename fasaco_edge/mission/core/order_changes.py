@@ -55,12 +55,12 @@ class OrderChanges:
         """Angle of the cells' rows to the x axis of the map frame [deg]."""
         return self.config.lattice_deg or 0.0
 
-    def begin(self, order: OrderState) -> None:
+    def begin_order(self, order: OrderState) -> None:
         """Begin another order; or end the present one, if the new state has none."""
         self.route.abandon()
         self.motion.forget_order()
         self._keep_out(order)
-        self.orders.start(order)
+        self.orders.begin_order(order)
         self.update_area()
 
     def _keep_out(self, order: OrderState) -> None:
@@ -70,7 +70,7 @@ class OrderChanges:
         if self.lattice_deg:
             drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
         self.map.keep_out(self._standing + ordered + drawn)
-        self.line.note_map()
+        self.line.receive_map()
 
     def update_area(self) -> None:
         """Update the reachable area; want a new plan if it changed."""
@@ -79,7 +79,7 @@ class OrderChanges:
         area = self.map.area
         if area is None:
             return
-        self.orders.reach.note_area()
+        self.orders.reach.record_area()
         if before is None:
             again = "robot is on coverable ground again"
             route.want(again if route.revision else self.ledger.first_plan_reason)
@@ -129,7 +129,7 @@ class OrderChanges:
         """Change to the state that follows a command at ``now`` [s]; return the path, if any."""
         before, update = self.orders.order_state, None
         if after.order is not before.order:
-            self.begin(after)
+            self.begin_order(after)
         elif after.keep_out != before.keep_out:
             update = self._change_keep_outs(after, now)
         elif after.paused and not before.paused:
@@ -169,11 +169,11 @@ class OrderChanges:
         self._keep_out(order)
         self.route.forget_failure()
         self.update_area()
-        self.orders.reach.note_keep_outs(before)
+        self.orders.reach.record_keep_outs(before)
         if not self.map.is_kept_out:
             return None
         # Near the zone's border the robot may go on, but along another path.
-        self.map.follow_path(None)
+        self.map.set_path_cell(None)
         return self.route.stop("robot is in a keep-out zone", now)
 
     def _resume(self, order: OrderState, now: float) -> PathUpdate | None:

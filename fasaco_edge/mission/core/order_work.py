@@ -44,7 +44,7 @@ class OrderWork:
                     return ended
                 continue
             request = route.request_plan(problem)
-            self.monitor.note_request(request.number)
+            self.monitor.record_request(request.number)
             state = State.COVERING if len(route.path.cells) else State.PLANNING
             return Doing(state, request.reason, update, request)
         return self._return_home(cell, update, now)
@@ -77,9 +77,9 @@ class OrderWork:
         if name := orders.order_state.waits_for:
             return self.wait_for_room(name, update, now)
         if orders.is_waiting or orders.order_state.stage is Stage.OVER:
-            route.drop()
+            route.want_none()
             return self.settle(update, now)
-        if reason := orders.begin(cell, now):
+        if reason := orders.begin_stage(cell, now):
             route.want(reason)
         return None
 
@@ -96,7 +96,7 @@ class OrderWork:
         """Stand until a room has the name ``name``."""
         reason = f"waits for a room {name!r}: no room on the map has this name yet"
         update = self.route.stop(reason, now) or update
-        self.route.drop()
+        self.route.want_none()
         return Doing(State.BLOCKED, reason, update)
 
     def share(self, cell: Cell, now: float, *, at_once: bool = False) -> str:
@@ -113,7 +113,7 @@ class OrderWork:
         """Drive to where the order ends, or end it there."""
         route, area, home = self.route, self.map.area, self.orders.goal()
         assert area is not None
-        route.drop()
+        route.want_none()
         self.monitor.clear_doubt()
         if home is None or cell == home:
             self.orders.advance(now)

@@ -57,7 +57,7 @@ class PathChecks:
     def _end_path(self, now: float, why: str = "") -> None:
         if self._orders.scope.is_first_done:
             self._route.want("what comes first is done: the rest")
-        elif self._orders.part.note_path_end(why):
+        elif self._orders.part.record_path_end(why):
             self._orders.advance(now)
         else:
             self._route.want("cells left over")

@@ -72,8 +72,8 @@ class PassedCells:
         """Forget all of them."""
         self._cells.clear()
 
-    def note(self, cell: Cell) -> None:
-        """Note that the robot has passed a cell."""
+    def add(self, cell: Cell) -> None:
+        """Add a cell that the robot has passed."""
         self._cells[cell] = None
         if len(self._cells) > MOST_PASSED:
             self.drop(next(iter(self._cells)))
@@ -147,8 +147,8 @@ class MissionLedger:
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
-    def note_restart(self, before: LedgerSnapshot) -> None:
-        """Note the coverage from before a restart, in present cells."""
+    def record_restart(self, before: LedgerSnapshot) -> None:
+        """Record the coverage from before a restart, in present cells."""
         self.before = before
 
     def not_since(self, window: Window) -> NDArray[np.bool_]:
@@ -172,12 +172,12 @@ class MissionLedger:
         """Whether no further map can contradict it."""
         return self._resumed is None
 
-    def resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
+    def restore(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         """Continue the ledger from before a restart; ``is_confirmed``: see the property."""
         self._resumed = None if is_confirmed else before
         self.current = CoverageLedger.restored(before)
         self.floor = SweptFloor.restored(before.floor, self._tool_m, self._sight)
-        self.shared.resume(before.fleet)
+        self.shared.restore(before.fleet)
         if cells := before.cells:
             self.first_plan_reason = f"first plan, {cells} cells were covered before"
 
@@ -219,7 +219,7 @@ class MissionLedger:
             self.current.open_again(cell)
         self._opened_again.update(cells)
         self.reopened += 1
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
 
     def break_track(self) -> None:
         """Note that the robot's track to its next pose is unknown."""
@@ -240,7 +240,7 @@ class MissionLedger:
         self.floor.leave(floor)
         # Cells of other robots become uncertain, too: each robot records on a map of its own.
         self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
         return before.cells - self.current.snapshot().cells
 
     def forget(self, inside: Callable[[Window, float], NDArray[np.bool_]]) -> None:
@@ -261,7 +261,7 @@ class MissionLedger:
         self.current.forget(cells_inside)
         self.floor.forget(lambda window: inside(window, PIXEL_M))
         self.shared.disregard(cells_inside)
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
         """Move to ``frame``; start over, and return the fault, if cells lie in another frame."""
@@ -282,7 +282,7 @@ class MissionLedger:
     def reset(self, frame: str) -> None:
         """Forget everything; ``frame``: frame of the poses, "" if none is active."""
         self._replace(frame)
-        self.shared.begin_anew()
+        self.shared.reset()
         self.shared.disregard(lambda rows, _: np.ones(len(rows), np.bool_))
         self.first_plan_reason = "first plan"
 
@@ -325,7 +325,7 @@ class MissionLedger:
         self.current, self.floor = self._nothing(frame)
         self._resumed = self.before = None
         self._forget_passed()
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
 
     def _begun_anew(self, why: str) -> LedgerMismatchError:
         misfit = LedgerMismatchError(why)

@@ -186,7 +186,7 @@ class FloorLeft:
         assert tally is not None
         assert floor is not None
         for row, col in passed.tolist():
-            kept.note((row, col))
+            kept.add((row, col))
         for cell in kept.next(CHECKED_CELLS) if len(passed) else ():
             if tally.open_in_m2(floor.box_of(cell, RIM_M)) < self._worth_m2:
                 kept.drop(cell)

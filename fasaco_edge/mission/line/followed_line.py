@@ -241,7 +241,7 @@ class FollowedLine:
         """Return the stands of the walk's cells from ``begin`` to ``end``, at least one."""
         return self._floor.stands.stands_of(self._walk[begin : max(end, begin + 1)])
 
-    def note(self, first: int, end: int, state: int) -> None:
+    def mark(self, first: int, end: int, state: int) -> None:
         """Mark points as MOVED or POLISHED."""
         self._whole = self._whole.marked(first, end, state)
 

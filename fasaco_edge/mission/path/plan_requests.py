@@ -187,7 +187,7 @@ class PlanRequests:
         self.forget_failure()
         return self.plans + (1 if self.pending is None or self.is_improving else 2)
 
-    def drop(self) -> None:
+    def want_none(self) -> None:
         """Want no plan."""
         self.wanted = self._full = ""
         self._changed = None
@@ -198,7 +198,7 @@ class PlanRequests:
 
     def abandon(self) -> None:
         """Want no plan, and discard the pending one: it is for another order."""
-        self.drop()
+        self.want_none()
         self.forget_failure()
         self.discard_pending()
 
@@ -215,7 +215,7 @@ class PlanRequests:
         changed = self._changed if self._is_by_map and not self._full else None
         problem = replace(problem, is_full=bool(self._full) or problem.is_full)
         request = self._request(problem, self._full or self.wanted, changed)
-        self.drop()
+        self.want_none()
         return request
 
     def _request_attempt(self, attempt: Attempt) -> PlanRequest:
@@ -262,8 +262,8 @@ class PlanRequests:
         sooner = f"{with_map}, or " if pause_s < BROKEN_S else ""
         return f"{why}; tried again {sooner}after {BROKEN_S:g} s"
 
-    def note_map(self) -> None:
-        """Note another map: a plan that failed with the previous map may succeed now."""
+    def receive_map(self) -> None:
+        """Take in another map: a plan that failed with the previous map may succeed now."""
         self._has_map = True
 
     def forget_failure(self) -> None:

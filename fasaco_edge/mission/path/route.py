@@ -70,7 +70,7 @@ class Route(PlanRequests):
         self._spare = SpareTime(spare_share)
         self._checked_on: ReachableArea | None = None
 
-    def succeed(self, before: Route) -> None:
+    def continue_from(self, before: Route) -> None:
         """Continue the counts of another route; a plan pending there is dropped."""
         self.revision, self.plans, self.attempts = before.revision, before.plans, before.attempts
         self.unchanged, self.outdated = before.unchanged, before.outdated
@@ -304,12 +304,12 @@ class Route(PlanRequests):
         self.published_at = now
         return PathUpdate(self.revision, self.path.ahead, reason, end_yaw=self._end_yaw)
 
-    def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
-        """Note that the robot is in ``cell``, see ``PathProgress.driven_to``."""
+    def record_cell(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
+        """Record that the robot is in ``cell``, see ``PathProgress.driven_to``."""
         self._hold(self.held.driven_to(cell, has_visited))
 
-    def follow_line(self, index: int) -> None:
-        """Note the robot's index on the path, as its line shows."""
+    def record_index(self, index: int) -> None:
+        """Record the robot's index on the path, as its line shows."""
         held = self.held
         if held.index < index < len(held.cells):
             self._hold(replace(held, index=index))

@@ -46,17 +46,17 @@ class TrailLayer:
             return request
         return replace(request, problem=replace(request.problem, trail=self.snapshot()))
 
-    def take(self, plan: CoveragePath) -> None:
+    def receive_plan(self, plan: CoveragePath) -> None:
         """Take over the trail that the ants of a plan have left, even if the plan is not driven."""
         self._follow_map()
         if plan.trail is not None:
             self._trail.take(plan.trail, plan.work.ants)
 
-    def resume(self, before: TrailSnapshot) -> None:
+    def restore(self, before: TrailSnapshot) -> None:
         """Continue with the trail from before a restart."""
         self._trail, self._lattice = LivingTrail(self._config.trail, before), None
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Clear the trail: it belongs to another place."""
         self._trail, self._lattice = LivingTrail(self._config.trail), None
 
@@ -69,7 +69,7 @@ class TrailLayer:
             before, lambda x, y: motion.back(1.0, x, y), turns, self._config.footprint.cell_m
         )
 
-    def note_drive(self) -> None:
+    def fade_driven(self) -> None:
         """Fade the trail along the driven part of the path."""
         self._follow_map()
         path = self._route.path

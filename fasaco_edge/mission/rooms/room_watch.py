@@ -65,19 +65,19 @@ class RoomWatch:
         self._found: FoundRooms | None = None
         self._due = -math.inf
 
-    def look(self, grid: OccupancyGrid, now: float) -> None:
+    def update(self, grid: OccupancyGrid, now: float) -> None:
         """Search a map for rooms at ``now`` [s] if that is due.
 
         Raises:
             NotPublished: the search failed; the rooms known before stay.
         """
         try:
-            self._look(grid, now)
+            self._update(grid, now)
         except Exception as error:
             why = f"rooms of this map were not published: {type(error).__name__}: {error}"
             raise NotPublished(why, hint=FAILED_HINT) from error
 
-    def _look(self, grid: OccupancyGrid, now: float) -> None:
+    def _update(self, grid: OccupancyGrid, now: float) -> None:
         """Search a map at ``now`` [s] if that is due.
 
         An unchanged map is entered again until it causes no further change.

@@ -56,7 +56,7 @@ class IdlePlaces:
         self._key: tuple[object, ...] = ()
         self._looked_at, self._said = float("-inf"), ""
 
-    def look(
+    def find(
         self, grid: OccupancyGrid, revision: int, order: OrderState, now: float, *, is_theirs: bool
     ) -> str:
         """Return which places have no effect, and why; "" for none.

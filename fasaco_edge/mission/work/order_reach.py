@@ -33,15 +33,15 @@ class OrderReach:
         # Cells that keep-out zones drawn during the order have cut off.
         self._cut_off: CellsOn | None = None
 
-    def begin(self, reached: ReachedCells | None) -> None:
+    def begin_order(self, reached: ReachedCells | None) -> None:
         """Start another order, or continue one with the cells reached before a restart."""
         self._newest = None
         self._once = None if reached is None else (reached.window, reached.mask)
         self._cut_off = None
         self._have_moved = reached is not None and reached.have_moved
-        self.note_area()
+        self.record_area()
 
-    def succeed(self, before: OrderReach) -> None:
+    def continue_from(self, before: OrderReach) -> None:
         """Take over the reach of another mission with the same order on the same cells."""
         self._newest, self._once = before._newest, before._once
         self._cut_off = before._cut_off
@@ -56,7 +56,7 @@ class OrderReach:
         """The cells that have been reachable; None for none."""
         return None if self._once is None else ReachedCells.of(self._once[1], self._once[0])
 
-    def note_area(self) -> None:
+    def record_area(self) -> None:
         """Remember the cells that are reachable now."""
         area = self._map.area
         if area is not None and area is not self._newest:
@@ -75,8 +75,8 @@ class OrderReach:
                 window = area.lattice.window
                 self._cut_off = window, _on(window, self._cut_off) & ~area.reachable
 
-    def note_keep_outs(self, before: ReachableArea | None) -> None:
-        """Note that keep-outs have changed; ``before``: the area until then."""
+    def record_keep_outs(self, before: ReachableArea | None) -> None:
+        """Record that keep-outs have changed; ``before``: the area until then."""
         if before is not None and (area := self._map.area) is not None:
             window = area.lattice.window
             lost = _on(window, (before.lattice.window, before.reachable)) & ~area.reachable
@@ -94,7 +94,7 @@ class OrderReach:
             assert lattice is not None
             self._once = moved_mask(*before, motion, lattice.cell_m)
             self._newest, self._have_moved, self._cut_off = None, True, None
-            self.note_area()
+            self.record_area()
 
     def shift(self, motion: Motion) -> None:
         """Move the cells with the newest map, whose area is not known yet."""

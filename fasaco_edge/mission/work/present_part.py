@@ -67,14 +67,14 @@ class PresentPart:
         """Forget the viewpoints of the previous order, and what it tried in vain."""
         self._order.exploration, self._has_new_lanes = Exploration(), False
         self.try_all()
-        self.scope.worth.begin()
+        self.scope.worth.begin_pass()
 
     def begin_pass(self, *, has_new_lanes: bool) -> None:
         """Try all cells of another pass; ``has_new_lanes``: whether it sets lanes of its own."""
         self._has_new_lanes = has_new_lanes
         self.try_all()
         if self._order.state.pass_number == 1:
-            self._order.exploration.begin()
+            self._order.exploration.begin_zone()
 
     def begin_retry(self, cell: Cell) -> None:
         """Try the cells left once more, and look at closed areas; ``cell``: the robot's cell."""
@@ -98,9 +98,9 @@ class PresentPart:
         """Whether only parts of other robots are left, and those robots make progress."""
         return self._company.others_go_on and not self.cells.left_to_me()
 
-    def note_cell(self, cell: Cell) -> None:
-        """Note that the robot is in ``cell``."""
-        self._order.exploration.note_cell(cell)
+    def record_cell(self, cell: Cell) -> None:
+        """Record that the robot is in ``cell``."""
+        self._order.exploration.record_cell(cell)
 
     def problem(
         self, cell: Cell, before: NDArray[np.int32], home: Cell | None, *, attempt: int = 0
@@ -158,14 +158,14 @@ class PresentPart:
         zone = self._order.state.current_zone
         return "others stand in the way" + (f" to zone {zone.name!r}" if zone else "")
 
-    def note_path_end(self, why: str) -> bool:
-        """Note the end of a path; return whether the cells it left must wait for a retry.
+    def record_path_end(self, why: str) -> bool:
+        """Record the end of a path; return whether the cells it left must wait for a retry.
 
         ``why``: why the path left them; "" if unknown.
         """
         cells = self.cells.left_to_me()
         if cells > 0:
-            self.uncovered.note_failure(why)
+            self.uncovered.record_failure(why)
         # Cells done are counted, not cells left, as a new map may add cells.
         done = self.done
         self._in_vain = self._in_vain + 1 if cells and done <= self._done else 1

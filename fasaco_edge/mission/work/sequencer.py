@@ -101,7 +101,7 @@ class Sequencer:
         """Whether the order is over."""
         return self._order.state.stage is Stage.OVER
 
-    def start(self, state: OrderState) -> None:
+    def begin_order(self, state: OrderState) -> None:
         """Begin with another order, or with none."""
         self._order.state = replace(state, reached=None)
         self._left_behind, self._retry_at = LeftBehind(), None
@@ -111,8 +111,8 @@ class Sequencer:
         self.part.begin_order()
         # Floor behind temporary obstacles counts as reachable for the next order on the same map.
         is_crowded = state.home is not None and self._map.obstacles.closed > 0
-        self.uncovered.begin()
-        self.reach.begin(self.reach.cells if is_crowded else state.reached)
+        self.uncovered.begin_order()
+        self.reach.begin_order(self.reach.cells if is_crowded else state.reached)
 
     def set_state(self, state: OrderState) -> None:
         """Continue with the same order in another state, after a command."""
@@ -145,7 +145,7 @@ class Sequencer:
         share = HOME_SHARE if home is None or area.contains(home) else MOST_SHARE
         return reached < share * once and self.uncovered.is_any_left()
 
-    def begin(self, cell: Cell, now: float) -> str:
+    def begin_stage(self, cell: Cell, now: float) -> str:
         """Start the stage that is due, from ``cell``; return why a plan is wanted, or ""."""
         if self._retry_at is not None and not self._is_worth_trying():
             self.advance(now)
@@ -155,7 +155,7 @@ class Sequencer:
         if state.begun or state.order is None or state.stage is Stage.OVER or state.waits_for:
             return ""
         zone = state.current_zone
-        self.scope.worth.begin()
+        self.scope.worth.begin_pass()
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             self._forget(zone, state)
         self._order.state = replace(state, begun=True, home=state.home or cell)
@@ -236,7 +236,7 @@ class Sequencer:
         The robot drives home first, unless it is on an errand or was sent home.
         """
         self._retry_at = None
-        self.scope.worth.begin()
+        self.scope.worth.begin_pass()
         state = self._order.state = self._order.state.out_of_time(minutes)
         is_sent_home = state.paused and state.why == AT_HOME
         if state.errand or is_sent_home:

@@ -114,16 +114,16 @@ class UncoveredCells:
         self._failures, self._why_left = 0, ""
         self._found: tuple[object, UncoveredAreas] = (None, UncoveredAreas())
 
-    def begin(self) -> None:
+    def begin_order(self) -> None:
         """Start another order."""
         self._failures, self._why_left = 0, ""
 
-    def succeed(self, before: UncoveredCells) -> None:
+    def continue_from(self, before: UncoveredCells) -> None:
         """Take over the failures of another mission with the same order."""
         self._failures, self._why_left = before._failures, before._why_left
 
-    def note_failure(self, why: str) -> None:
-        """Note that a path left cells over, and why."""
+    def record_failure(self, why: str) -> None:
+        """Record that a path left cells over, and why."""
         self._failures, self._why_left = self._failures + 1, why
 
     def found(self) -> UncoveredAreas:

@@ -201,8 +201,8 @@ def test_cells_swept_by_others_survive_a_restart():
 )
 def test_unreadable_progress_of_others_is_received_again(kept):
     shared = SharedProgress()
-    shared.resume(kept)
-    shared.begin(9)
+    shared.restore(kept)
+    shared.begin_epoch(9)
     assert shared.epoch == 9
     assert not shared.swept(Window(0, 0, 9, 9)).any()
 
@@ -228,7 +228,7 @@ def test_after_a_loop_closure_nothing_uncertain_is_given_back():
         MissionLedger(0.3, 0.3, shared=SharedProgress()),
         {(row, col) for row in range(10) for col in range(10)},
     )
-    ledger.shared.begin(5)
+    ledger.shared.begin_epoch(5)
     ledger.shared.receive("r2", 1, tiles_of(block))
     ledger.lift_tool()
     ledger.forget_uncertain(Motion(Pose2D(1.5, 1.5), Pose2D(2.1, 1.5)))
@@ -301,7 +301,7 @@ def everywhere(rows, _cols):
 )
 def test_disregarded_cells_count_once_swept_again(kept, counted):
     shared, cells = SharedProgress(), {(0, col) for col in range(20)}
-    shared.begin(1)
+    shared.begin_epoch(1)
     shared.receive("r2", 1, tiles_of(cells))
     shared.disregard(everywhere)
     # It has forgotten all but what it kept, and swept all again, out of hearing.

@@ -47,7 +47,7 @@ def divided_by(member, number):
 def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
     grid = room(4.5, 3.5)
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
+    robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(grid))
     for number in range(1, 2000):
         if robot.mission.state is State.DONE:
@@ -60,7 +60,7 @@ def test_a_robot_without_a_part_sweeps_missed_floor_of_another():
 
 def test_a_polished_line_survives_the_wait_for_another_robot():
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
+    robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(60)
     while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
@@ -80,7 +80,7 @@ def test_a_polished_line_survives_the_wait_for_another_robot():
 
 def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
+    robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(40)
     while math.dist(robot.at, path_ahead(robot.mission)[1]) > 2 * CELL_M:
@@ -102,7 +102,7 @@ def test_a_yielding_robot_does_not_cross_its_cell_centre_first():
 
 def test_a_robot_leaves_the_rest_of_a_line_without_open_floor():
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
+    robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     alone = replace(divided_by("r2", 0), parts=(), by="")
     robot.tell(alone)
@@ -125,7 +125,7 @@ def nearest_to(line, place):
 def test_a_yielding_robot_comes_no_nearer_to_a_close_one(toward):
     # Both stood in a doorway for good: straight to its refuge meant into the other's side.
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
+    robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.drive(150)
     angle, apart = toward * math.tau / 12, 2 * RADIUS_M + 0.01

@@ -29,7 +29,7 @@ def around(cell):
 def begun():
     """A robot, r1, that has passed cells of a room beside another one; and one of those."""
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
+    robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
     robot.drive(40, is_checked=False)
