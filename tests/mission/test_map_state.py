@@ -39,7 +39,7 @@ def take_something_in(draw, state, whole, zones):
             state.receive_map(whole)
         case _:
             zones = draw(st.sampled_from([(), (ZONE,)]))
-            state.keep_out(zones)
+            state.keep_out(zones, state.grid)
             state.receive_map(replace(state.grid or whole))
     return whole, zones
 

@@ -16,7 +16,7 @@ from fasaco_edge.mission.map.placing import are_same
 from fasaco_edge.mission.orders.order import EVERYTHING, Zone, order_document, read_order
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.work.order_state import OrderState
-from fasaco_edge.mission.work.sequencer import MAX_IN_VAIN
+from fasaco_edge.mission.work.present_part import MAX_IN_VAIN
 from fasaco_edge.mission.work.worth import WorthFirst, least_priority
 from tests.mission.battery import Battery
 from tests.mission.test_room_orders import (

@@ -51,7 +51,7 @@ class Errands:
         route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
         errand = orders.order_state.errand
         is_new = route.set_aside()
-        route.want_none()
+        route.requests.want_none()
         goal = orders.goal(errand)
         if cell == goal and not is_new and self.standing.in_cell_s >= ARRIVAL_S:
             if errand == "charge":

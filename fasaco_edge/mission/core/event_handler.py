@@ -63,7 +63,7 @@ class EventHandler:
         self._attempt(self._check_building)
         self._settle_frame()
         if stood and not self.map.building.why:
-            self.route.want("the map shows the building of the ledger again")
+            self.route.requests.want("the map shows the building of the ledger again")
         return Decision(
             path=self._path,
             faults=tuple(self._faults),
@@ -109,7 +109,7 @@ class EventHandler:
 
     def _receive_member(self, event: MemberReceived) -> None:
         if reason := self.company.receive(event, self._now):
-            self.route.want(reason)
+            self.route.requests.want(reason)
 
     def _close_floor(self, event: FollowerBlocked) -> None:
         if self.blocked.receive(event, self.map, self.route.revision, self._now):
@@ -118,13 +118,13 @@ class EventHandler:
     def _receive_priorities(self, grid: OccupancyGrid) -> None:
         """Take a map of priorities; raise WrongFrame if it is in another frame than the map.
 
-        If there is no map yet, ``_note_frame`` checks the frame later.
+        If there is no map yet, ``_settle_frame`` checks the frame later.
         """
         used = self.map.grid
         if used is not None and grid.frame != used.frame:
             raise _in_other_frame(grid, used)
         if self.orders.scope.worth.receive(grid):
-            self.route.want(OTHERS_FIRST)
+            self.route.requests.want(OTHERS_FIRST)
 
     def _open_floor(self) -> None:
         """Reopen closed floor when its time is up, if the robot has work."""
@@ -140,7 +140,7 @@ class EventHandler:
         assert self.map.grid is not None
         self.monitor.receive_map(self._now if at is None else at)
         self.line.receive_map()
-        self.route.receive_map()
+        self.route.requests.receive_map()
         before = self._compare_buildings()
         if before is not None and (self.map.has_moved or self.map.building.is_foreign):
             self.motion.receive_map(before)
@@ -207,10 +207,9 @@ class EventHandler:
             return
         self.orders.scope.worth.receive(None)
         self._path = self.route.stop(str(misfit), self._now) or self._path
-        self.trail.reset()
-        self.motion.reset()
+        self.motion.leave_map()
         self.changes.begin_order(self.orders.order_state.in_other_building(str(misfit)))
-        self.route.want(self.ledger.first_plan_reason)
+        self.route.requests.want(self.ledger.first_plan_reason)
         raise misfit
 
     def _enter_frame(self, frame: str) -> None:
@@ -239,8 +238,7 @@ class EventHandler:
         self._path = self.route.stop(why, self._now) or self._path
         self.route.abandon()
         self.monitor.forget_pose(self._now)
-        self.trail.reset()
-        self.motion.reset()
+        self.motion.leave_map()
         self.way_out.forget_track()
 
     def _receive_pose(self, stamped: StampedPose, at: float | None = None) -> None:
@@ -281,7 +279,6 @@ class EventHandler:
         self.trail.fade_driven()
 
     def _record_again(self) -> None:
-        """Record the floor under the tool again, on a new map."""
         if self.map.pose is not None and not self.monitor.driven.holds:
             self._record(Driven(self.map.pose.pose, self.monitor.farthest_m))
 
@@ -298,15 +295,18 @@ class EventHandler:
                 self._faults.append(full)
 
     def _receive_plan(self, event: PlanReady | PlanBroken) -> None:
-        """Take a plan; raise PlanFailed if the planner failed."""
         if isinstance(event, PlanBroken):
             self.route.fail(event, self._now)
             raise event.why
-        request = self.route.pending
+        request = self.route.requests.pending
         if request is not None and request.number == event.number:
             self.trail.receive_plan(event.path)
         self._path = self.route.accept(event, self._now) or self._path
-        if request is not None and self.route.pending is None and not self.route.wanted:
+        if (
+            request is not None
+            and self.route.requests.pending is None
+            and not self.route.requests.wanted
+        ):
             self.monitor.receive_plan(request.number)
 
     def _obey(self, event: CommandReceived) -> None:
@@ -329,11 +329,10 @@ class EventHandler:
             self.monitor.receive_map(self._now)
             self.line.receive_map()
         self.ledger.reset(self.map.frames.active)
-        self.trail.reset()
-        self.motion.reset()
+        self.motion.leave_map()
         self.map.building.reset()
         self._compare_buildings()
-        self.route.forget_failure()
+        self.route.requests.forget_failure()
         self._record_again()
 
 

@@ -83,7 +83,7 @@ class Executive:
             return
         if not self.orders.order_state.errand:
             self.route.abandon()
-            self.route.want("time is up")
+            self.route.requests.want("time is up")
         self.orders.run_out_of_time(self.time_limit.minutes)
 
     def _give_way(self) -> Doing | None:
@@ -179,16 +179,15 @@ class Executive:
         if self._state is State.COVERING:
             self._checks.check_time(now)
         if reason := self.orders.begin_stage(cell, now):
-            self.route.want(reason)
+            self.route.requests.want(reason)
         if reason := self._work.share(cell, now):
-            self.route.want(reason)
+            self.route.requests.want(reason)
 
     def _plan(self) -> Doing | None:
-        """Request the wanted plan, unless one is being made."""
         route, state = self.route, self._state
-        if not route.wanted or route.pending is not None:
+        if not route.requests.wanted or route.requests.pending is not None:
             return None
-        if why := route.why_not_yet(self._now):
+        if why := route.requests.why_not_yet(self._now):
             return Doing(State.BLOCKED, why, self._update)
         # Wait a moment after the robot was stopped.
         if state is State.BLOCKED and not self._standing.has_waited:
@@ -200,7 +199,7 @@ class Executive:
         route, orders = self.route, self.orders
         if orders.order_state.stage is Stage.RETURNING and self._cell == orders.goal():
             orders.advance(self._now)
-        waits = orders.is_waiting and route.path.finished and route.pending is None
+        waits = orders.is_waiting and route.path.finished and route.requests.pending is None
         if waits or orders.order_state.stage is Stage.OVER:
             return self._work.settle(self._update, self._now)
         return None
@@ -209,17 +208,19 @@ class Executive:
         """Drive on; publish the path again to a robot that stands; use spare time."""
         route, now, update = self.route, self._now, self._update
         state, reason = self._state, self._reason
-        if route.pending is not None and not len(route.path.cells):
-            state, reason = State.PLANNING, route.pending.reason
+        if route.requests.pending is not None and not len(route.path.cells):
+            state, reason = State.PLANNING, route.requests.pending.reason
         elif self.orders.order_state.stage is not Stage.RETURNING:
             state, reason = State.COVERING, ""
         drives = len(route.path.ahead) > 1 and update is None
-        if drives and route.pending is None and (why := self.blocked.asks_again(now)):
+        if drives and route.requests.pending is None and (why := self.blocked.asks_again(now)):
             update = route.publish_anew(why, now)
         if self._standing.is_on_path and update is None:
             update = route.publish(route.path.ahead, "robot stands", now)
             self._standing.record_try()
-        is_free = state is State.COVERING and route.pending is None and not route.wanted
+        is_free = (
+            state is State.COVERING and route.requests.pending is None and not route.requests.wanted
+        )
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
 
 

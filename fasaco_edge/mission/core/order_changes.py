@@ -20,7 +20,7 @@ from fasaco_edge.mission.path.map_motion import MapMotion
 from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.rooms.room_commands import carry_out
 from fasaco_edge.mission.rooms.room_watch import RoomWatch
-from fasaco_edge.mission.work.loss import loss_in
+from fasaco_edge.mission.work.loss import check_loss
 from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.mission.work.sequencer import Sequencer
 
@@ -64,12 +64,11 @@ class OrderChanges:
         self.update_area()
 
     def _keep_out(self, order: OrderState) -> None:
-        """Apply the keep-outs of the configuration and of an order."""
         ordered = order.order.keep_out if order.order else ()
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:
             drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
-        self.map.keep_out(self._standing + ordered + drawn)
+        self.map.keep_out(self._standing + ordered + drawn, self.map.grid)
         self.line.receive_map()
 
     def update_area(self) -> None:
@@ -82,9 +81,9 @@ class OrderChanges:
         self.orders.reach.record_area()
         if before is None:
             again = "robot is on coverable ground again"
-            route.want(again if route.revision else self.ledger.first_plan_reason)
+            route.requests.want(again if route.revision else self.ledger.first_plan_reason)
         elif change := area.change_since(before):
-            route.want(str(change), change.window)
+            route.requests.want(str(change), change.window)
 
     def answer(self, event: CommandReceived) -> tuple[Answer, OrderState | None]:
         """Return the answer to a command, and the state that follows; None if it is refused."""
@@ -101,7 +100,7 @@ class OrderChanges:
             has_home = self.map.places.place("home") is not None
             after = before.commanded(asked, has_home=has_home)
             if not asked.discard:
-                loss_in(before.forgets(asked, after), self.ledger, self.map).check(asked.name)
+                check_loss(asked.name, before.forgets(asked, after), self.ledger, self.map)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
             return Answer(event.number, error), None
@@ -133,7 +132,7 @@ class OrderChanges:
         elif after.keep_out != before.keep_out:
             update = self._change_keep_outs(after, now)
         elif after.paused and not before.paused:
-            self.route.pause()
+            self.route.requests.pause()
         elif before.paused and not (after.paused or after.errand):
             update = self._resume(after, now)
         self.orders.set_state(after)
@@ -157,17 +156,17 @@ class OrderChanges:
                 then, now = (in_zones(each, lattice.window, lattice.cell_m) for each in zones)
                 if (then != now).any():
                     what = f"the outline of {zone.name!r} has changed"
-                    self.route.want(what if zone.polygon else "other rooms are left out")
+                    self.route.requests.want(what if zone.polygon else "other rooms are left out")
                 is_other = zone.ranked != (state.current_zone or zone).ranked
                 if is_other and self.orders.scope.worth.choose_again():
-                    self.route.want(OTHERS_FIRST)
+                    self.route.requests.want(OTHERS_FIRST)
         self._followed = book.version, order
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
         """Apply changed keep-outs to the same order; stop a robot inside one of them."""
         before = self.map.area
         self._keep_out(order)
-        self.route.forget_failure()
+        self.route.requests.forget_failure()
         self.update_area()
         self.orders.reach.record_keep_outs(before)
         if not self.map.is_kept_out:
@@ -177,10 +176,10 @@ class OrderChanges:
         return self.route.stop("robot is in a keep-out zone", now)
 
     def _resume(self, order: OrderState, now: float) -> PathUpdate | None:
-        self.route.forget_failure()
+        self.route.requests.forget_failure()
         if order.begun and order.stage is not Stage.RETURNING:
             return self.route.resume(now)
-        self.route.want("resumed")
+        self.route.requests.want("resumed")
         return None
 
     def _replan(self) -> int:
@@ -195,4 +194,4 @@ class OrderChanges:
         if not self.orders.part.can_plan:
             hint = "the floor in reach is covered: `mission start` covers it again"
             raise CommandError("nothing to plan: no reachable cell is left to cover", hint=hint)
-        return self.route.want_full("asked for")
+        return self.route.requests.want_full("asked for")

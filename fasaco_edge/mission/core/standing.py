@@ -124,7 +124,6 @@ class Standing:
 
     @property
     def _has_path(self) -> bool:
-        """Whether there is a path to drive."""
         return len(self._route.path.ahead) > 1
 
     def _update_place(self) -> None:
@@ -143,7 +142,6 @@ class Standing:
         self._had_path = at
 
     def _update_yaw(self) -> None:
-        """Find whether the robot turns."""
         assert self._map.pose is not None
         yaw = self._map.pose.pose.yaw
         if abs(math.remainder(yaw - self._yaw, math.tau)) > TURNS_RAD:

@@ -159,7 +159,6 @@ def _before(seen: list[_Seen], index: int, seconds: float) -> int | None:
 
 
 def _is_even(seen: list[_Seen]) -> bool:
-    """Return whether poses fit straight driving at constant speed."""
     a, b = seen[0], seen[-1]
     most_m, took_s = UNEVEN * _apart(a, b), b.at - a.at
     return all(

@@ -205,10 +205,6 @@ class MissionLedger:
             return _full(MOST_FLOOR_TILES, pixels, DROPPED_FLOOR_TILES)
         return None
 
-    def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell: the robot missed its point, but its floor is swept."""
-        self.current.visit(cell)
-
     def may_open_again(self, cell: Cell) -> bool:
         """Return whether a cell may be opened once more."""
         return self._opened_again[cell] < MOST_AGAIN
@@ -317,7 +313,6 @@ class MissionLedger:
         )
 
     def _forget_passed(self) -> None:
-        """Forget passed cells, as their floor has to be swept again."""
         self.passed.clear()
         self._opened_again.clear()
 

@@ -255,7 +255,6 @@ class SweptFloor:
         self._around_ahead = Window(rows[0], cols[0], rows[1], cols[1])
 
     def _swept_ahead(self) -> tuple[Window, Mask]:
-        """Return the preliminary sweeps and their window."""
         if self._ahead is None:
             places = self._track.ahead()
             segments = self._segments_ahead(places)

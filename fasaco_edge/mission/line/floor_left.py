@@ -178,7 +178,8 @@ class FloorLeft:
         is_asked = window.values_at(asked, np.array(unseen, np.int32), 0).tolist()
         for cell, counts in zip(unseen, is_asked, strict=True):
             if counts and tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
-                self._ledger.credit(cell)
+                # The robot missed its point, but its floor is swept.
+                covered.visit(cell)
 
     def _keep(self, passed: NDArray[np.int32]) -> None:
         """Keep the passed cells; drop cells once their floor is swept."""

@@ -122,7 +122,6 @@ class Polisher:
         self._put(ahead, first, last, piece, line)
 
     def _on(self, ahead: LineAhead, floor: FloorMap) -> tuple[kernel.Floor, kernel.Price]:
-        """Return floor and prices for the kernels."""
         unit = ahead.tally.unit_m
         radius, tool = floor.discs.radius_m / unit, floor.discs.tool_m / 2 / unit
         clear = floor.discs.clear_m / unit
@@ -149,7 +148,6 @@ class Polisher:
         lengths: NDArray[np.float64],
         farthest: float,
     ) -> int:
-        """Polish from one point to another; return the new index of the last one."""
         if last - first < 2:
             return last
         piece = ahead.line.part(first, last + 1)

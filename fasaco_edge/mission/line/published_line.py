@@ -107,7 +107,6 @@ class PublishedLine:
         return self.differs_m <= self._near_m and not leads_on(self._near())
 
     def _near(self) -> Points:
-        """Return the points of the next metre of the published line."""
         rest = self._xy[self._next :][:COMPARED_POINTS]
         ways = np.hypot(*np.diff(rest, axis=0).T) if len(rest) > 1 else np.empty(0)
         return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 2]
@@ -218,6 +217,8 @@ class Publication:
     def _is_settled(self, ahead: LineAhead) -> bool:
         """Whether neither a plan nor polish is under way that changes the next metres."""
         route = self._route
-        is_planned = not route.wanted and (route.pending is None or route.is_improving)
+        is_planned = not route.requests.wanted and (
+            route.requests.pending is None or route.requests.is_improving
+        )
         rough, lengths = ahead.line.first_below(POLISHED), ahead.lengths(HELD_M)
         return is_planned and (rough >= len(lengths) - 1 or float(lengths[rough]) > HELD_M)

@@ -267,7 +267,6 @@ class BuildingWatch:
             self._reference, self._reference_at = lattice, now
 
     def _end(self, now: float) -> None:
-        """Take the newest map as the reference."""
         self._reference, self._reference_at, self._agreed_at = self._newest, now, now
         self._foreign = self._jump = self._shifted = None
 

@@ -81,7 +81,7 @@ class MissionGround:
             self.change, self.lattice = change, change.after
         return plain
 
-    def close(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
+    def keep_out(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
         """Replace the keep-out polygons (x, y) [m]."""
         is_other, self._keep_out = polygons != self._keep_out, polygons
         if grid is not None and (is_other or self.free_floor is None):

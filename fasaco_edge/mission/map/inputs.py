@@ -163,7 +163,6 @@ class FrameSelector:
         )
 
     def _limit(self, held: dict[str, OccupancyGrid] | dict[str, tuple[StampedPose, float]]) -> None:
-        """Keep the active frame and the newest other one."""
         others = [frame for frame in held if frame != self.active]
         most = 1 if self.active else 2
         for frame in others[: len(others) - most]:

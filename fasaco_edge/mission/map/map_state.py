@@ -18,7 +18,7 @@ from fasaco_edge.errors import (
     WrongFrame,
 )
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.geometry import Polygon, StampedPose, Window, polygon_bounds
+from fasaco_edge.grid.geometry import StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
 from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
@@ -201,13 +201,9 @@ class MapState(MissionGround):
             change = LatticeChange.to(self._shown, change.after)
         self.has_moved, self._shown = has_moved(change), change.after
 
-    def watch_on(self, building: BuildingWatch) -> None:
-        """Take over the building watch of another mission on the same cells."""
-        self.building = building
-
-    def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
-        """Replace the keep-out polygons (x, y) [m]."""
-        self.close(polygons, self.grid)
+    def continue_from(self, before: MapState) -> None:
+        """Take over the doubt about the building of another mission on the same cells."""
+        self.building = before.building
 
     def receive_pose(self, pose: StampedPose) -> None:
         """Take in a pose.

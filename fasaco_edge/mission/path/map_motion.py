@@ -6,6 +6,7 @@ first pose on it shows the motion, so they are moved as they were before that ma
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -31,17 +32,18 @@ class _Before(NamedTuple):
     path: NDArray[np.int32] | None = None
 
 
+@dataclass(slots=True, eq=False)
 class MapMotion:
     """Moves coverage, reached cells, trail and path with the map."""
 
-    def __init__(
-        self, ledger: MissionLedger, orders: Sequencer, trail: TrailLayer, route: Route
-    ) -> None:
-        self._ledger, self._orders, self._trail, self._route = ledger, orders, trail, route
-        self._before = _Before()
-        # The motion that the newest pose has shown, the path before it, and the number of cells
-        # that it makes uncertain; None once the path has moved.
-        self._shown: tuple[Motion, NDArray[np.int32] | None, int] | None = None
+    _ledger: MissionLedger
+    _orders: Sequencer
+    _trail: TrailLayer
+    _route: Route
+    _before: _Before = field(default=_Before(), init=False)
+    # The motion that the newest pose has shown, the path before it, and the number of cells that it
+    # makes uncertain; None once the path has moved.
+    _shown: tuple[Motion, NDArray[np.int32] | None, int] | None = field(default=None, init=False)
 
     def receive_map(self, pose: Pose2D) -> None:
         """Keep what lay on the map, as the newest one has moved under a robot at ``pose``.
@@ -85,13 +87,14 @@ class MapMotion:
         if path is not None and len(path) and not motion.is_still:
             update = self._route.move(path, motion, now)
         if uncertain:
-            self._route.want(f"map and pose moved: {uncertain} cells to be covered again")
+            self._route.requests.want(f"map and pose moved: {uncertain} cells to be covered again")
         return update
 
     def forget_order(self) -> None:
         """Forget reached cells and path: another order begins."""
         self._before = self._before._replace(reached=None, path=None)
 
-    def reset(self) -> None:
-        """Forget everything: it lay on another map."""
+    def leave_map(self) -> None:
+        """Forget the trail and what is to be moved: they lay on another map."""
+        self._trail.reset()
         self._before, self._shown = _Before(), None

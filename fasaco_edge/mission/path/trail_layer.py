@@ -19,26 +19,25 @@ from fasaco_edge.planners.path import CoveragePath
 
 
 class TrailLayer:
-    """Owns the living trail: each plan starts from it, and changes it."""
+    """Owns the living trail: each plan starts from it, and changes it.
+
+    Attributes:
+        trail: the trail; read-only.
+    """
 
     def __init__(self, config: MissionConfig, map_state: MapState, route: Route) -> None:
         self._config = config
         self._map, self._route = map_state, route
-        self._trail = LivingTrail(config.trail)
+        self.trail = LivingTrail(config.trail)
         # The lattice that the trail lies on.
         self._lattice: CoverageLattice | None = None
         # The robot's last path, and its index on it.
         self._path, self._index = NO_CELLS, 0
 
-    @property
-    def trail(self) -> LivingTrail:
-        """The trail."""
-        return self._trail
-
     def snapshot(self) -> TrailSnapshot:
         """Return the trail on the newest map."""
         self._follow_map()
-        return self._trail.snapshot()
+        return self.trail.snapshot()
 
     def posed(self, request: PlanRequest) -> PlanRequest:
         """Return a request with the trail from which its ants start."""
@@ -50,22 +49,22 @@ class TrailLayer:
         """Take over the trail that the ants of a plan have left, even if the plan is not driven."""
         self._follow_map()
         if plan.trail is not None:
-            self._trail.take(plan.trail, plan.work.ants)
+            self.trail.take(plan.trail, plan.work.ants)
 
     def restore(self, before: TrailSnapshot) -> None:
         """Continue with the trail from before a restart."""
-        self._trail, self._lattice = LivingTrail(self._config.trail, before), None
+        self.trail, self._lattice = LivingTrail(self._config.trail, before), None
 
     def reset(self) -> None:
         """Clear the trail: it belongs to another place."""
-        self._trail, self._lattice = LivingTrail(self._config.trail), None
+        self.trail, self._lattice = LivingTrail(self._config.trail), None
 
     def move(self, before: TrailSnapshot, motion: Motion) -> None:
         """Move the trail with the map; ``before``: the trail before it moved."""
         self._follow_map()
         turn = math.remainder(motion.end.yaw - motion.start.yaw, math.tau)
         turns = round(turn / (0.5 * math.pi))
-        self._trail.move(
+        self.trail.move(
             before, lambda x, y: motion.back(1.0, x, y), turns, self._config.footprint.cell_m
         )
 
@@ -75,7 +74,7 @@ class TrailLayer:
         path = self._route.path
         begun = self._index if path.cells is self._path else 0
         if path.index > begun:
-            self._trail.fade(path.cells[begun : path.index + 1])
+            self.trail.fade(path.cells[begun : path.index + 1])
         self._path, self._index = path.cells, path.index
 
     def finish(self, update: PathUpdate | None) -> None:
@@ -83,7 +82,7 @@ class TrailLayer:
         self._follow_map()
         if update is not None and update.plan is not None:
             cells, cost = update.cells, self._config.cost
-            self._trail.strengthen(cells, cost.quality(_distinct(cells), cost.of_walk_us(cells)))
+            self.trail.strengthen(cells, cost.quality(_distinct(cells), cost.of_walk_us(cells)))
 
     def _follow_map(self) -> None:
         lattice, before = self._map.lattice, self._lattice
@@ -92,12 +91,11 @@ class TrailLayer:
         change = self._map.change
         is_next = change is not None and change.before is before and change.after is lattice
         changed = change.cells if change is not None and is_next and before is not None else None
-        self._trail.follow(lattice.window, lattice.steps, changed)
+        self.trail.follow(lattice.window, lattice.steps, changed)
         self._lattice = lattice
 
 
 def _distinct(cells: NDArray[np.int32]) -> int:
-    """Return the number of distinct cells of a path, int32 (n, 2)."""
     # Column by column: numpy takes several times as long for rows of two.
     rows, cols = np.ascontiguousarray(cells.T)
     rows, cols = rows - rows.min(), cols - cols.min()

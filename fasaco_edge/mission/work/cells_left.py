@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import get_args
 
 import numpy as np
@@ -24,26 +24,19 @@ from fasaco_edge.mission.work.present_order import PresentOrder
 from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
 
+@dataclass(slots=True, eq=False)
 class CellsLeft:
-    """Derives the cells left from map, ledger and company; owns nothing.
+    """Derives the cells left from map, ledger, company and order; owns nothing."""
 
-    Args:
-        config, map_state, ledger, company: the sources of the cells.
-        order: the order and its viewpoints.
-    """
-
-    def __init__(
-        self,
-        config: MissionConfig,
-        map_state: MapState,
-        ledger: MissionLedger,
-        company: Company,
-        order: PresentOrder,
-    ) -> None:
-        self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
-        self._order = order
-        # The last area, and its edge cells.
-        self._edge: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
+    _config: MissionConfig
+    _map: MapState
+    _ledger: MissionLedger
+    _company: Company
+    _order: PresentOrder
+    # The last area, and its edge cells.
+    _edge: tuple[ReachableArea | None, NDArray[np.bool_]] = field(
+        default=(None, np.empty((0, 0), bool)), init=False
+    )
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
@@ -241,7 +234,6 @@ def zones_beyond(
 
 
 def _sticks_out(polygon: Polygon, lattice: CoverageLattice) -> bool:
-    """Return whether part of a polygon lies beyond the map."""
     x0, y0, x1, y1 = (edge / lattice.cell_m for edge in polygon_bounds(polygon))
     window = lattice.window
     return x0 < window.col0 or y0 < window.row0 or x1 > window.col1 or y1 > window.row1

@@ -21,13 +21,15 @@ class OrderReach:
     """Remembers which cells have been reachable since an order began.
 
     Masks are bool (rows, cols) on the lattice of the area.
+
+    Attributes:
+        reached: a window around all maps received, and which of its cells have ever been reachable.
     """
 
     def __init__(self, map_state: MapState) -> None:
         self._map = map_state
         self._newest: ReachableArea | None = None
-        # A window around all maps received, and which of its cells have ever been reachable.
-        self._once: CellsOn | None = None
+        self.reached: CellsOn | None = None
         # Whether these cells have moved since the newest area.
         self._have_moved = False
         # Cells that keep-out zones drawn during the order have cut off.
@@ -36,25 +38,20 @@ class OrderReach:
     def begin_order(self, reached: ReachedCells | None) -> None:
         """Start another order, or continue one with the cells reached before a restart."""
         self._newest = None
-        self._once = None if reached is None else (reached.window, reached.mask)
+        self.reached = None if reached is None else (reached.window, reached.mask)
         self._cut_off = None
         self._have_moved = reached is not None and reached.have_moved
         self.record_area()
 
     def continue_from(self, before: OrderReach) -> None:
         """Take over the reach of another mission with the same order on the same cells."""
-        self._newest, self._once = before._newest, before._once
+        self._newest, self.reached = before._newest, before.reached
         self._cut_off = before._cut_off
-
-    @property
-    def reached(self) -> CellsOn | None:
-        """A window around all maps received, and which of its cells have ever been reachable."""
-        return self._once
 
     @property
     def cells(self) -> ReachedCells | None:
         """The cells that have been reachable; None for none."""
-        return None if self._once is None else ReachedCells.of(self._once[1], self._once[0])
+        return None if self.reached is None else ReachedCells.of(self.reached[1], self.reached[0])
 
     def record_area(self) -> None:
         """Remember the cells that are reachable now."""
@@ -70,7 +67,7 @@ class OrderReach:
                 # coverable, and lie beside reachable cells.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
-            self._once, self._newest, self._have_moved = (window, once), area, False
+            self.reached, self._newest, self._have_moved = (window, once), area, False
             if self._cut_off is not None:
                 window = area.lattice.window
                 self._cut_off = window, _on(window, self._cut_off) & ~area.reachable
@@ -92,19 +89,19 @@ class OrderReach:
         if before is not None and not motion.is_still:
             lattice = self._map.lattice
             assert lattice is not None
-            self._once = moved_mask(*before, motion, lattice.cell_m)
+            self.reached = moved_mask(*before, motion, lattice.cell_m)
             self._newest, self._have_moved, self._cut_off = None, True, None
             self.record_area()
 
     def shift(self, motion: Motion) -> None:
         """Move the cells with the newest map, whose area is not known yet."""
-        if self._once is not None and self._map.lattice is not None:
-            self._once = moved_mask(*self._once, motion, self._map.lattice.cell_m)
+        if self.reached is not None and self._map.lattice is not None:
+            self.reached = moved_mask(*self.reached, motion, self._map.lattice.cell_m)
             self._have_moved, self._cut_off = True, None
 
     def around(self, window: Window) -> Window:
         """Return the window around all maps received; around the newest alone if too large."""
-        whole = Window.around(window, None if self._once is None else self._once[0])
+        whole = Window.around(window, None if self.reached is None else self.reached[0])
         assert whole is not None
         return whole if whole.rows * whole.cols <= MAX_LATTICE_CELLS else window
 
@@ -130,7 +127,7 @@ class OrderReach:
 
     def on(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window have ever been reachable, bool (rows, cols)."""
-        return _on(window, self._once)
+        return _on(window, self.reached)
 
     def without_keep_outs(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells would be reachable without keep-outs, bool (rows, cols) of an area."""
@@ -144,15 +141,14 @@ class OrderReach:
     def is_map_cut(self) -> bool:
         """Whether the newest map lacks cells that were reachable."""
         lattice = self._map.lattice
-        if lattice is None or self._once is None:
+        if lattice is None or self.reached is None:
             return False
-        window, once = self._once
+        window, once = self.reached
         shown = carried(lattice.states != UNKNOWN, lattice.window, window)
         return bool((once & ~shown).any())
 
 
 def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return cells and their eight neighbours, bool (rows, cols)."""
     padded = np.pad(cells, 1)
     rows = padded[:-2] | padded[1:-1] | padded[2:]
     widened: NDArray[np.bool_] = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]

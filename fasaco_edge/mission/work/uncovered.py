@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -91,28 +91,21 @@ def viewpoints_beside(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -
     return [(row, col) for row, col in beside[largest].tolist()]
 
 
+@dataclass(slots=True, eq=False)
 class UncoveredCells:
     """Finds the cells of an order that stay uncovered, and why.
-
-    Args:
-        map_state, ledger: the map, and the covered cells.
-        reach: the cells that have been reachable since the order began.
-        order: the order and its progress.
 
     Masks are bool (rows, cols) on the lattice of the area.
     """
 
-    def __init__(
-        self,
-        map_state: MapState,
-        ledger: MissionLedger,
-        reach: OrderReach,
-        order: PresentOrder,
-    ) -> None:
-        self._map, self._ledger, self._reach, self._order = map_state, ledger, reach, order
-        # Number of paths that left cells over, and why the last path did; "" if unknown.
-        self._failures, self._why_left = 0, ""
-        self._found: tuple[object, UncoveredAreas] = (None, UncoveredAreas())
+    _map: MapState
+    _ledger: MissionLedger
+    _reach: OrderReach
+    _order: PresentOrder
+    # Number of paths that left cells over, and why the last path did; "" if unknown.
+    _failures: int = field(default=0, init=False)
+    _why_left: str = field(default="", init=False)
+    _found: tuple[object, UncoveredAreas] = field(default=(None, UncoveredAreas()), init=False)
 
     def begin_order(self) -> None:
         """Start another order."""

@@ -220,7 +220,7 @@ def test_an_unsweepable_cell_is_given_up_while_another_works():
     assert ours.mission.company.has_company
     assert "1 cell not reached: tried again after 30 s (1 of 1)" in reasons
     assert "0.1 m2 not reached: left over after" in reasons[-1]
-    assert ours.mission.route.plans < 40
+    assert ours.mission.route.requests.plans < 40
 
 
 def test_after_a_loop_closure_nothing_uncertain_is_given_back():
@@ -407,13 +407,13 @@ def test_robots_beyond_the_limit_do_not_replace_each_other():
 def test_a_robot_that_comes_and_goes_keeps_the_paths_of_others():
     fleet = FleetDrive(HALL, TWO)
     ours, other = fleet.robots.values()
-    report, plans = other.report(), ours.mission.route.plans
+    report, plans = other.report(), ours.mission.route.requests.plans
     for second in range(40):
         state = "covering" if second % 2 else "blocked"
         ours.tell(replace(report, state=state, x=1.0 + 0.1 * (second % 3)), after=0.0)
         ours.tick()
     assert 2 <= ours.mission.company.numbers.number <= 9
-    assert ours.mission.route.plans - plans <= 9
+    assert ours.mission.route.requests.plans - plans <= 9
 
 
 def test_a_robot_without_a_part_does_not_divide_again_and_again():
