@@ -116,7 +116,7 @@ class EventHandler:
             self._map_changed(self.monitor.map_at)
 
     def _receive_priorities(self, grid: OccupancyGrid) -> None:
-        """Take a map of priorities; raise WrongFrame if it is in another frame than the map.
+        """Take in a map of priorities; raise WrongFrame if it is in another frame than the map.
 
         If there is no map yet, ``_settle_frame`` checks the frame later.
         """

@@ -202,7 +202,7 @@ class MapState(MissionGround):
         self.has_moved, self._shown = has_moved(change), change.after
 
     def continue_from(self, before: MapState) -> None:
-        """Take over the doubt about the building of another mission on the same cells."""
+        """Take over a predecessor's doubt about the building; it had the same cells."""
         self.building = before.building
 
     def receive_pose(self, pose: StampedPose) -> None:

@@ -53,10 +53,8 @@ class Sequencer:
         self._config, self._map, self._ledger = config, map_state, ledger
         self._order = order = PresentOrder()
         self.part = part = PresentPart(config, map_state, ledger, company, room_price, order)
-        self.cells, self.scope, self.reach, self.uncovered = (
-            *(part.cells, part.scope),
-            *(part.reach, part.uncovered),
-        )
+        self.cells, self.scope = part.cells, part.scope
+        self.reach, self.uncovered = part.reach, part.uncovered
         # Whether floor opens while the robot is on its way home.
         self._left_behind = LeftBehind()
         # Time of the next retry [s]; None for none.
