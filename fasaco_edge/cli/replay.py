@@ -180,7 +180,7 @@ def _summary(
         reason=mission.reason,
         covered_cells=coverage.covered if coverage else 0,
         coverable_cells=coverage.coverable if coverage else 0,
-        plans=mission.route.plans,
+        plans=mission.route.requests.plans,
         paths=mission.route.revision,
         paths_recorded=len(recorded.paths),
         paths_as_recorded=None

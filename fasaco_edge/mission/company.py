@@ -33,11 +33,6 @@ class Company:
         return False
 
     @property
-    def has_company(self) -> bool:
-        """Whether other robots are at work on the remaining area."""
-        return False
-
-    @property
     def others_go_on(self) -> bool:
         """Whether only parts of other robots are left, and those robots make progress."""
         return False
@@ -70,15 +65,21 @@ class Company:
         """Return the cells on which this robot sweeps the floor, visited or not."""
         return cells
 
-    def untried(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
-        """Return the cells that this robot has not given up."""
-        return cells
+    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
+        """Leave this robot's part of cells tried in vain to the others, also after new maps.
 
-    def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot tried in vain to the others, also after new maps."""
+        Returns:
+            The cells that this robot has not given up; None if no others are at work.
+        """
+        return None
 
-    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> None:
-        """Leave cells that this robot cannot reach to the others, until the next map."""
+    def pass_over(self, cells: NDArray[np.bool_], area: ReachableArea) -> bool:
+        """Leave this robot's part of cells that it cannot reach to the others, until the next map.
+
+        Returns:
+            Whether there were any; False if no others are at work.
+        """
+        return False
 
     def try_again(self) -> None:
         """Clear the list of cells given up."""
@@ -101,7 +102,7 @@ class Waiting:
 
     waits_for = ""
 
-    def succeed(self, before: Waiting) -> None:
+    def continue_from(self, before: Waiting) -> None:
         """Take over the state of a predecessor."""
 
     def decide(self, state: State, now: float, *, may_drive: bool) -> Doing | None:

@@ -112,23 +112,25 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
     from fasaco_edge.mission.map.map_state import MapState
     from fasaco_edge.mission.path.route import Route
     from fasaco_edge.mission.path.trail_layer import TrailLayer
+    from fasaco_edge.mission.work.order_reach import OrderReach
+    from fasaco_edge.mission.work.present_part import PresentPart
     from fasaco_edge.mission.work.sequencer import Sequencer
 
     return (
-        ("ingest", MapState, "take_map"),
-        ("floor", MissionGround, "follow"),
+        ("ingest", MapState, "receive_map"),
+        ("floor", MissionGround, "follow_map"),
         ("reach", MapState, "update_area"),
         ("reach", ReachableArea, "change_since"),
-        ("orders", Sequencer, "note_area"),
-        ("orders", Sequencer, "problem"),
-        ("orders", Sequencer, "begin"),
+        ("orders", OrderReach, "record_area"),
+        ("orders", PresentPart, "problem"),
+        ("orders", Sequencer, "begin_stage"),
         ("ledger", MissionLedger, "check"),
         ("route", Route, "accept"),
         ("route", Route, "truncate"),
         ("trail", TrailLayer, "finish"),
         ("trail", TrailLayer, "posed"),
         ("open floor", FloorLeft, "update"),
-        ("follow", LineLayer, "note_map"),
+        ("follow", LineLayer, "receive_map"),
         ("laying", LineAhead, "lay"),
         ("laying", LineAhead, "check"),
         ("counting", SweepTally, "exchange"),

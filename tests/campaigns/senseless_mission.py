@@ -344,7 +344,7 @@ class MissionTrial:
         if grid is None or mission.lattice is None or keeps_out:
             return
         fresh = MissionGround(mission.rotation.config(self._config))
-        fresh.begin(grid)
+        fresh.begin_lattice(grid)
         geometry = grid.geometry
         for name in ("window", "states", "steps"):
             now, anew = getattr(mission.lattice, name), getattr(fresh.lattice, name)

@@ -66,7 +66,7 @@ def main() -> None:
     if UNSENT in sys.argv:
         sys.argv.remove(UNSENT)
         break_stops()
-    planner_of, take_map = registry.planner_of, MapState._take_map
+    planner_of, take_map = registry.planner_of, MapState._apply_map
 
     def breaking_map(self: Any, grid: Any, within: Any = None) -> None:
         take_map(self, grid, within)
@@ -74,7 +74,7 @@ def main() -> None:
             raise ZeroDivisionError("division by zero")
 
     registry.planner_of = lambda *args: BreakingPlanner(planner_of(*args))  # type: ignore[assignment]
-    MapState._take_map = breaking_map  # type: ignore[method-assign]
+    MapState._apply_map = breaking_map  # type: ignore[method-assign]
     from fasaco_edge.cli import main as run
 
     sys.exit(run())

@@ -44,11 +44,11 @@ def test_the_way_back_counts_and_so_does_what_driving_drains():
     gauge = BatteryGauge()
     for second in range(100):
         level = 0.8 - 0.002 * second
-        gauge.note(BatteryReceived(level), float(second), drives=True)
+        gauge.receive(BatteryReceived(level), float(second), drives=True)
     assert gauge.drain_per_s == pytest.approx(0.002)
     # Standing and charging show nothing of it, nor does a jump.
     for second in range(100, 200):
-        gauge.note(BatteryReceived(0.2), float(second), drives=second % 2 == 0)
+        gauge.receive(BatteryReceived(0.2), float(second), drives=second % 2 == 0)
     assert gauge.drain_per_s == pytest.approx(0.002)
     drive = Battery(0.9)
     drive.mission.charging.gauge._drains.extend([0.01] * 5)
@@ -121,7 +121,7 @@ def test_a_charge_that_jumps_and_comes_back_is_not_believed(lie):
 def test_a_fast_discharge_is_accepted():
     gauge = BatteryGauge()
     for second in range(8):
-        gauge.note(BatteryReceived(0.9 - 0.02 * second), float(second), drives=True)
+        gauge.receive(BatteryReceived(0.9 - 0.02 * second), float(second), drives=True)
     assert gauge.level == pytest.approx(0.76)
 
 
@@ -410,7 +410,9 @@ def test_a_battery_reported_full_on_the_way_changes_nothing():
 def test_a_charge_that_comes_in_coarse_steps_is_believed():
     gauge = BatteryGauge()
     for number in range(8):
-        gauge.note(BatteryReceived(0.9 - 0.06 * number, "discharging"), 50.0 * number, drives=True)
+        gauge.receive(
+            BatteryReceived(0.9 - 0.06 * number, "discharging"), 50.0 * number, drives=True
+        )
     assert gauge.level < 0.6
 
 

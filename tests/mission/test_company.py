@@ -29,10 +29,10 @@ def test_a_single_robot_has_no_company():
     assert type(Mission(CONFIG).company) is Company
 
 
-@pytest.mark.parametrize("forgets", ["note_forgotten", "clear", "begin_anew"])
+@pytest.mark.parametrize("forgets", ["record_forgotten", "clear", "reset"])
 def test_cells_of_others_are_kept_until_this_robot_forgets_cells(forgets):
     ledger = MissionLedger(0.3, 0.3)
-    ledger.shared.resume(b"of a fleet")
+    ledger.shared.restore(b"of a fleet")
     assert ledger.snapshot().fleet == b"of a fleet"
     assert isinstance(ledger.shared, OthersCells)
     getattr(ledger.shared, forgets)()

@@ -245,13 +245,13 @@ def test_resume_without_a_change_keeps_the_path():
     drive = started(*ROOM)
     for _ in range(5):
         drive.go()
-    ahead, plans = drive.walk[:], drive.mission.route.plans
+    ahead, plans = drive.walk[:], drive.mission.route.requests.plans
     drive.command("pause")
     drive.tell(pose_at(*drive.cell), MapReceived(building(*ROOM)), after=60.0)
     decision = drive.command("resume")
     assert (decision.plan, decision.path.reason) == (None, "resumed")
     assert drive.mission.state is State.COVERING
-    assert (drive.walk, drive.mission.route.plans) == (ahead, plans)
+    assert (drive.walk, drive.mission.route.requests.plans) == (ahead, plans)
     drive.finish()
 
 

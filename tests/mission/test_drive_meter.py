@@ -39,7 +39,7 @@ def measured(told, scatter_m=0.0, scatter_rad=0.0):
     for at, pose in told:
         dx, dy, dyaw = rng.normal(0.0, (scatter_m, scatter_m, scatter_rad)).tolist()
         seen = Pose2D(pose.x + dx, pose.y + dy, pose.yaw + dyaw)
-        meter.note(StampedPose(seen, "map", round((1000.0 + at) * 1e9)))
+        meter.receive_pose(StampedPose(seen, "map", round((1000.0 + at) * 1e9)))
     return meter.times
 
 
@@ -88,11 +88,11 @@ def test_a_turn_by_270_degrees_is_no_quarter_turn():
         for _, pose in seen:
             at += 0.1
             x, y = pose.x * math.cos(yaw), pose.x * math.sin(yaw)
-            meter.note(StampedPose(Pose2D(x, y, yaw), "map", round((1000.0 + at) * 1e9)))
+            meter.receive_pose(StampedPose(Pose2D(x, y, yaw), "map", round((1000.0 + at) * 1e9)))
         for step in range(60):
             at += 0.1
             turned = Pose2D(x, y, math.remainder(yaw + math.radians(4.5 * step), math.tau))
-            meter.note(StampedPose(turned, "map", round((1000.0 + at) * 1e9)))
+            meter.receive_pose(StampedPose(turned, "map", round((1000.0 + at) * 1e9)))
         yaw += math.radians(270.0)
     assert meter.times.speed_m_s is not None
     assert meter.times.turns == 0
@@ -102,5 +102,5 @@ def test_a_turn_by_270_degrees_is_no_quarter_turn():
 def test_poses_without_times_that_fit_show_nothing(stamp):
     meter = DriveMeter()
     for number, (_, pose) in enumerate(poses(LANES, SLOW)):
-        meter.note(StampedPose(pose, "map", stamp(number)))
+        meter.receive_pose(StampedPose(pose, "map", stamp(number)))
     assert meter.times == DriveTimes()

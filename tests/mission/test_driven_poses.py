@@ -56,7 +56,7 @@ def poses(*xs, every_s=1.0):
 
 def taken(*xs, speed_m_s=0.5, every_s=1.0):
     driven = DrivenPoses(speed_m_s, cell_m=0.2)
-    return [driven.take(pose) for pose in poses(*xs, every_s=every_s)]
+    return [driven.receive_pose(pose) for pose in poses(*xs, every_s=every_s)]
 
 
 def test_a_pose_that_comes_back_counts_for_nothing():

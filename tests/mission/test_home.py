@@ -81,7 +81,7 @@ def test_the_way_home_begins_at_the_robot_even_off_its_path():
     """A polished line takes short cuts; the robot drove 20 m to a home that was 3 m away."""
     drive = covering(home=HOME)
     assert drive.cell != (5, 7)
-    drive.mission.map.follow_path((5, 7))
+    drive.mission.map.set_path_cell((5, 7))
     path = drive.command("home").path
     assert tuple(path.cells[0].tolist()) == drive.cell
     assert len(path.cells) == 1 + abs(drive.cell[0] - 5) + abs(drive.cell[1] - 0)

@@ -104,10 +104,10 @@ def test_looking_takes_little_of_a_cycle():
     vast = polygon(0, 0, 490, 490)
     order, slow = OrderState.autostart(), slowness()
     places = IdlePlaces(with_policy(CONFIG, keep_out=(*small, vast)))
-    places.look(large, 1, order, 0.0, is_theirs=True)  # kernels are loaded
+    places.find(large, 1, order, 0.0, is_theirs=True)  # kernels are loaded
     places = IdlePlaces(with_policy(CONFIG, keep_out=(*small, vast)))
     began = time.perf_counter()
-    text = places.look(large, 2, order, 0.0, is_theirs=True)
+    text = places.find(large, 2, order, 0.0, is_theirs=True)
     assert time.perf_counter() - began < 0.05 * slow
     assert text.endswith("mission.keep_out[4] and 94 more")
-    assert places.look(large, 3, order, 0.5 * PERIOD_S, is_theirs=True) == text
+    assert places.find(large, 3, order, 0.5 * PERIOD_S, is_theirs=True) == text

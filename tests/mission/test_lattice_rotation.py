@@ -285,7 +285,7 @@ def snapshot_of(ledger):
 def looks(grid, metres=12):
     watch, found = WallWatch(), []
     for step in range(10 * metres):
-        found.append(watch.look(grid, Pose2D(0.1 * step, 0.0)))
+        found.append(watch.estimate(grid, Pose2D(0.1 * step, 0.0)))
     return [deg for deg in found if deg is not None]
 
 
@@ -303,6 +303,6 @@ def test_walls_are_observed_only_until_they_are_certain():
 
 def test_a_jump_of_the_pose_does_not_count_as_a_drive():
     watch, grid = WallWatch(), turned(room(2.6, 2.0), 20.0)
-    found = [watch.look(grid, Pose2D(50.0 * step, 0.0)) for step in range(50)]
+    found = [watch.estimate(grid, Pose2D(50.0 * step, 0.0)) for step in range(50)]
     assert found == [None] * 50
     assert rotated_pose(Pose2D(1.0, 0.0, 0.0), 90.0).x == pytest.approx(0.0)

@@ -518,7 +518,7 @@ def test_a_path_that_ends_where_it_was_cut_off_is_whole_again():
     wall[:, -30:] = 100
     robot.tell(MapReceived(OccupancyGrid(grid.geometry, wall)))
     assert len(robot.mission.route.path.cells) < cells
-    assert not robot.mission.route.wanted
+    assert not robot.mission.route.requests.wanted
     robot.finish()
 
 

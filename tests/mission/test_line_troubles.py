@@ -164,7 +164,7 @@ def polished_line(grid):
     floor = FloorMap(grid, plain, footprint, RobotDiscs(0.12, 0.27), 10_000_000)
     ahead = LineAhead(floor)
     ahead.lay(np.array(LANES, np.int32), Pose2D(0.625, 0.625))
-    ahead.note(0, len(ahead.line), POLISHED)
+    ahead.mark(0, len(ahead.line), POLISHED)
     return ahead, floor
 
 

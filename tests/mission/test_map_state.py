@@ -25,22 +25,22 @@ def take_something_in(draw, state, whole, zones):
     match draw(st.sampled_from(["map", "part", "update", "jump", "zones"])):
         case "map":
             whole = repainted(draw, whole)
-            state.take_map(whole)
+            state.receive_map(whole)
         case "part":
-            state.take_map(part_of(draw, whole))
+            state.receive_map(part_of(draw, whole))
         case "update" if state.grid is not None and state.grid.cells.size:
             rows, cols = state.grid.cells.shape
             row, col = draw(st.integers(0, rows - 1)), draw(st.integers(0, cols - 1))
             window = Window(row, col, min(row + 5, rows), min(col + 5, cols))
             cells = repainted(draw, state.grid).cells[row : row + 5, col : col + 5]
-            state.take_patches([MapPatch(window, cells.copy())])
+            state.receive_patches([MapPatch(window, cells.copy())])
         case "jump":
             whole = displaced(draw, whole)
-            state.take_map(whole)
+            state.receive_map(whole)
         case _:
             zones = draw(st.sampled_from([(), (ZONE,)]))
-            state.keep_out(zones)
-            state.take_map(replace(state.grid or whole))
+            state.keep_out(zones, state.grid)
+            state.receive_map(replace(state.grid or whole))
     return whole, zones
 
 
@@ -60,7 +60,7 @@ def test_from_map_to_map_the_state_is_what_its_last_map_says(data, whole):
             assert np.array_equal(ours.steps, theirs.steps)
         share = data.draw(st.sampled_from([0.2, 0.5, 0.8]))
         place = Pose2D(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-        state.take_pose(StampedPose(place))
+        state.receive_pose(StampedPose(place))
         state.update_area()
         cell = state.robot_cell()
         assert (state.area is None) == (cell is None)
@@ -74,11 +74,11 @@ def test_a_map_that_says_nothing_new_changes_nothing():
     state = MapState(MissionConfig(FOOTPRINT))
     cells = np.zeros((60, 60), np.int8)
     first = grid(cells)
-    state.take_map(first)
-    state.take_pose(StampedPose(Pose2D(1.0, 1.0)))
+    state.receive_map(first)
+    state.receive_pose(StampedPose(Pose2D(1.0, 1.0)))
     state.update_area()
     lattice, ground = state.lattice, state.area
-    state.take_map(grid(cells))
+    state.receive_map(grid(cells))
     state.update_area()
     assert state.map_revision == 2
     assert state.grid is not first

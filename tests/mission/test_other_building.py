@@ -252,7 +252,7 @@ def test_a_reload_keeps_the_doubt_about_the_building(other):
     stand(first, 3.0, shown)
     again = Drive(HERE)
     again.mission.restore(first.mission.snapshot(), first.mission.order_state)
-    again.mission.succeed(first.mission)
+    again.mission.continue_from(first.mission)
     again.now = first.now
     faults = stand(again, 4.0, shown)
     assert [type(fault) for fault in faults] == [LedgerMismatchError]

@@ -18,13 +18,13 @@ EDGE_M = 0.5
 
 
 def look(published, line, now=0.0, *, is_settled=True, leads_on=False):
-    published.look(line)
+    published.compare(line)
     return published.is_due(now, is_settled, lambda points: leads_on)
 
 
 def test_a_change_waits_until_the_robot_is_near():
     published = PublishedLine(0.25)
-    published.take(ZIGZAG, len(ZIGZAG))
+    published.record_published(ZIGZAG, len(ZIGZAG))
     assert not look(published, ZIGZAG)
     changed = ZIGZAG.copy()
     changed[12] += 0.1
@@ -35,7 +35,7 @@ def test_a_change_waits_until_the_robot_is_near():
 
 def test_a_near_change_waits_briefly_for_a_running_plan():
     published = PublishedLine(0.25)
-    published.take(ZIGZAG, len(ZIGZAG))
+    published.record_published(ZIGZAG, len(ZIGZAG))
     cut = ZIGZAG[:5]
     assert not look(published, cut, 1.0, is_settled=False)
     assert not look(published, cut, 1.9, is_settled=False)
@@ -46,13 +46,13 @@ def test_a_near_change_waits_briefly_for_a_running_plan():
 @pytest.mark.parametrize("left", [1, 2, 3])
 def test_a_change_just_ahead_does_not_wait(left):
     published = PublishedLine(0.25)
-    published.take(ZIGZAG, len(ZIGZAG))
+    published.record_published(ZIGZAG, len(ZIGZAG))
     assert look(published, ZIGZAG[:left], is_settled=False)
 
 
 def test_a_published_line_that_leads_on_waits_for_the_plan():
     published = PublishedLine(0.25)
-    published.take(ZIGZAG, len(ZIGZAG))
+    published.record_published(ZIGZAG, len(ZIGZAG))
     assert not look(published, ZIGZAG[:2], 1.0, is_settled=False, leads_on=True)
     assert look(published, ZIGZAG[:2], 1.1, is_settled=False, leads_on=False)
     assert look(published, ZIGZAG[:2], 2.0, is_settled=False, leads_on=True)
@@ -61,8 +61,8 @@ def test_a_published_line_that_leads_on_waits_for_the_plan():
 def test_a_robot_without_a_line_gets_one():
     published = PublishedLine(0.25)
     assert look(published, ZIGZAG, is_settled=False)
-    published.take(ZIGZAG, len(ZIGZAG))
-    published.forget()
+    published.record_published(ZIGZAG, len(ZIGZAG))
+    published.reset()
     assert look(published, ZIGZAG, is_settled=False)
 
 
@@ -70,20 +70,20 @@ def test_a_line_that_ends_at_the_robot_is_published_once():
     """It was published in each step, and the robot never counted as one that has waited."""
     published, here = PublishedLine(0.25), ZIGZAG[:1]
     assert look(published, here)
-    published.take(here, 1)
+    published.record_published(here, 1)
     assert not look(published, here, 1.0)
     assert look(published, ZIGZAG, 2.0)
 
 
 def test_the_published_line_is_held_as_far_as_it_is_polished():
     published = PublishedLine(0.25)
-    published.take(ZIGZAG, len(ZIGZAG))
-    published.look(ZIGZAG)
+    published.record_published(ZIGZAG, len(ZIGZAG))
+    published.compare(ZIGZAG)
     assert (published.held - 1) * EDGE_M == pytest.approx(HELD_M, abs=EDGE_M)
-    published.look(ZIGZAG[4:])
+    published.compare(ZIGZAG[4:])
     assert (published.held - 1) * EDGE_M == pytest.approx(HELD_M - 4 * EDGE_M, abs=EDGE_M)
-    published.take(ZIGZAG, 3)
-    published.look(ZIGZAG)
+    published.record_published(ZIGZAG, 3)
+    published.compare(ZIGZAG)
     assert published.held == 3
 
 

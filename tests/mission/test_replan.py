@@ -152,4 +152,4 @@ def test_plans_that_lead_to_no_path_are_counted():
     drive.tell(MapReceived(building(".....#..")))
     drive.plan()
     assert (route.unchanged, route.outdated) == (1, 1)
-    assert route.plans == 3
+    assert route.requests.plans == 3

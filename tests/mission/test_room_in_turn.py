@@ -95,7 +95,7 @@ def test_floor_tried_in_vain_is_left_until_other_rooms_are_finished():
     drive.command("start")
     drive.plan()
     for _ in range(MAX_IN_VAIN + 1):
-        assert not drive.mission.orders.note_path_end("")
+        assert not drive.mission.orders.part.record_path_end("")
     drive.command("replan")
     west, east = planned(drive)
     assert (west, east) == (0, 90)
@@ -106,7 +106,7 @@ def test_floor_tried_in_vain_is_left_until_other_rooms_are_finished():
     drive.command("start")
     drive.plan()
     orders = drive.mission.orders
-    ends = [orders.note_path_end("") for _ in range(3 * (MAX_IN_VAIN + 1))]
+    ends = [orders.part.record_path_end("") for _ in range(3 * (MAX_IN_VAIN + 1))]
     assert ends.index(True) == MAX_IN_VAIN + 1
 
 

@@ -45,7 +45,7 @@ def test_a_mission_waits_for_map_then_pose_then_requests_a_plan():
     assert drive.mission.state is State.WAITING_FOR_POSE
     decision = drive.tell(pose_at(1, 2))
     assert drive.mission.state is State.PLANNING
-    assert drive.mission.route.is_planning
+    assert drive.mission.route.requests.is_planning
     assert decision.path is None
     assert decision.plan.reason == "first plan"
     assert decision.plan.problem.start == (1, 2)
@@ -321,7 +321,7 @@ def test_an_answer_to_another_question_leaves_the_question_open():
     drive = Drive((0, 0), MapReceived(building(*CORRIDOR)), pose_at(0, 0))
     path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
     assert drive.tell(PlanReady(drive.request.number + 1, path, 0.1)) == Decision()
-    assert drive.mission.route.is_planning
+    assert drive.mission.route.requests.is_planning
     assert drive.plan().path.revision == 1
     drive.finish()
 

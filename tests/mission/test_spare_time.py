@@ -230,14 +230,14 @@ def test_a_better_path_that_comes_too_late_is_dropped(what):
     else:
         # Something stands where the robot was about to drive: the path ends before it, at once.
         drive.tell(patch("#", at=(0, 5)))
-        assert drive.mission.route.wanted
-        assert drive.mission.route.is_improving
+        assert drive.mission.route.requests.wanted
+        assert drive.mission.route.requests.is_improving
     drive.request = None
     drive.tell(better)
     assert BETTER not in [update.reason for update in drive.updates]
     if what == "path is new":
         assert drive.request.reason.startswith("path blocked")
-        assert not drive.mission.route.is_improving
+        assert not drive.mission.route.requests.is_improving
 
 
 def test_a_needed_plan_comes_after_the_attempt():
@@ -245,10 +245,10 @@ def test_a_needed_plan_comes_after_the_attempt():
     drive = driving()
     request, drive.request = drive.request, None
     drive.tell(patch("#", at=(11, 11)))
-    assert drive.mission.route.wanted
+    assert drive.mission.route.requests.wanted
     drive.tell(plan(request, whole(request, request.problem.before)))
     assert not drive.request.problem.only_better
-    assert not drive.mission.route.wanted
+    assert not drive.mission.route.requests.wanted
 
 
 def test_a_new_walk_is_attempted_after_vain_attempts_at_the_last():

@@ -24,7 +24,7 @@ def replace(drive):
     """Let another mission go on, as the daemon does."""
     before, after = drive.mission, Mission(drive.config)
     after.restore(before.snapshot(), before.order_state)
-    after.succeed(before)
+    after.continue_from(before)
     drive.mission, drive.request, drive.walk, drive.revision = after, None, [], 0
     drive.tell(*before.held())
 

@@ -214,14 +214,14 @@ def wobbling(sigma_m, poses=400):
 def test_the_scatter_of_poses_is_what_they_err(sigma_m):
     scatter = PoseScatter(0.15)
     for x, y in wobbling(sigma_m):
-        scatter.note(Pose2D(x, y))
+        scatter.receive_pose(Pose2D(x, y))
     assert scatter.sigma_m == pytest.approx(sigma_m, rel=0.4)
 
 
 def test_few_poses_and_corners_show_no_noise():
     scatter = PoseScatter(0.15)
     for number, (x, y) in enumerate([(0.25 * min(n, 6), 0.25 * max(n - 6, 0)) for n in range(13)]):
-        scatter.note(Pose2D(x, y))
+        scatter.receive_pose(Pose2D(x, y))
         assert scatter.sigma_m == 0.0, number
 
 
@@ -278,7 +278,7 @@ def test_a_repeated_pose_hides_no_noise():
 def test_errors_of_filtered_positions_keep_their_bounds(sigma_m):
     track = SteadyTrack(TOOL)
     poses = wobbling(sigma_m)
-    places = [place for x, y in poses for place in track.add(Pose2D(x, y))] + track.end()
+    places = [place for x, y in poses for place in track.receive_pose(Pose2D(x, y))] + track.end()
     assert len(places) == len(poses)
     off, said = (np.array(each) for each in zip(*((p.y, p.error_m) for p in places), strict=True))
     assert (abs(off) <= said).mean() >= 0.9

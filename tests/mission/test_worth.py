@@ -16,7 +16,7 @@ from fasaco_edge.mission.map.placing import are_same
 from fasaco_edge.mission.orders.order import EVERYTHING, Zone, order_document, read_order
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.work.order_state import OrderState
-from fasaco_edge.mission.work.sequencer import MAX_IN_VAIN
+from fasaco_edge.mission.work.present_part import MAX_IN_VAIN
 from fasaco_edge.mission.work.worth import WorthFirst, least_priority
 from tests.mission.battery import Battery
 from tests.mission.test_room_orders import (
@@ -146,9 +146,9 @@ def test_unreachable_floor_of_high_priority_is_given_up():
     drive.plan()
     orders = drive.mission.orders
     for _ in range(MAX_IN_VAIN):
-        assert not orders.note_path_end("")
+        assert not orders.part.record_path_end("")
         assert drive.mission.orders.scope.worth.least == 80
-    assert not orders.note_path_end("")
+    assert not orders.part.record_path_end("")
     assert drive.mission.orders.scope.worth.least == 0
     problem = drive.command("replan").plan.problem
     assert np.count_nonzero(problem.to_cover) > 150, "the other room, too"
@@ -218,10 +218,10 @@ def test_a_map_of_dirt_in_another_frame_is_refused():
 def test_one_slow_path_does_not_count_in_later_passes():
     window, everything = Window(0, 0, 10, 21), np.ones((10, 21), bool)
     worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
-    worth.take(dirt(90).grid)
+    worth.receive(dirt(90).grid)
     worth.allow(300.0)
     assert worth.puts_other_first(everything, window, 2000.0)
-    worth.begin()
+    worth.begin_pass()
     worth.choose(everything, window)
     assert worth.least == 0
     assert not worth.are_too_many(everything.size)
@@ -230,7 +230,7 @@ def test_one_slow_path_does_not_count_in_later_passes():
 def test_a_map_of_dirt_takes_a_few_bytes_per_cell():
     window = Window(-400, -700, 1600, 1300)
     worth = WorthFirst(CELL, 1.0, lambda: Zone(EVERYTHING, None), lambda: "map")
-    worth.take(dirt(90).grid)
+    worth.receive(dirt(90).grid)
     worth.allow(100.0)
     everything = np.ones((window.rows, window.cols), bool)
     tracemalloc.start()

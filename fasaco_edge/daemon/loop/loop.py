@@ -229,7 +229,9 @@ class Loop:
         """Take the times of plans and maps."""
         mission = self._runner.mission
         for plan in batch.plans:
-            if isinstance(plan, PlanReady) and not (mission and mission.route.is_improving):
+            if isinstance(plan, PlanReady) and not (
+                mission and mission.route.requests.is_improving
+            ):
                 self._status.plan_s = plan.seconds
         maps = [received.at for received in batch.samples if received.kind in MAPS]
         self._latency.arrived = maps[-1] if maps else None
@@ -260,9 +262,9 @@ class Loop:
             return self._recover(commands, error)
         if mission.map_revision > maps:
             self._status.ingest_s = time.monotonic() - now
-            if decision.plan is not None or mission.route.wanted:
+            if decision.plan is not None or mission.route.requests.wanted:
                 self._latency.call_for_plan()
-        if mission.route.wanted and mission.route.is_improving:
+        if mission.route.requests.wanted and mission.route.requests.is_improving:
             self._runner.interrupt()  # a needed plan comes before an improvement
         self._perform(decision)
         for name, message in self._periodic.items():

@@ -155,8 +155,8 @@ def plan_counts(mission: Mission | None) -> PlanCounts:
     if mission is None:
         return PlanCounts()
     route = mission.route
-    counts = (route.plans, route.unchanged, route.outdated, route.attempts)
-    return PlanCounts(*counts, planning=route.is_planning)
+    counts = (route.requests.plans, route.unchanged, route.outdated, route.requests.attempts)
+    return PlanCounts(*counts, planning=route.requests.is_planning)
 
 
 def trouble_reports(mission: Mission, now: float) -> tuple[TroubleReport, ...]:

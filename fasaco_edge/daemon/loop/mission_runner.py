@@ -113,11 +113,11 @@ class MissionRunner:
             self.mission, self.worker = loaded
             self._keeper.restore(self.mission, self.rooms)
             if self._before is not None:
-                self.mission.succeed(self._before)
+                self.mission.continue_from(self._before)
             self._before = None
             if self.config.fleet:
                 # Sets the order apart from orders of ledgers that were set aside.
-                self.mission.covered.shared.begin(time.time_ns() // 1_000_000)
+                self.mission.covered.shared.begin_epoch(time.time_ns() // 1_000_000)
             self._held = HeldEvents()
         return self.mission, held, faults
 
@@ -139,7 +139,7 @@ class MissionRunner:
                 return None
             before = self.order_state
             places = StandingPlaces(self.config.mission, self.config.mission)
-            places.resume(before.places)
+            places.restore(before.places)
             if before.frame:
                 places.enter(before.frame)
             command = asked.asked._replace(order=places.located(asked.order, self.rooms))

@@ -97,7 +97,7 @@ class GivingWay(Waiting):
         # Reason and time of its last wait.
         self._waited, self._waited_at = "", -math.inf
 
-    def succeed(self, before: Waiting) -> None:
+    def continue_from(self, before: Waiting) -> None:
         """Take over the state of a predecessor: where the robot stays, and why it waited."""
         if not isinstance(before, GivingWay):
             return
@@ -155,7 +155,7 @@ class GivingWay(Waiting):
         elif state is not State.DONE and cell is not None:
             state = State.COVERING if order.is_open else State.DONE
             if why := self._fleet.share(self._orders.cells.open_cells, cell, now):
-                self._route.want(why)
+                self._route.requests.want(why)
         return Doing(state, self._reason, update)
 
     def why_stuck(self, now: float) -> str:

@@ -170,13 +170,20 @@ class FleetLayer(Company):
         has_work = (self.untried(unvisited, area) & own & area.reachable).any()
         return cells & own if has_work else cells
 
-    def give_up(self, cells: Mask, area: ReachableArea) -> None:
-        """Leave cells that this robot failed to sweep to the others, also after new maps."""
-        self._tried = area.lattice.window, cells | self._tried_on(area)
+    def give_up(self, cells: Mask, area: ReachableArea) -> Mask | None:
+        """Leave this robot's part of cells to the others; see ``Company.give_up``."""
+        if self._division is None:
+            return None
+        self._tried = area.lattice.window, self.mine(cells, area) | self._tried_on(area)
+        return self.untried(cells, area)
 
-    def pass_over(self, cells: Mask, area: ReachableArea) -> None:
-        """Leave cells that this robot cannot reach to the others, until the next map."""
-        self._shut = area, cells | (self._shut[1] if self._shut[0] is area else np.False_)
+    def pass_over(self, cells: Mask, area: ReachableArea) -> bool:
+        """Leave this robot's part of cells to the others; see ``Company.pass_over``."""
+        if self._division is None:
+            return False
+        mine = self.mine(cells, area)
+        self._shut = area, mine | (self._shut[1] if self._shut[0] is area else np.False_)
+        return bool(mine.any())
 
     def try_again(self) -> None:
         """Clear the list of cells given up."""

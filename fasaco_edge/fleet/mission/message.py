@@ -80,6 +80,6 @@ def waits_for(mission: Mission) -> str:
     robot has no work; "" for none."""
     name, orders = mission.giving_way.waits_for, mission.orders
     stands = mission.doing is State.COVERING and len(mission.route.path.ahead) < 2
-    if name or not (stands and orders.waits_for_others):
+    if name or not (stands and orders.part.waits_for_others):
         return name
     return layer_of(mission).busiest(orders.cells.open_cells)

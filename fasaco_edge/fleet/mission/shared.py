@@ -86,13 +86,13 @@ class SharedProgress(OthersCells):
         self._grown: set[Cell] = set()
         self._encoded: tuple[int, bytes] = 0, b""
 
-    def begin(self, epoch: int) -> None:
+    def begin_epoch(self, epoch: int) -> None:
         """Start an epoch that no earlier ledger of this robot used, unless one was restored."""
         if not self.epoch:
             self.epoch = epoch
             self.version += 1
 
-    def note_forgotten(self) -> None:
+    def record_forgotten(self) -> None:
         """Note that this robot has forgotten some of its own cells."""
         if self.epoch:
             self.epoch += 1
@@ -113,7 +113,7 @@ class SharedProgress(OthersCells):
         self._left = frame
         self.version += 1
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Accept the next map as the one that the fleet shares."""
         self._left = ""
         self.version += 1
@@ -264,7 +264,7 @@ class SharedProgress(OthersCells):
             self._encoded = self.version, msgspec.json.encode(_StoredProgress(1, *own))
         return self._encoded[1]
 
-    def resume(self, kept: bytes) -> None:
+    def restore(self, kept: bytes) -> None:
         """Restore from bytes of ``encode``; bytes of another version are ignored.
 
         If the configured place of this robot's map has changed, cells are ignored, too.

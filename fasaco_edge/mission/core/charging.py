@@ -55,7 +55,7 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.received_at = float("-inf")
-        # Time of the last message; time of the last accepted level, or of ``begin`` before one.
+        # Times of the last message, and of the last accepted level, or of ``start_timeout``.
         self._noted_at = float("-inf")
         self._accepted_at: float | None = None
         # A level not accepted yet, and the time of its first report.
@@ -64,7 +64,7 @@ class BatteryGauge:
         self._since: tuple[float, float] | None = None
         self._drains: deque[float] = deque(maxlen=NEWEST)
 
-    def succeed(self, before: BatteryGauge) -> None:
+    def continue_from(self, before: BatteryGauge) -> None:
         """Take over the state of a predecessor."""
         vars(self).update(vars(before))
 
@@ -74,7 +74,7 @@ class BatteryGauge:
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return the time since the last accepted level, or since ``begin`` before one [s]."""
+        """Return the time since the last accepted level, before one since ``start_timeout`` [s]."""
         return 0.0 if self._accepted_at is None else now - self._accepted_at
 
     def why_silent(self, since: float) -> str:
@@ -83,11 +83,11 @@ class BatteryGauge:
             return ", it jumps to and fro"
         return ", its messages give none" if self._noted_at >= since else ""
 
-    def begin(self, now: float) -> None:
+    def start_timeout(self, now: float) -> None:
         """Start the timeout for the first level at ``now`` [s], unless it runs already."""
         self._accepted_at = now if self._accepted_at is None else self._accepted_at
 
-    def note(self, event: BatteryReceived, now: float, *, drives: bool) -> None:
+    def receive(self, event: BatteryReceived, now: float, *, drives: bool) -> None:
         """Take in a message at ``now`` [s]; ``drives``: whether the robot is driving."""
         self.power, self._noted_at = event.power, now
         if event.level is None:
@@ -145,9 +145,9 @@ class Charging:
     def __post_init__(self) -> None:
         self._looked = Lapse(self.map)
 
-    def succeed(self, before: Charging) -> None:
+    def continue_from(self, before: Charging) -> None:
         """Take over a predecessor's gauge and charging state."""
-        self.gauge.succeed(before.gauge)
+        self.gauge.continue_from(before.gauge)
         self._best, self._turned_at, self._most = before._best, before._turned_at, before._most
 
     @property
@@ -155,15 +155,15 @@ class Charging:
         """When to charge; None for never."""
         return self.config.battery
 
-    def look(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Update the time to the dock at intervals; to be called with each decision."""
         if self.policy is None:
             return
-        if not self._looked.has_begun:
-            self.gauge.begin(now)
+        if not self._looked.has_started:
+            self.gauge.start_timeout(now)
         elif self.gauge.drain_per_s is None or self._looked.seconds(now) < LOOK_EVERY_S:
             return
-        self._looked.begin(now)
+        self._looked.start(now)
         is_charging = self.orders.order_state.errand == "charge"
         self._rest_s = self._seconds_left() if is_charging else None
         self._to_dock_s = (
@@ -203,8 +203,8 @@ class Charging:
         is_low = level <= self.turns_back_at or self._is_best_here
         return self.orders.goal("charge") is not None and is_low
 
-    def begin(self) -> None:
-        """Note that the robot goes to charge."""
+    def begin_errand(self) -> None:
+        """Begin the way to the dock."""
         self._turned_at = self.turns_back_at
 
     def why_due(self) -> str:

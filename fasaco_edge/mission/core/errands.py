@@ -32,12 +32,12 @@ class Errands:
     def consider_charging(self, state: State, now: float) -> None:
         """Begin to charge if due, and end charging if the battery suffices."""
         orders, charging = self.orders, self.charging
-        charging.look(now)
+        charging.update(now)
         errand, docked = orders.order_state.errand, state is State.CHARGING
         if errand == "charge" and charging.is_enough(now, docked=docked):
             orders.set_state(replace(orders.order_state, errand=""))
         elif not errand and charging.is_due(now):
-            charging.begin()
+            charging.begin_errand()
             orders.set_state(replace(orders.order_state, errand="charge"))
 
     def run(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
@@ -51,7 +51,7 @@ class Errands:
         route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
         errand = orders.order_state.errand
         is_new = route.set_aside()
-        route.drop()
+        route.requests.want_none()
         goal = orders.goal(errand)
         if cell == goal and not is_new and self.standing.in_cell_s >= ARRIVAL_S:
             if errand == "charge":
@@ -61,7 +61,7 @@ class Errands:
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
         stands = cell != goal and self.standing.is_on_path
         if stands and not is_new:
-            self.standing.note_again()
+            self.standing.record_try()
         is_lost = cell != goal and ((is_off and self.standing.has_waited) or stands)
         to = PLACES[errand]
         if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:

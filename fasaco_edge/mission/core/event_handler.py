@@ -39,7 +39,7 @@ class EventHandler:
         self.map, self.ledger, self.monitor = parts.map, parts.ledger, parts.monitor
         self.orders, self.route, self.line = parts.orders, parts.route, parts.line
         self.trail, self.company, self.changes = parts.trail, parts.company, parts.changes
-        self.way_out, self.blocked = parts.way_out, parts.blocked
+        self.way_out, self.blocked, self.motion = parts.way_out, parts.blocked, parts.motion
         self.drive, self.battery = parts.lasting.drive, parts.lasting.battery
         self.rooms = parts.lasting.rooms
         self._now = 0.0
@@ -60,10 +60,10 @@ class EventHandler:
         for event in in_runs(events):
             self._attempt(partial(self._apply, event))
         self._attempt(self._open_floor)
-        self._attempt(self._look_for_another_building)
-        self._note_frame()
+        self._attempt(self._check_building)
+        self._settle_frame()
         if stood and not self.map.building.why:
-            self.route.want("the map shows the building of the ledger again")
+            self.route.requests.want("the map shows the building of the ledger again")
         return Decision(
             path=self._path,
             faults=tuple(self._faults),
@@ -81,25 +81,25 @@ class EventHandler:
     def _apply(self, event: Event | PatchRun) -> None:
         match event:
             case MapReceived(grid, at):
-                if self.map.take_map(grid):
+                if self.map.receive_map(grid):
                     self._enter_frame(grid.frame)
                 self._map_changed(at)
             case PatchRun(patches):
-                has_changed, faults = self.map.take_patches(patches)
+                has_changed, faults = self.map.receive_patches(patches)
                 self._faults += faults
                 if has_changed:
                     self._map_changed()
             case PatchesLost(count):
-                self.map.lose_patches(count)
+                self.map.receive_loss(count)
             case PoseReceived(pose, at):
-                self._take_pose(pose, at)
+                self._receive_pose(pose, at)
             case BatteryReceived():
                 drives = len(self.route.path.ahead) > 1
-                self.battery.note(event, self._now, drives=drives)
+                self.battery.receive(event, self._now, drives=drives)
             case PriorityReceived(grid):
-                self._take_priorities(grid)
+                self._receive_priorities(grid)
             case PlanReady() | PlanBroken():
-                self._take_plan(event)
+                self._receive_plan(event)
             case CommandReceived():
                 self._obey(event)
             case FollowerBlocked():
@@ -109,22 +109,22 @@ class EventHandler:
 
     def _receive_member(self, event: MemberReceived) -> None:
         if reason := self.company.receive(event, self._now):
-            self.route.want(reason)
+            self.route.requests.want(reason)
 
     def _close_floor(self, event: FollowerBlocked) -> None:
-        if self.blocked.take(event, self.map, self.route.revision, self._now):
+        if self.blocked.receive(event, self.map, self.route.revision, self._now):
             self._map_changed(self.monitor.map_at)
 
-    def _take_priorities(self, grid: OccupancyGrid) -> None:
-        """Take a map of priorities; raise WrongFrame if it is in another frame than the map.
+    def _receive_priorities(self, grid: OccupancyGrid) -> None:
+        """Take in a map of priorities; raise WrongFrame if it is in another frame than the map.
 
-        If there is no map yet, ``_note_frame`` checks the frame later.
+        If there is no map yet, ``_settle_frame`` checks the frame later.
         """
         used = self.map.grid
         if used is not None and grid.frame != used.frame:
             raise _in_other_frame(grid, used)
-        if self.orders.scope.worth.take(grid):
-            self.route.want(OTHERS_FIRST)
+        if self.orders.scope.worth.receive(grid):
+            self.route.requests.want(OTHERS_FIRST)
 
     def _open_floor(self) -> None:
         """Reopen closed floor when its time is up, if the robot has work."""
@@ -138,16 +138,13 @@ class EventHandler:
         """Follow a new map; raise LedgerMismatchError if it shows another building."""
         assert self.map.free is not None
         assert self.map.grid is not None
-        self.monitor.note_map(self._now if at is None else at)
-        self.line.note_map()
-        self.route.note_map()
+        self.monitor.receive_map(self._now if at is None else at)
+        self.line.receive_map()
+        self.route.requests.receive_map()
         before = self._compare_buildings()
         if before is not None and (self.map.has_moved or self.map.building.is_foreign):
-            self.ledger.note_map_motion(before)
-            self.orders.reach.note_map_motion()
-            self.trail.note_map_motion()
-            self.route.note_map_motion()
-            self.way_out.begin_anew()
+            self.motion.receive_map(before)
+            self.way_out.forget_track()
         else:
             self._record_again()  # the pose may have come before the map
             if self.map.shift is not None:
@@ -162,13 +159,13 @@ class EventHandler:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose
         if not self.map.shows_floor:
-            self.map.building.note_no_floor()
+            self.map.building.receive_blank_map()
             return pose
         plain, free = map(self.map.without_obstacles, (self.map.plain, self.map.free))
         contradicts = partial(self.ledger.contradicts, free)
-        return self.map.building.note_map(plain, pose, self._now, contradicts)
+        return self.map.building.receive_map(plain, pose, self._now, contradicts)
 
-    def _note_frame(self) -> None:
+    def _settle_frame(self) -> None:
         """Assign the map's frame to places and orders without one; drop those of other frames."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
@@ -177,7 +174,7 @@ class EventHandler:
             self._faults.append(fault)
         given = self.orders.scope.worth.given
         if given is not None and given.frame != grid.frame:
-            self.orders.scope.worth.take(None)
+            self.orders.scope.worth.receive(None)
             self._faults.append(_in_other_frame(given, grid))
         order = self.orders.order_state
         if not order.frame:
@@ -185,11 +182,11 @@ class EventHandler:
         elif order.frame != grid.frame:
             why = f"it was given in frame {order.frame!r}, the map is in {grid.frame!r}"
             after = order.in_other_frame(why)
-            self.changes.begin(replace(after, frame=grid.frame))
+            self.changes.begin_order(replace(after, frame=grid.frame))
 
-    def _look_for_another_building(self) -> None:
+    def _check_building(self) -> None:
         """Raise LedgerMismatchError once the map has shown another building for long enough."""
-        if self.map.grid is None or not self.map.building.look(self._now):
+        if self.map.grid is None or not self.map.building.update(self._now):
             return
         misfit = self.ledger.begin_elsewhere(self.map.grid.frame)
         self.company.forget_ground()
@@ -199,7 +196,7 @@ class EventHandler:
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
         """Continue on a new map; drop the places of the previous building if it shows another."""
         if misfit is not None:
-            self.map.building.accept(self._now)
+            self.map.building.accept_building(self._now)
             self.map.places.leave_building(self.ledger.current.frame)
         self._go_on(misfit)
 
@@ -208,11 +205,11 @@ class EventHandler:
         if misfit is None:
             self.changes.update_area()
             return
-        self.orders.scope.worth.take(None)
+        self.orders.scope.worth.receive(None)
         self._path = self.route.stop(str(misfit), self._now) or self._path
-        self.trail.begin_anew()
-        self.changes.begin(self.orders.order_state.in_other_building(str(misfit)))
-        self.route.want(self.ledger.first_plan_reason)
+        self.motion.leave_map()
+        self.changes.begin_order(self.orders.order_state.in_other_building(str(misfit)))
+        self.route.requests.want(self.ledger.first_plan_reason)
         raise misfit
 
     def _enter_frame(self, frame: str) -> None:
@@ -225,12 +222,12 @@ class EventHandler:
             self.company.forget_ground()
         if misfit is None and before not in ("", frame):
             why = f"map and poses are in frame {frame!r} now, no longer in {before!r}"
-            self.changes.begin(self.orders.order_state.in_other_frame(why))
+            self.changes.begin_order(self.orders.order_state.in_other_frame(why))
         if not is_other_map and misfit is None:
             return
         self._leave_map(f"map and poses are in frame {frame!r} now")
-        self.monitor.note_map(self._now)
-        self.line.note_map()
+        self.monitor.receive_map(self._now)
+        self.line.receive_map()
         self._compare_buildings()
         if misfit is not None:
             self._record_again()
@@ -241,39 +238,34 @@ class EventHandler:
         self._path = self.route.stop(why, self._now) or self._path
         self.route.abandon()
         self.monitor.forget_pose(self._now)
-        self.trail.begin_anew()
-        self.way_out.begin_anew()
+        self.motion.leave_map()
+        self.way_out.forget_track()
 
-    def _take_pose(self, stamped: StampedPose, at: float | None = None) -> None:
-        if self.map.frames.note_pose(stamped, self._now):
+    def _receive_pose(self, stamped: StampedPose, at: float | None = None) -> None:
+        if self.map.frames.receive_pose(stamped, self._now):
             self._enter_frame(stamped.frame)
         before = self.map.pose
-        self.map.take_pose(stamped)
-        has_jumped = self.monitor.note_pose(stamped, self._now if at is None else at)
+        self.map.receive_pose(stamped)
+        has_jumped = self.monitor.receive_pose(stamped, self._now if at is None else at)
         if has_jumped:
             self.ledger.break_track()
             self.drive.break_track()
-            self.way_out.begin_anew()
+            self.way_out.forget_track()
             if before is not None:
-                self.map.building.note_jump(before.pose, stamped.pose, self._now)
-        self.drive.note(stamped)
-        self.way_out.note_pose(stamped.pose)
-        motion, uncertain = None, 0
+                self.map.building.record_jump(before.pose, stamped.pose, self._now)
+        self.drive.receive_pose(stamped)
+        self.way_out.receive_pose(stamped.pose)
         # While the map shows another building, poses are invalid: no floor under them is swept.
-        is_known = self.map.building.note_pose(stamped.pose, self._now)
+        is_known = self.map.building.receive_pose(stamped.pose, self._now)
         if is_known:
-            motion = self.ledger.map_motion(stamped.pose)
-            self.trail.note_motion(motion)
-            uncertain = self.ledger.forget_uncertain(stamped.pose)
-            if motion is not None:
-                self.orders.move_reached(motion)
-                if self.map.building.take_closure():
+            if (motion := self.motion.receive_pose(stamped.pose)) is not None:
+                if self.map.building.pop_closure():
                     self.orders.move_home(motion)
                     self.rooms.move(motion, self.changes.lattice_deg)
                 self.monitor.driven.break_track()
-            for driven in self.monitor.driven.take(stamped):
+            for driven in self.monitor.driven.receive_pose(stamped):
                 self._record(driven)
-        self.line.note_pose(stamped.pose, self.monitor.on_line_m)
+        self.line.receive_pose(stamped.pose, self.monitor.on_line_m)
         if has_jumped and self.line.is_followed:
             self.monitor.clear_doubt()  # the robot has driven on between two poses
         cell = self.map.robot_cell()
@@ -281,16 +273,12 @@ class EventHandler:
             return
         if has_jumped or self.map.area is None or not self.map.area.contains(cell):
             self.changes.update_area()
-        if is_known:
-            self._path = self.route.note_motion(motion, self._now) or self._path
-        if uncertain:
-            self.route.want(f"map and pose moved: {uncertain} cells to be covered again")
-        self.orders.note_cell(cell)
-        self.route.follow(cell, self.ledger.current.has_visited)
-        self.trail.note_drive()
+        self._path = self.motion.move_path(self._now) or self._path
+        self.orders.part.record_cell(cell)
+        self.route.record_cell(cell, self.ledger.current.has_visited)
+        self.trail.fade_driven()
 
     def _record_again(self) -> None:
-        """Record the floor under the tool again, on a new map."""
         if self.map.pose is not None and not self.monitor.driven.holds:
             self._record(Driven(self.map.pose.pose, self.monitor.farthest_m))
 
@@ -306,17 +294,20 @@ class EventHandler:
             if full is not None:
                 self._faults.append(full)
 
-    def _take_plan(self, event: PlanReady | PlanBroken) -> None:
-        """Take a plan; raise PlanFailed if the planner failed."""
+    def _receive_plan(self, event: PlanReady | PlanBroken) -> None:
         if isinstance(event, PlanBroken):
             self.route.fail(event, self._now)
             raise event.why
-        request = self.route.pending
+        request = self.route.requests.pending
         if request is not None and request.number == event.number:
-            self.trail.take(event.path)
+            self.trail.receive_plan(event.path)
         self._path = self.route.accept(event, self._now) or self._path
-        if request is not None and self.route.pending is None and not self.route.wanted:
-            self.monitor.note_plan(request.number)
+        if (
+            request is not None
+            and self.route.requests.pending is None
+            and not self.route.requests.wanted
+        ):
+            self.monitor.receive_plan(request.number)
 
     def _obey(self, event: CommandReceived) -> None:
         """Carry out a command; an error becomes its answer."""
@@ -331,17 +322,17 @@ class EventHandler:
     def _reset(self) -> None:
         """Forget the choice of a frame, and all coverage except under the tool."""
         self._is_forgotten = True
-        self.map.places.begin_anew()
+        self.map.places.reset()
         self.map.frames.reset()
         if self.map.switch_frame():
             self._leave_map("reset")
-            self.monitor.note_map(self._now)
-            self.line.note_map()
+            self.monitor.receive_map(self._now)
+            self.line.receive_map()
         self.ledger.reset(self.map.frames.active)
-        self.trail.begin_anew()
-        self.map.building.begin_anew()
+        self.motion.leave_map()
+        self.map.building.reset()
         self._compare_buildings()
-        self.route.forget_failure()
+        self.route.requests.forget_failure()
         self._record_again()
 
 

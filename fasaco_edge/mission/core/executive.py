@@ -40,9 +40,9 @@ class Executive:
         self._cell: Cell = 0, 0
         self._update: PathUpdate | None = None
 
-    def succeed(self, before: Executive) -> None:
+    def continue_from(self, before: Executive) -> None:
         """Continue where another mission ended; a docked robot stays docked."""
-        self.troubles.succeed(before.troubles)
+        self.troubles.continue_from(before.troubles)
         if before._state is State.CHARGING:
             self._state, self._reason = before._state, before._reason
 
@@ -64,10 +64,10 @@ class Executive:
     def decide(self, now: float) -> Decision:
         """Return the decision at ``now`` [s]: that of the first rule that returns an activity."""
         self._now, self._update = now, None
-        self.way_out.end()
+        self.way_out.forget_why()
         doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
         self._state, self._reason = doing.state, doing.reason
-        self.troubles.look(self.doing, now)
+        self.troubles.update(self.doing, now)
         return Decision(plan=doing.plan, path=doing.path)
 
     def _charge_in_time(self) -> None:
@@ -83,7 +83,7 @@ class Executive:
             return
         if not self.orders.order_state.errand:
             self.route.abandon()
-            self.route.want("time is up")
+            self.route.requests.want("time is up")
         self.orders.run_out_of_time(self.time_limit.minutes)
 
     def _give_way(self) -> Doing | None:
@@ -100,7 +100,7 @@ class Executive:
         if resting is None:
             return None
         if resting[0] in STOPPED:
-            self._standing.begin_anew()
+            self._standing.reset()
         return Doing(*resting, self._update)
 
     def _why_rest(self) -> tuple[State, str] | None:
@@ -151,7 +151,7 @@ class Executive:
             self.map.forget_area()
             return self.way_out.lead_out(self.map.why_misplaced(), None, self._now)
         self._cell = cell
-        self._standing.look(cell, self._now)
+        self._standing.update(cell, self._now)
         if not len(route.path.cells):
             self.monitor.clear_doubt()  # without a path there is no doubt about it
         self._update = route.truncate(self._now)
@@ -179,17 +179,16 @@ class Executive:
         if self._state is State.COVERING:
             self._checks.check_time(now)
             self._checks.check_room(cell)
-        if reason := self.orders.begin(cell, now):
-            self.route.want(reason)
+        if reason := self.orders.begin_stage(cell, now):
+            self.route.requests.want(reason)
         if reason := self._work.share(cell, now):
-            self.route.want(reason)
+            self.route.requests.want(reason)
 
     def _plan(self) -> Doing | None:
-        """Request the wanted plan, unless one is being made."""
         route, state = self.route, self._state
-        if not route.wanted or route.pending is not None:
+        if not route.requests.wanted or route.requests.pending is not None:
             return None
-        if why := route.why_not_yet(self._now):
+        if why := route.requests.why_not_yet(self._now):
             return Doing(State.BLOCKED, why, self._update)
         # Wait a moment after the robot was stopped.
         if state is State.BLOCKED and not self._standing.has_waited:
@@ -201,7 +200,7 @@ class Executive:
         route, orders = self.route, self.orders
         if orders.order_state.stage is Stage.RETURNING and self._cell == orders.goal():
             orders.advance(self._now)
-        waits = orders.is_waiting and route.path.finished and route.pending is None
+        waits = orders.is_waiting and route.path.finished and route.requests.pending is None
         if waits or orders.order_state.stage is Stage.OVER:
             return self._work.settle(self._update, self._now)
         return None
@@ -210,17 +209,19 @@ class Executive:
         """Drive on; publish the path again to a robot that stands; use spare time."""
         route, now, update = self.route, self._now, self._update
         state, reason = self._state, self._reason
-        if route.pending is not None and not len(route.path.cells):
-            state, reason = State.PLANNING, route.pending.reason
+        if route.requests.pending is not None and not len(route.path.cells):
+            state, reason = State.PLANNING, route.requests.pending.reason
         elif self.orders.order_state.stage is not Stage.RETURNING:
             state, reason = State.COVERING, ""
         drives = len(route.path.ahead) > 1 and update is None
-        if drives and route.pending is None and (why := self.blocked.asks_again(now)):
+        if drives and route.requests.pending is None and (why := self.blocked.asks_again(now)):
             update = route.publish_anew(why, now)
         if self._standing.is_on_path and update is None:
             update = route.publish(route.path.ahead, "robot stands", now)
-            self._standing.note_again()
-        is_free = state is State.COVERING and route.pending is None and not route.wanted
+            self._standing.record_try()
+        is_free = (
+            state is State.COVERING and route.requests.pending is None and not route.requests.wanted
+        )
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
 
 

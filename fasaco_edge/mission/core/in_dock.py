@@ -79,15 +79,15 @@ class DockCurrent:
 
     @property
     def is_docked(self) -> bool:
-        """Whether the robot was docked at the last look."""
+        """Whether the robot was docked at the last update."""
         return self._docked_at is not None
 
-    def succeed(self, before: DockCurrent) -> None:
+    def continue_from(self, before: DockCurrent) -> None:
         """Take over the state of a predecessor."""
         vars(self).update(vars(before) | {"_gauge": self._gauge})
 
-    def look(self, now: float, *, is_docked: bool) -> None:
-        """Note level and power supply at ``now``; to be called in each step."""
+    def update(self, now: float, *, is_docked: bool) -> None:
+        """Follow level and power supply at ``now``; to be called in each step."""
         if not is_docked:
             self._docked_at = self._unclaimed_at = self._extreme = self._rose_at = None
             self._falls = False
@@ -98,9 +98,9 @@ class DockCurrent:
         elif self._unclaimed_at is None:
             self._unclaimed_at = now
         if (level := self._gauge.level) is not None:
-            self._note_level(level, now)
+            self._update_extreme(level, now)
 
-    def _note_level(self, level: float, now: float) -> None:
+    def _update_extreme(self, level: float, now: float) -> None:
         extreme = self._extreme
         if extreme is None:
             self._extreme = level

@@ -55,15 +55,15 @@ class WallWatch:
         """Whether it has decided or given up."""
         return self._looks >= MOST_LOOKS
 
-    def end(self) -> None:
+    def stop(self) -> None:
         """Stop estimating."""
         self._looks = MOST_LOOKS
 
-    def begin(self) -> None:
-        """Start again, in another building."""
+    def reset(self) -> None:
+        """Start again in another building."""
         self._looks, self._seen, self._due_m = 0, None, self._driven_m
 
-    def look(self, grid: OccupancyGrid, pose: Pose2D) -> float | None:
+    def estimate(self, grid: OccupancyGrid, pose: Pose2D) -> float | None:
         """Return the lattice rotation [deg] once, when it is certain; else None.
 
         Args:
@@ -82,7 +82,7 @@ class WallWatch:
         seen = self._seen
         if seen is None or not (seen.wall_m >= PLENTY_M or _agree(before, seen)):
             return None
-        self.end()
+        self.stop()
         return seen.angle_deg if abs(seen.angle_deg) >= LEAST_ROTATION_DEG else 0.0
 
 
@@ -119,7 +119,7 @@ class LatticeLayout:
         self._most_cells = config.max_lattice_cells
         self._walls = WallWatch()
         if self._is_given:
-            self._walls.end()
+            self._walls.stop()
 
     def sized(self, config: MissionConfig) -> MissionConfig:
         """Return a mission's configuration with cells of the present edge."""
@@ -132,7 +132,7 @@ class LatticeLayout:
         cost = replace(config.cost, step_s=config.cost.step_s * scale)
         return replace(config, footprint=footprint, cost=cost, sweeping=sweeping)
 
-    def resume(self, before: LedgerSnapshot, lay: Laid) -> bool:
+    def restore(self, before: LedgerSnapshot, lay: Laid) -> bool:
         """Keep angle and edge of a ledger's cells; return whether that changes the layout.
 
         The ledger is from before a restart. Its edge is kept only if the present pass has it, too.
@@ -142,7 +142,7 @@ class LatticeLayout:
             self.deg = deg
         elif deg and not self._is_given:
             self.deg = self._usual_deg = deg
-            self._walls.end()
+            self._walls.stop()
         cell_m, tool_m = self._lane_and_tool_m(lay)
         if math.isclose(before.cell_m, cell_m):
             self.cell_m, self._tool_m = cell_m, tool_m
@@ -181,15 +181,15 @@ class LatticeLayout:
         self.deg, self.cell_m, self._tool_m = wanted, cell_m, tool_m
         return True
 
-    def note_faults(self, faults: Iterable[FasacoError]) -> None:
+    def receive_faults(self, faults: Iterable[FasacoError]) -> None:
         """Estimate the walls again if the map shows another building."""
         is_other = any(isinstance(fault, LedgerMismatchError) for fault in faults)
         if is_other and not self._is_given:
-            self._walls.begin()
+            self._walls.reset()
 
     def _rotates_to_walls(self, grid: OccupancyGrid, pose: StampedPose) -> bool:
         """Evaluate the walls of the newest map; return whether the angle has changed."""
-        deg = self._walls.look(grid, pose.pose)
+        deg = self._walls.estimate(grid, pose.pose)
         # A rotated lattice spans up to twice as many cells, and the map may grow.
         if deg is None or deg == self.deg or not self._fits(grid, deg, self.cell_m, share=0.5):
             return False

@@ -55,6 +55,8 @@ class Mission:
             robot and others, the line, the measured driving; read-only.
         route: the path and the pending plan, with counts; read-only.
         company: the other robots; read-only.
+        rotation: the lattice rotation, which converts the mission's places to the map frame;
+            read-only.
         room_cells: the cells of the rooms; read-only.
         charging: the battery, and when to charge; read-only.
         time_limit: when the order has to end; read-only.
@@ -74,12 +76,12 @@ class Mission:
 
     def _lay_cells(self) -> None:
         """Start a mission on a lattice at the decided angle, with cells of the decided edge."""
-        self._rotation = LatticeRotation(self._layout.deg)
+        self.rotation = LatticeRotation(self._layout.deg)
         # The newest map in the lattice's frame, and the same map in the map frame.
         self._laid_grid: OccupancyGrid | None = None
         self._given_grid: OccupancyGrid | None = None
-        config = self._rotation.config(self._layout.sized(self._config))
-        parts = laid_parts(config, self._kind, self._lasting, self._rotation.deg)
+        config = self.rotation.config(self._layout.sized(self._config))
+        parts = laid_parts(config, self._kind, self._lasting, self.rotation.deg)
         self.map, self.covered, self.orders = parts.map, parts.ledger, parts.orders
         self.route, self.line, self.company = parts.route, parts.line, parts.company
         self.charging, self.time_limit = parts.charging, parts.time_limit
@@ -108,7 +110,7 @@ class Mission:
         if rooms is not None:
             self._rooms.book = rooms
         order = order or self.order_state
-        if before is not None and self._layout.resume(before, order.current_pass):
+        if before is not None and self._layout.restore(before, order.current_pass):
             self._lay_cells()
         self._continue(order, before, restart=before)
 
@@ -121,41 +123,41 @@ class Mission:
         is_confirmed: bool = False,
     ) -> None:
         """Continue an order with its ledger, and with the ledger of the last restart."""
-        deg, cell_m = self._rotation.deg, self._layout.cell_m
+        deg, cell_m = self.rotation.deg, self._layout.cell_m
         rotated_by_deg, scale = 0.0, 1.0
         if before is not None:
             rotated_by_deg, scale = deg - before.lattice_deg, cell_m / before.cell_m
         if before is not None and not before.is_empty:
             before = relaid_ledger(before, deg, cell_m)
-            self.covered.resume(before, is_confirmed=is_confirmed)
-            self._trail.resume(before.trail)
+            self.covered.restore(before, is_confirmed=is_confirmed)
+            self._trail.restore(before.trail)
             self.map.frames.activate(before.frame)
             if restart is not None and order.stage is not Stage.OVER:
-                self.covered.note_restart(relaid_ledger(restart, deg, cell_m))
-        self.map.places.resume(order.places)
+                self.covered.record_restart(relaid_ledger(restart, deg, cell_m))
+        self.map.places.restore(order.places)
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
-        self._changes.begin(self._rotation.order(order, rotated_by_deg, scale))
+        self._changes.begin_order(self.rotation.order(order, rotated_by_deg, scale))
         self.state, self.reason = self._executive.status()
 
-    def succeed(self, before: Mission) -> None:
+    def continue_from(self, before: Mission) -> None:
         """Take over a predecessor's state of robot and inputs, and its doubt about the building.
 
         To be called before the first step, which gets the events of the predecessor's ``held``.
         """
-        self._executive.succeed(before._executive)
+        self._executive.continue_from(before._executive)
         if before.rotation != self.rotation or before._layout.cell_m != self._layout.cell_m:
             return
-        self.orders.reach.succeed(before.orders.reach)
-        self.orders.uncovered.succeed(before.orders.uncovered)
-        self._executive.way_out.succeed(before._executive.way_out)
+        self.orders.reach.continue_from(before.orders.reach)
+        self.orders.uncovered.continue_from(before.orders.uncovered)
+        self._executive.way_out.continue_from(before._executive.way_out)
         if before.is_in_doubt:
-            self.map.watch_on(before.map.building)
+            self.map.continue_from(before.map)
 
     def held(self) -> list[Event]:
         """Return the newest map, pose and priorities as events for a succeeding mission."""
         monitor = self._executive.monitor
-        priorities = self._rotation.grid(self.orders.scope.worth.given)
+        priorities = self.rotation.grid(self.orders.scope.worth.given)
         return [
             *([MapReceived(self.grid, monitor.map_at)] if self.grid is not None else []),
             *([PoseReceived(self.pose, monitor.pose_at)] if self.pose is not None else []),
@@ -178,7 +180,7 @@ class Mission:
         events = list(events)
         begun = self._make_room(events, now)
         happened = self._align(self._handle(events, now), now)
-        happened = self._look_for_rooms(happened, now)
+        happened = self._find_rooms(happened, now)
         decided = self._executive.decide(now)
         self.state, self.reason = self._executive.status()
         stop = self.route.stop(self.reason, now) if self.state.is_at_rest else None
@@ -187,31 +189,33 @@ class Mission:
         path = self.line.finish(path, now)
         self.state, self.reason = self._executive.status()
         if path is not None:
-            path = self._rotation.path(path, self.lattice)
+            path = self.rotation.path(path, self.lattice)
             path = replace(path, speed_m_s=self.order_state.speed_m_s)
         plan = decided.plan and self._trail.posed(decided.plan)
         return replace(happened, plan=plan, path=path)
 
-    def _look_for_rooms(self, happened: Decision, now: float) -> Decision:
-        """Find rooms if due, and let the order follow them; return the decision. A failure is
-        reported as a fault, as the robot can sweep without rooms."""
+    def _find_rooms(self, happened: Decision, now: float) -> Decision:
+        """Find rooms if due, and let the order follow them; return the decision."""
         if any(isinstance(fault, LedgerMismatchError) for fault in happened.faults):
             self._rooms.leave_building()
         try:
             if self.grid is not None and not self.is_in_doubt:
-                self._rooms.look(self.grid, now)
-        except NotPublished as fault:
+                self._rooms.update(self.grid, now)
+        except Exception as error:  # the robot can sweep without rooms
+            why = f"rooms of this map were not published: {type(error).__name__}: {error}"
+            hint = "the robot goes on with the rooms it knows; report it with the log"
+            fault = NotPublished(why, hint=hint)
             happened = replace(happened, faults=(*happened.faults, fault))
         self._changes.follow_rooms()
         return happened
 
     def _handle(self, events: Iterable[Event], now: float) -> Decision:
-        return self._handler.handle(map(self._rotation.event, events), now)
+        return self._handler.handle(map(self.rotation.event, events), now)
 
     def _align(self, happened: Decision, now: float) -> Decision:
         """Lay other cells if the pass or the walls require them; return the combined decision."""
         state, grid, pose = self.order_state, self.grid, self.pose
-        self._layout.note_faults(happened.faults)
+        self._layout.receive_faults(happened.faults)
         # Keep the cells in an errand (the kept path needs them), and while the building is in
         # doubt.
         if state.errand or self.is_in_doubt or grid is None or pose is None:
@@ -237,11 +241,11 @@ class Mission:
         stop = route.stop(why, now)
         self._lay_cells()
         self._continue(order, before, restart=restart, is_confirmed=is_confirmed)
-        self.route.succeed(route)
-        self._executive.succeed(executive)
+        self.route.continue_from(route)
+        self._executive.continue_from(executive)
         self.drive.break_track()
         self._handle(held, now)
-        self.route.want(why)
+        self.route.requests.want(why)
         return stop
 
     @property
@@ -263,7 +267,7 @@ class Mission:
             return ""
         is_theirs = not self.map.places.why
         order = self.orders.order_state
-        return self._idle.look(self.grid, self.map_revision, order, now, is_theirs=is_theirs)
+        return self._idle.find(self.grid, self.map_revision, order, now, is_theirs=is_theirs)
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""
@@ -275,13 +279,8 @@ class Mission:
         """Return the state kept over a restart: coverage, and the order's progress."""
         trail = self._trail.snapshot()
         note = replace(self.order_state, reached=self.orders.reached).to_json()
-        ledger, lattice_deg = self.covered.snapshot(), self._rotation.deg
+        ledger, lattice_deg = self.covered.snapshot(), self.rotation.deg
         return replace(ledger, trail=trail, note=note, lattice_deg=lattice_deg)
-
-    @property
-    def rotation(self) -> LatticeRotation:
-        """The lattice rotation, which converts the mission's places to the map frame."""
-        return self._rotation
 
     @property
     def rooms(self) -> RoomBook:
@@ -304,7 +303,7 @@ class Mission:
         """The newest map; None before there is one."""
         if self.map.given is not self._laid_grid:
             given = self.map.given
-            self._laid_grid, self._given_grid = given, self._rotation.grid(given)
+            self._laid_grid, self._given_grid = given, self.rotation.grid(given)
         return self._given_grid
 
     @property
@@ -315,7 +314,7 @@ class Mission:
     @property
     def pose(self) -> StampedPose | None:
         """The newest pose; None before there is one."""
-        return self._rotation.pose(self.map.pose)
+        return self.rotation.pose(self.map.pose)
 
     @property
     def lattice(self) -> CoverageLattice | None:

@@ -16,10 +16,11 @@ from fasaco_edge.mission.map.placing import placed, rotated_order
 from fasaco_edge.mission.orders.mask import mask_polygons
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.zones import in_zones
+from fasaco_edge.mission.path.map_motion import MapMotion
 from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.rooms.room_commands import carry_out
 from fasaco_edge.mission.rooms.room_watch import RoomWatch
-from fasaco_edge.mission.work.loss import loss_in
+from fasaco_edge.mission.work.loss import check_loss
 from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.mission.work.sequencer import Sequencer
 
@@ -36,6 +37,7 @@ class OrderChanges:
     orders: Sequencer
     route: Route
     line: LineLayer
+    motion: MapMotion
     rooms: RoomWatch
     # Whether the robot is in no fleet: the robots of a fleet have the same cells.
     is_alone: bool
@@ -53,21 +55,21 @@ class OrderChanges:
         """Angle of the cells' rows to the x axis of the map frame [deg]."""
         return self.config.lattice_deg or 0.0
 
-    def begin(self, order: OrderState) -> None:
+    def begin_order(self, order: OrderState) -> None:
         """Begin another order; or end the present one, if the new state has none."""
         self.route.abandon()
+        self.motion.forget_order()
         self._keep_out(order)
-        self.orders.start(order)
+        self.orders.begin_order(order)
         self.update_area()
 
     def _keep_out(self, order: OrderState) -> None:
-        """Apply the keep-outs of the configuration and of an order."""
         ordered = order.order.keep_out if order.order else ()
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:
             drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
-        self.map.keep_out(self._standing + ordered + drawn)
-        self.line.note_map()
+        self.map.keep_out(self._standing + ordered + drawn, self.map.grid)
+        self.line.receive_map()
 
     def update_area(self) -> None:
         """Update the reachable area; want a new plan if it changed."""
@@ -76,12 +78,12 @@ class OrderChanges:
         area = self.map.area
         if area is None:
             return
-        self.orders.reach.note_area()
+        self.orders.reach.record_area()
         if before is None:
             again = "robot is on coverable ground again"
-            route.want(again if route.revision else self.ledger.first_plan_reason)
+            route.requests.want(again if route.revision else self.ledger.first_plan_reason)
         elif change := area.change_since(before):
-            route.want(str(change), change.window)
+            route.requests.want(str(change), change.window)
 
     def answer(self, event: CommandReceived) -> tuple[Answer, OrderState | None]:
         """Return the answer to a command, and the state that follows; None if it is refused."""
@@ -98,7 +100,7 @@ class OrderChanges:
             has_home = self.map.places.place("home") is not None
             after = before.commanded(asked, has_home=has_home)
             if not asked.discard:
-                loss_in(before.forgets(asked, after), self.ledger, self.map).check(asked.name)
+                check_loss(asked.name, before.forgets(asked, after), self.ledger, self.map)
             plan = self._replan() if event.command == "replan" else None
         except FasacoError as error:
             return Answer(event.number, error), None
@@ -126,11 +128,11 @@ class OrderChanges:
         """Change to the state that follows a command at ``now`` [s]; return the path, if any."""
         before, update = self.orders.order_state, None
         if after.order is not before.order:
-            self.begin(after)
+            self.begin_order(after)
         elif after.keep_out != before.keep_out:
             update = self._change_keep_outs(after, now)
         elif after.paused and not before.paused:
-            self.route.pause()
+            self.route.requests.pause()
         elif before.paused and not (after.paused or after.errand):
             update = self._resume(after, now)
         self.orders.set_state(after)
@@ -154,30 +156,30 @@ class OrderChanges:
                 then, now = (in_zones(each, lattice.window, lattice.cell_m) for each in zones)
                 if (then != now).any():
                     what = f"the outline of {zone.name!r} has changed"
-                    self.route.want(what if zone.polygon else "other rooms are left out")
+                    self.route.requests.want(what if zone.polygon else "other rooms are left out")
                 is_other = zone.ranked != (state.current_zone or zone).ranked
                 if is_other and self.orders.scope.worth.choose_again():
-                    self.route.want(OTHERS_FIRST)
+                    self.route.requests.want(OTHERS_FIRST)
         self._followed = book.version, order
 
     def _change_keep_outs(self, order: OrderState, now: float) -> PathUpdate | None:
         """Apply changed keep-outs to the same order; stop a robot inside one of them."""
         before = self.map.area
         self._keep_out(order)
-        self.route.forget_failure()
+        self.route.requests.forget_failure()
         self.update_area()
-        self.orders.reach.note_keep_outs(before)
+        self.orders.reach.record_keep_outs(before)
         if not self.map.is_kept_out:
             return None
         # Near the zone's border the robot may go on, but along another path.
-        self.map.follow_path(None)
+        self.map.set_path_cell(None)
         return self.route.stop("robot is in a keep-out zone", now)
 
     def _resume(self, order: OrderState, now: float) -> PathUpdate | None:
-        self.route.forget_failure()
+        self.route.requests.forget_failure()
         if order.begun and order.stage is not Stage.RETURNING:
             return self.route.resume(now)
-        self.route.want("resumed")
+        self.route.requests.want("resumed")
         return None
 
     def _replan(self) -> int:
@@ -189,7 +191,7 @@ class OrderChanges:
         if self.map.area is None or self.map.robot_cell() is None:
             hint = "drive the robot to free floor, or check map, pose and robot radius"
             raise CommandError(f"nothing to plan: {self.map.why_misplaced()}", hint=hint)
-        if not self.orders.can_plan:
+        if not self.orders.part.can_plan:
             hint = "the floor in reach is covered: `mission start` covers it again"
             raise CommandError("nothing to plan: no reachable cell is left to cover", hint=hint)
-        return self.route.want_full("asked for")
+        return self.route.requests.want_full("asked for")

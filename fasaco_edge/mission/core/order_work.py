@@ -35,16 +35,16 @@ class OrderWork:
         stands = state is State.COVERING and not len(route.path.cells)
         self.share(cell, now, at_once=not stands)
         while orders.order_state.stage is not Stage.RETURNING:
-            if why := orders.why_standing(now):
+            if why := orders.part.why_standing(now):
                 return self._stand_by(why, update, now)
             try:
-                problem = orders.problem(cell, route.path_to_keep)
+                problem = orders.part.problem(cell, route.path_to_keep, orders.goal())
             except NothingToCover:
                 if ended := self._go_on_elsewhere(cell, update, now):
                     return ended
                 continue
-            request = route.request_plan(problem)
-            self.monitor.note_request(request.number)
+            request = route.requests.request_plan(problem)
+            self.monitor.record_request(request.number)
             state = State.COVERING if len(route.path.cells) else State.PLANNING
             return Doing(state, request.reason, update, request)
         return self._return_home(cell, update, now)
@@ -58,14 +58,14 @@ class OrderWork:
         route, orders, area = self.route, self.orders, self.map.area
         if area is not None and (why := self.way_out.why_shut_in(area)):
             return self.way_out.lead_out(why, update, now)
-        if reason := orders.explore(cell):
-            route.want(reason)
+        if reason := orders.part.explore(cell):
+            route.requests.want(reason)
             return None
-        if why := orders.why_looking(cell, now):
+        if why := orders.part.why_looking(cell, now):
             return self._stand_by(why, update, now)
         if self.line.left.open_missed():
             return None
-        if orders.pass_over_unreachable():
+        if orders.part.pass_over_unreachable():
             self.share(cell, now, at_once=True)
             return None
         return self._next_stage(cell, update, now)
@@ -77,10 +77,10 @@ class OrderWork:
         if name := orders.order_state.waits_for:
             return self.wait_for_room(name, update, now)
         if orders.is_waiting or orders.order_state.stage is Stage.OVER:
-            route.drop()
+            route.requests.want_none()
             return self.settle(update, now)
-        if reason := orders.begin(cell, now):
-            route.want(reason)
+        if reason := orders.begin_stage(cell, now):
+            route.requests.want(reason)
         return None
 
     def settle(self, update: PathUpdate | None, now: float) -> Doing:
@@ -96,7 +96,7 @@ class OrderWork:
         """Stand until a room has the name ``name``."""
         reason = f"waits for a room {name!r}: no room on the map has this name yet"
         update = self.route.stop(reason, now) or update
-        self.route.drop()
+        self.route.requests.want_none()
         return Doing(State.BLOCKED, reason, update)
 
     def share(self, cell: Cell, now: float, *, at_once: bool = False) -> str:
@@ -106,14 +106,13 @@ class OrderWork:
         return self.company.share(self.orders.cells.open_cells, cell, now, at_once=at_once)
 
     def _stand_by(self, reason: str, update: PathUpdate | None, now: float) -> Doing:
-        """Stand during an order, without a path."""
         return Doing(State.COVERING, reason, self.route.stop(reason, now) or update)
 
     def _return_home(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing:
         """Drive to where the order ends, or end it there."""
         route, area, home = self.route, self.map.area, self.orders.goal()
         assert area is not None
-        route.drop()
+        route.requests.want_none()
         self.monitor.clear_doubt()
         if home is None or cell == home:
             self.orders.advance(now)

@@ -19,6 +19,7 @@ from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.line.layer import LineLayer
 from fasaco_edge.mission.map.inputs import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.path.map_motion import MapMotion
 from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.path.trail_layer import TrailLayer
 from fasaco_edge.mission.rooms.room_cells import RoomCells
@@ -54,6 +55,7 @@ class Parts:
         route: the published path and the pending plan.
         line: the line over the path.
         trail: the trail from which ants start.
+        motion: what lay on the map before it moved.
         company: the other robots; ``giving_way``: which of them this robot waits for.
         charging: when to charge; ``dock``: whether the robot is in its dock.
         time_limit: when the order has to end.
@@ -72,6 +74,7 @@ class Parts:
     route: Route
     line: LineLayer
     trail: TrailLayer
+    motion: MapMotion
     company: Company
     giving_way: Waiting
     charging: Charging
@@ -109,6 +112,8 @@ def laid_parts(
     orders = Sequencer(config, map_state, ledger, company, room_price)
     route = Route(config.spare_share, map_state, orders)
     line = LineLayer(sweeping, map_state, ledger, orders, route)
+    trail = TrailLayer(config, map_state, route)
+    motion = MapMotion(ledger, orders, trail, route)
     return Parts(
         map=map_state,
         ledger=ledger,
@@ -116,7 +121,8 @@ def laid_parts(
         orders=orders,
         route=route,
         line=line,
-        trail=TrailLayer(config, map_state, route),
+        trail=trail,
+        motion=motion,
         company=company,
         giving_way=kind.waiting(config, map_state, orders, route, company),
         charging=Charging(config, map_state, orders, route, lasting.battery),
@@ -126,7 +132,8 @@ def laid_parts(
         blocked=BlockedFollower(),
         standing=Standing(map_state, route),
         changes=OrderChanges(
-            config, map_state, ledger, orders, route, line, lasting.rooms, is_alone=kind is ALONE
+            *(config, map_state, ledger, orders, route, line, motion, lasting.rooms),
+            is_alone=kind is ALONE,
         ),
         lasting=lasting,
         room_cells=room_cells,

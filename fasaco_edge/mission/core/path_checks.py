@@ -41,7 +41,7 @@ class PathChecks:
             if doubted and list(cell) in path.ahead[:2].tolist():
                 monitor.clear_doubt()  # the pose only flickered
             elif waited and now - monitor.doubt_since >= PATIENCE_S:
-                route.want(monitor.doubt)
+                route.requests.want(monitor.doubt)
             return
         last = tuple(path.cells[-1].tolist()) if len(path.cells) else None
         has_visited = last is not None and self._ledger.current.has_visited(last)
@@ -52,15 +52,15 @@ class PathChecks:
             self._line.left.open_missed()
             self._end_path(now)
         elif waited and (path.is_far(cell) or self._standing.is_beside_path):
-            route.want("robot left the path")
+            route.requests.want("robot left the path")
 
     def _end_path(self, now: float, why: str = "") -> None:
         if self._orders.scope.is_first_done:
-            self._route.want("what comes first is done: the rest")
-        elif self._orders.note_path_end(why):
+            self._route.requests.want("what comes first is done: the rest")
+        elif self._orders.part.record_path_end(why):
             self._orders.advance(now)
         else:
-            self._route.want("cells left over")
+            self._route.requests.want("cells left over")
 
     def _drives_in_vain(self, now: float) -> bool:
         """Return whether poses are too far apart to cover new cells, so that no path would end."""
@@ -73,7 +73,7 @@ class PathChecks:
             and now - max(self._progress[1], self._route.begun_at) < VAIN_S
         ):
             return False
-        before, covered = self._progress, self._orders.done
+        before, covered = self._progress, self._orders.part.done
         self._progress = covered, now
         return before is not None and covered <= before[0]
 
@@ -92,12 +92,12 @@ class PathChecks:
             return
         self._worth_at = now
         if not self._line.left.is_worth_driving and not self._orders.scope.is_any_planned_left:
-            route.want("others have swept what lay ahead")
+            route.requests.want("others have swept what lay ahead")
 
     def check_room(self, cell: Cell) -> None:
         """Want a new plan if new rooms show that the robot has another room to finish first."""
         if not self._has_plan_due and self._orders.scope.is_in_other_room(cell):
-            self._route.want("rooms have changed: another one first")
+            self._route.requests.want("rooms have changed: another one first")
 
     def check_time(self, now: float) -> None:
         """Want a new plan with the most worthwhile floor first if time or battery do not suffice
@@ -110,9 +110,8 @@ class PathChecks:
         figures = self._line.ahead()
         ahead_s = orders.scope.walk_s(route.path.ahead) if figures is None else figures.seconds
         if ahead_s > may_work_s and orders.scope.puts_other_first(ahead_s):
-            route.want("not all can be done in time: the most worthwhile floor first")
+            route.requests.want("not all can be done in time: the most worthwhile floor first")
 
     @property
     def _has_plan_due(self) -> bool:
-        """Whether a plan is being made, or wanted."""
-        return self._route.pending is not None or bool(self._route.wanted)
+        return self._route.requests.pending is not None or bool(self._route.requests.wanted)

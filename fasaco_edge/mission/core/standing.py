@@ -52,20 +52,20 @@ class Standing:
         # The robot's yaw when it last turned [rad], and the time of that turn.
         self._yaw, self._turned_at = 0.0, -math.inf
 
-    def succeed(self, before: Standing) -> None:
+    def continue_from(self, before: Standing) -> None:
         """Take over a predecessor's count of the time and of the tries."""
         self._place, self._since, self._tries = before._place, before._since, before._tries
         self._had_path = before._had_path
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Forget the place: the robot rests, and must not drive."""
         self._place = math.inf, math.inf
 
-    def look(self, cell: Cell, now: float) -> None:
-        """Note the robot's cell and place; to be called in each step."""
+    def update(self, cell: Cell, now: float) -> None:
+        """Update the robot's cell and place; to be called in each step."""
         self._now = now
-        self._note_place()
-        self._note_yaw()
+        self._update_place()
+        self._update_yaw()
         if cell != self._cell:
             self._cell, self._entered_at = cell, now
 
@@ -106,8 +106,8 @@ class Standing:
         """Whether the robot has stood in one place for long, with a path to drive."""
         return self._has_path and self._in_place_s() >= STANDING_S
 
-    def note_again(self) -> None:
-        """Note that the robot gets its path again."""
+    def record_try(self) -> None:
+        """Record that the robot gets its path again."""
         assert self._map.pose is not None
         self._tries += 1
         self._since = self._now, self._map.pose.stamp_ns
@@ -124,11 +124,10 @@ class Standing:
 
     @property
     def _has_path(self) -> bool:
-        """Whether there is a path to drive."""
         return len(self._route.path.ahead) > 1
 
-    def _note_place(self) -> None:
-        """Note the robot's place, and whether it has a path to drive."""
+    def _update_place(self) -> None:
+        """Update the robot's place, and whether it has a path to drive."""
         assert self._map.pose is not None
         stamped = self._map.pose
         here, at = (stamped.pose.x, stamped.pose.y), (self._now, stamped.stamp_ns)
@@ -142,8 +141,7 @@ class Standing:
             self._since = since + begun_at - had_at, since_ns + at[1] - had_ns
         self._had_path = at
 
-    def _note_yaw(self) -> None:
-        """Note whether the robot turns."""
+    def _update_yaw(self) -> None:
         assert self._map.pose is not None
         yaw = self._map.pose.pose.yaw
         if abs(math.remainder(yaw - self._yaw, math.tau)) > TURNS_RAD:
@@ -172,7 +170,9 @@ class BlockedFollower:
         self._newest: FollowerBlocked | None = None
         self._at = self._asked_at = -math.inf
 
-    def take(self, event: FollowerBlocked, map_state: MapState, revision: int, now: float) -> bool:
+    def receive(
+        self, event: FollowerBlocked, map_state: MapState, revision: int, now: float
+    ) -> bool:
         """Take in a report, and close floor with a reported obstacle for a while; return whether
         that changes the map.
 

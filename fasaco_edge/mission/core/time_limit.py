@@ -24,27 +24,27 @@ MOST_SPEED_UP = 30.0
 
 
 class Lapse:
-    """Time since a look: the longer of the times by our clock and by the robot's stamps.
+    """Time since a start: the longer of the times by our clock and by the robot's stamps.
 
     Simulated time may run ``MOST_SPEED_UP`` times as fast as ours, and stamps may stand still.
     """
 
     def __init__(self, map_state: MapState) -> None:
         self._map = map_state
-        # Our time [s] and the pose's stamp [ns] at the last look, 0 without a pose; None before it.
+        # Our time [s] and the pose's stamp [ns] at the start, 0 without a pose; None before it.
         self._since: tuple[float, int] | None = None
 
     @property
-    def has_begun(self) -> bool:
-        """Whether there was a look."""
+    def has_started(self) -> bool:
+        """Whether it was started."""
         return self._since is not None
 
-    def begin(self, now: float) -> None:
-        """Note a look at ``now`` [s]."""
+    def start(self, now: float) -> None:
+        """Start at ``now`` [s]."""
         self._since = now, self._stamp_ns
 
     def seconds(self, now: float) -> float:
-        """Return the time since the last look; 0 before the first [s]."""
+        """Return the time since the last start; 0 before the first [s]."""
         if self._since is None:
             return 0.0
         at, stamp_ns = self._since
@@ -114,8 +114,8 @@ class TimeLimit:
         if not self.minutes or not state.has_begun or state.stage is Stage.OVER:
             self._looked = Lapse(self.map)
             return False
-        if not self._looked.has_begun or self._looked.seconds(now) >= LOOK_EVERY_S:
+        if not self._looked.has_started or self._looked.seconds(now) >= LOOK_EVERY_S:
             orders.spend(self._looked.seconds(now))
-            self._looked.begin(now)
+            self._looked.start(now)
             self._to_home_s = seconds_back("home", self.config, self.map, orders)
         return state.stage is not Stage.RETURNING and self.may_work_s(now) <= 0.0

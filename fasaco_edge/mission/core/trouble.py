@@ -62,7 +62,7 @@ class Troubles:
     """Finds the troubles of a mission.
 
     Attributes:
-        found: by the last ``look``, in the order of ``RULES``.
+        found: by the last ``update``, in the order of ``RULES``.
     """
 
     def __init__(self, parts: Parts) -> None:
@@ -80,23 +80,23 @@ class Troubles:
         """The limits after which troubles are reported."""
         return self.charging.config.policy
 
-    def succeed(self, before: Troubles) -> None:
+    def continue_from(self, before: Troubles) -> None:
         """Take over the findings and counts of a predecessor, so that no timeout starts again."""
         self.found = before.found
-        self.monitor.succeed(before.monitor)
-        self.charging.succeed(before.charging)
-        self.giving_way.succeed(before.giving_way)
-        self.standing.succeed(before.standing)
-        self._current.succeed(before._current)
-        self.offset.succeed(before.offset)
+        self.monitor.continue_from(before.monitor)
+        self.charging.continue_from(before.charging)
+        self.giving_way.continue_from(before.giving_way)
+        self.standing.continue_from(before.standing)
+        self._current.continue_from(before._current)
+        self.offset.continue_from(before.offset)
 
-    def look(self, state: State, now: float) -> None:
+    def update(self, state: State, now: float) -> None:
         """Find the troubles at ``now`` [s] in a state; to be called once in each step."""
-        self.monitor.begin(now)
+        self.monitor.start_timeouts(now)
         is_docked = state is State.CHARGING or (
             state.is_at_rest and self.dock.holds(is_charging=self._current.is_docked)
         )
-        self._current.look(now, is_docked=is_docked)
+        self._current.update(now, is_docked=is_docked)
         before = {trouble.code: trouble.since for trouble in self.found}
         self.found = tuple(
             Trouble(rule.code, why, rule.do, before.get(rule.code, now))

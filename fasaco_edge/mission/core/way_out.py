@@ -60,21 +60,21 @@ class WayOut:
         self._since = -math.inf
         self._tries = 0
 
-    def note_pose(self, pose: Pose2D) -> None:
-        """Note where the robot is."""
+    def receive_pose(self, pose: Pose2D) -> None:
+        """Add the robot's place to the track."""
         here = pose.x, pose.y
         if not self._track or math.dist(here, self._track[-1]) >= SPACING_M:
             self._track.append(here)
 
-    def succeed(self, before: WayOut) -> None:
+    def continue_from(self, before: WayOut) -> None:
         """Continue with the track of a predecessor."""
         self._track = before._track
 
-    def end(self) -> None:
-        """Note that nothing shuts the robot in."""
+    def forget_why(self) -> None:
+        """Begin a step: nothing shuts the robot in so far."""
         self.why = ""
 
-    def begin_anew(self) -> None:
+    def forget_track(self) -> None:
         """Forget the track: the robot was carried, or drove it on another map."""
         self._track.clear()
 

@@ -92,7 +92,7 @@ class DriveMeter:
         self._seen.clear()
         self._measured_until = -math.inf
 
-    def note(self, stamped: StampedPose) -> None:
+    def receive_pose(self, stamped: StampedPose) -> None:
         """Take in the next pose; a pose that is hardly newer is ignored."""
         at, pose, seen = stamped.stamp_ns * 1e-9, stamped.pose, self._seen
         if seen and 0.0 <= at - seen[-1].at < LEAST_S:
@@ -159,7 +159,6 @@ def _before(seen: list[_Seen], index: int, seconds: float) -> int | None:
 
 
 def _is_even(seen: list[_Seen]) -> bool:
-    """Return whether poses fit straight driving at constant speed."""
     a, b = seen[0], seen[-1]
     most_m, took_s = UNEVEN * _apart(a, b), b.at - a.at
     return all(
@@ -225,7 +224,7 @@ class DrivenPoses:
         took_s = (after.stamp_ns - before.stamp_ns) * 1e-9
         return SPEED_MARGIN * self._speed_m_s * took_s if 0.0 < took_s <= LONGEST_S else 0.0
 
-    def take(self, stamped: StampedPose) -> list[Driven]:
+    def receive_pose(self, stamped: StampedPose) -> list[Driven]:
         """Take in the next pose; return those that count now."""
         sure, held = self._sure, self._held
         farthest_m = 0.0 if sure is None else self.farthest_m(sure, stamped)
@@ -236,7 +235,7 @@ class DrivenPoses:
             self._held = stamped
             return []
         self._sure, self._held = held, None
-        return [Driven(held.pose, is_joined=False), *self.take(stamped)]
+        return [Driven(held.pose, is_joined=False), *self.receive_pose(stamped)]
 
     def _is_near(self, before: StampedPose, after: StampedPose, farthest_m: float) -> bool:
         one, other = before.pose, after.pose

@@ -208,7 +208,6 @@ def certain_floor(
 
 
 def _stacked(tiles: Tiles) -> FloorTiles:
-    """Return tiles as arrays."""
     places = sorted(tiles)
     bits = np.zeros((len(tiles), FLOOR_TILE, ROW_BYTES), np.uint8)
     for number, place in enumerate(places):

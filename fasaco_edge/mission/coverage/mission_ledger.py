@@ -72,8 +72,8 @@ class PassedCells:
         """Forget all of them."""
         self._cells.clear()
 
-    def note(self, cell: Cell) -> None:
-        """Note that the robot has passed a cell."""
+    def add(self, cell: Cell) -> None:
+        """Add a cell that the robot has passed."""
         self._cells[cell] = None
         if len(self._cells) > MOST_PASSED:
             self.drop(next(iter(self._cells)))
@@ -136,8 +136,6 @@ class MissionLedger:
         self._opened_again: Counter[Cell] = Counter()
         # The ledger from before a restart; None once a map has confirmed it.
         self._resumed: LedgerSnapshot | None = None
-        # The robot's last pose before the map moved.
-        self._pose_before_motion: Pose2D | None = None
 
     @property
     def version(self) -> tuple[int, int, int]:
@@ -149,8 +147,8 @@ class MissionLedger:
         own = self.current.visits(window)
         return np.maximum(own, self.shared.swept(window)) if self.shared.version else own
 
-    def note_restart(self, before: LedgerSnapshot) -> None:
-        """Note the coverage from before a restart, in present cells."""
+    def record_restart(self, before: LedgerSnapshot) -> None:
+        """Record the coverage from before a restart, in present cells."""
         self.before = before
 
     def not_since(self, window: Window) -> NDArray[np.bool_]:
@@ -174,12 +172,12 @@ class MissionLedger:
         """Whether no further map can contradict it."""
         return self._resumed is None
 
-    def resume(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
+    def restore(self, before: LedgerSnapshot, *, is_confirmed: bool = False) -> None:
         """Continue the ledger from before a restart; ``is_confirmed``: see the property."""
         self._resumed = None if is_confirmed else before
         self.current = CoverageLedger.restored(before)
         self.floor = SweptFloor.restored(before.floor, self._tool_m, self._sight)
-        self.shared.resume(before.fleet)
+        self.shared.restore(before.fleet)
         if cells := before.cells:
             self.first_plan_reason = f"first plan, {cells} cells were covered before"
 
@@ -207,10 +205,6 @@ class MissionLedger:
             return _full(MOST_FLOOR_TILES, pixels, DROPPED_FLOOR_TILES)
         return None
 
-    def credit(self, cell: Cell) -> None:
-        """Count a visit to a cell: the robot missed its point, but its floor is swept."""
-        self.current.visit(cell)
-
     def may_open_again(self, cell: Cell) -> bool:
         """Return whether a cell may be opened once more."""
         return self._opened_again[cell] < MOST_AGAIN
@@ -221,29 +215,20 @@ class MissionLedger:
             self.current.open_again(cell)
         self._opened_again.update(cells)
         self.reopened += 1
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
 
     def break_track(self) -> None:
         """Note that the robot's track to its next pose is unknown."""
         self.current.break_track()
         self.floor.break_track()
 
-    def note_map_motion(self, pose: Pose2D) -> None:
-        """Note that the map has moved under a robot at ``pose``; the next pose shows how."""
-        self._pose_before_motion = pose
+    def lift_tool(self) -> None:
+        """Note that the map has moved: track and cells under the tool are unknown."""
         self.current.lift_tool()
         self.floor.break_track()
 
-    def map_motion(self, pose: Pose2D) -> Motion | None:
-        """Return the map's motion by the first pose after it; None if no motion was noted."""
-        start = self._pose_before_motion
-        return None if start is None else Motion(start, pose)
-
-    def forget_uncertain(self, pose: Pose2D) -> int:
+    def forget_uncertain(self, motion: Motion) -> int:
         """Forget cells that a motion of the map makes uncertain; return their number."""
-        motion, self._pose_before_motion = self.map_motion(pose), None
-        if motion is None or motion.is_still:
-            return 0
         self._forget_passed()
         before = self.snapshot()
         cells, floor = uncertain_cells(before, motion), certain_floor(before.floor, motion)
@@ -251,7 +236,7 @@ class MissionLedger:
         self.floor.leave(floor)
         # Cells of other robots become uncertain, too: each robot records on a map of its own.
         self.shared.disregard(uncertain_cells(self.shared.snapshot(self._cell_m), motion))
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
         return before.cells - self.current.snapshot().cells
 
     def forget(self, inside: Callable[[Window, float], NDArray[np.bool_]]) -> None:
@@ -272,7 +257,7 @@ class MissionLedger:
         self.current.forget(cells_inside)
         self.floor.forget(lambda window: inside(window, PIXEL_M))
         self.shared.disregard(cells_inside)
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
 
     def move_to(self, frame: str) -> LedgerMismatchError | None:
         """Move to ``frame``; start over, and return the fault, if cells lie in another frame."""
@@ -293,7 +278,7 @@ class MissionLedger:
     def reset(self, frame: str) -> None:
         """Forget everything; ``frame``: frame of the poses, "" if none is active."""
         self._replace(frame)
-        self.shared.begin_anew()
+        self.shared.reset()
         self.shared.disregard(lambda rows, _: np.ones(len(rows), np.bool_))
         self.first_plan_reason = "first plan"
 
@@ -328,15 +313,14 @@ class MissionLedger:
         )
 
     def _forget_passed(self) -> None:
-        """Forget passed cells, as their floor has to be swept again."""
         self.passed.clear()
         self._opened_again.clear()
 
     def _replace(self, frame: str) -> None:
         self.current, self.floor = self._nothing(frame)
-        self._resumed = self._pose_before_motion = self.before = None
+        self._resumed = self.before = None
         self._forget_passed()
-        self.shared.note_forgotten()
+        self.shared.record_forgotten()
 
     def _begun_anew(self, why: str) -> LedgerMismatchError:
         misfit = LedgerMismatchError(why)

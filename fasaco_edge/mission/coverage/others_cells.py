@@ -34,11 +34,11 @@ class OthersCells:
         """Return which cells of ``window`` others have swept, bool (rows, cols), read-only."""
         return np.zeros((window.rows, window.cols), np.bool_)
 
-    def begin(self, epoch: int) -> None:
+    def begin_epoch(self, epoch: int) -> None:
         """Start an epoch with a number new to this robot's ledgers; a restored epoch stays."""
 
-    def note_forgotten(self) -> None:
-        """Note that this robot has forgotten some of its own cells."""
+    def record_forgotten(self) -> None:
+        """Record that this robot has forgotten some of its own cells."""
         self._kept = b""
 
     def disregard(self, inside: Inside) -> None:
@@ -55,7 +55,7 @@ class OthersCells:
         """Note that the map in a frame shows another building: cells of others lie elsewhere."""
         self._kept = b""
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Accept the next map as one that others share."""
         self._kept = b""
 
@@ -67,6 +67,6 @@ class OthersCells:
         """Return everything as bytes, to be stored with the ledger; b"" for nothing."""
         return self._kept
 
-    def resume(self, kept: bytes) -> None:
+    def restore(self, kept: bytes) -> None:
         """Restore the bytes of ``encode``."""
         self._kept = kept

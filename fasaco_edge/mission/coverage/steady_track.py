@@ -43,7 +43,7 @@ class PoseScatter:
         self._before: tuple[Pose2D, ...] = ()
         self._off_m: deque[float] = deque(maxlen=POSES)
 
-    def note(self, pose: Pose2D) -> None:
+    def receive_pose(self, pose: Pose2D) -> None:
         """Take in the next pose."""
         if len(self._before) == 2 and not self._is_corner(*self._before, pose):
             first, middle = self._before
@@ -114,12 +114,12 @@ class SteadyTrack:
         self._farthest_m: list[float] = []
         self._done = 0
 
-    def add(self, pose: Pose2D, farthest_m: float = 0.0) -> list[Position]:
+    def receive_pose(self, pose: Pose2D, farthest_m: float = 0.0) -> list[Position]:
         """Take in the next pose; return the places that are final now.
 
         ``farthest_m``: longest possible drive since the previous pose; 0 if unknown [m].
         """
-        self._scatter.note(pose)
+        self._scatter.receive_pose(pose)
         self._poses.append(pose)
         self._farthest_m.append(farthest_m)
         places = self._places(len(self._poses) - self._beside)

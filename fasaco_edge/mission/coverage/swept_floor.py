@@ -162,10 +162,10 @@ class SweptFloor:
         else:
             self._end_track()
         before = self._around_ahead
-        self._keep(self._track.add(pose, farthest_m))
+        self._keep(self._track.receive_pose(pose, farthest_m))
         self._begin_ahead()
         # The preliminary sweeps have changed, too.
-        self._note(Window.around(before, self._around_ahead))
+        self._record_change(Window.around(before, self._around_ahead))
 
     def changed_since(self, changes: int) -> Window | None:
         """Return the window that may have changed since change number ``changes``; None for none.
@@ -215,9 +215,9 @@ class SweptFloor:
                 self._tiles.drop(place)
         if self.pixels != before:
             self.forgotten += 1
-            self._note(ANYWHERE)
+            self._record_change(ANYWHERE)
         if self._last is not None:
-            self._keep(self._track.add(self._last))
+            self._keep(self._track.receive_pose(self._last))
             self._begin_ahead()
 
     def _end_track(self) -> None:
@@ -226,9 +226,9 @@ class SweptFloor:
         self._keep(self._track.end())
         self._kept_to = None
         self._begin_ahead()
-        self._note(before)
+        self._record_change(before)
 
-    def _note(self, window: Window | None) -> None:
+    def _record_change(self, window: Window | None) -> None:
         if window is not None:
             self.changes += 1
             self._news.append((self.changes, window))
@@ -255,7 +255,6 @@ class SweptFloor:
         self._around_ahead = Window(rows[0], cols[0], rows[1], cols[1])
 
     def _swept_ahead(self) -> tuple[Window, Mask]:
-        """Return the preliminary sweeps and their window."""
         if self._ahead is None:
             places = self._track.ahead()
             segments = self._segments_ahead(places)
@@ -307,7 +306,7 @@ class SweptFloor:
                 self.pixels += count
                 has_changed = True
         if has_changed:
-            self._note(window)
+            self._record_change(window)
 
     def _make_room(self, place: TileKey) -> None:
         """Drop the tiles farthest from ``place`` if there is no room for another."""
@@ -315,7 +314,7 @@ class SweptFloor:
             self.pixels -= sum(map(count_bits, dropped))
             self.dropped += len(dropped)
             self.forgotten += 1
-            self._note(ANYWHERE)
+            self._record_change(ANYWHERE)
 
 
 def _apart(one: Pose2D, other: Pose2D) -> float:

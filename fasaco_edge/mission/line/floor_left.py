@@ -178,7 +178,8 @@ class FloorLeft:
         is_asked = window.values_at(asked, np.array(unseen, np.int32), 0).tolist()
         for cell, counts in zip(unseen, is_asked, strict=True):
             if counts and tally.missed_m2(floor.box_of(cell)) < LEAST_LEFT_M2:
-                self._ledger.credit(cell)
+                # The robot missed its point, but its floor is swept.
+                covered.visit(cell)
 
     def _keep(self, passed: NDArray[np.int32]) -> None:
         """Keep the passed cells; drop cells once their floor is swept."""
@@ -186,7 +187,7 @@ class FloorLeft:
         assert tally is not None
         assert floor is not None
         for row, col in passed.tolist():
-            kept.note((row, col))
+            kept.add((row, col))
         for cell in kept.next(CHECKED_CELLS) if len(passed) else ():
             if tally.open_in_m2(floor.box_of(cell, RIM_M)) < self._worth_m2:
                 kept.drop(cell)

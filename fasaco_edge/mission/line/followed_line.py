@@ -111,7 +111,6 @@ class FollowedLine:
         self._place.here = carried(self._place.here[None])[0]
 
     def _move(self, shape: tuple[int, int], by: tuple[int, int]) -> None:
-        """Move to a raster of another shape, (rows, cols), and shift."""
         points, before = self._whole.points, self.tally.shape
         self._whole = self._whole.moved(by)
         moved = self._whole.points
@@ -238,10 +237,9 @@ class FollowedLine:
         return begin + next(seen, nearest[0])
 
     def _stands(self, begin: int, end: int) -> Points:
-        """Return the stands of the walk's cells from ``begin`` to ``end``, at least one."""
         return self._floor.stands.stands_of(self._walk[begin : max(end, begin + 1)])
 
-    def note(self, first: int, end: int, state: int) -> None:
+    def mark(self, first: int, end: int, state: int) -> None:
         """Mark points as MOVED or POLISHED."""
         self._whole = self._whole.marked(first, end, state)
 

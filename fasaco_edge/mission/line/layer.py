@@ -76,7 +76,7 @@ class LineLayer:
         # The floor at the last update, and its revision.
         self._seen: tuple[FloorMap | None, int] = None, 0
 
-    def note_map(self) -> None:
+    def receive_map(self) -> None:
         """Follow the newest map; to be called with each map."""
         floor = self._map.floor
         if floor is None or (floor is self._seen[0] and floor.revision == self._seen[1]):
@@ -96,8 +96,8 @@ class LineLayer:
         )
         self._touched = Window.around(touched, floor.touched)
 
-    def note_pose(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
-        """Note the robot's pose, and find its place on the line.
+    def receive_pose(self, pose: Pose2D, farthest_m: float = 0.0) -> None:
+        """Take in the robot's pose, and find its place on the line.
 
         ``farthest_m``: the farthest it may have driven since the previous pose; 0 if unknown [m].
         """
@@ -109,19 +109,19 @@ class LineLayer:
             self.left.update()
         before = self._route.held.index
         ahead.drive(pose, farthest_m)
-        self.offset.note((pose.x, pose.y), ahead.beside)
-        self._route.follow_line(ahead.cell)
+        self.offset.record((pose.x, pose.y), ahead.beside)
+        self._route.record_index(ahead.cell)
         path = self._route.held
         self.left.pass_cells(path.cells[before : path.index])
         is_on_it = ahead.is_followed and len(path.cells) > 0
         row, col = path.cells[path.index].tolist() if is_on_it else (0, 0)
-        self._map.follow_path((row, col) if is_on_it else None)
+        self._map.set_path_cell((row, col) if is_on_it else None)
 
     def finish(self, update: PathUpdate | None, now: float) -> PathUpdate | None:
         """Return the update to publish after a step, with or without a new path."""
         ahead, stamped = self._ahead, self._map.pose
         if ahead is None or stamped is None or self._polisher is None or self._map.floor is None:
-            self._publication.forget()
+            self._publication.reset()
             return update
         touched, self._touched = self._touched, None
         self._unchecked = Window.around(self._unchecked, touched)
@@ -151,7 +151,7 @@ class LineLayer:
             self._is_settled = not self._orders.cells.is_exploring
         # Urgent updates are published unpolished. In a step with a map or a plan only a change that
         # is due is polished; other polishing comes with the next pose.
-        held = self._publication.look(ahead)
+        held = self._publication.compare(ahead)
         may_change = (update is None or update.may_wait) and not reason and not is_further
         is_new = update is not None or touched is not None
         may_change = may_change and not (is_new and (ahead.is_cut or not self._publication.is_near))
@@ -159,7 +159,7 @@ class LineLayer:
         if may_change and is_driven and not self._is_way:
             held = max(held, ahead.line.first_below(CURVED)) if self._curver else held
             self._polisher.polish(ahead, self._map.floor, held, is_settled=self._is_settled)
-            self._publication.look(ahead)
+            self._publication.compare(ahead)
         if self._curver is None:
             return self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
         reason = self._curve(self._curver, ahead, self._map.floor, stamped.pose) or reason
@@ -172,7 +172,7 @@ class LineLayer:
         """Make the next curve if it is due; return why to publish a way at once, or ""."""
         if not curver.curve(ahead, floor, pose):
             return ""
-        self._publication.look(ahead)
+        self._publication.compare(ahead)
         return "curve further ahead" if self._is_way else ""
 
     @property

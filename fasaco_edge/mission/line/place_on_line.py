@@ -179,12 +179,12 @@ class Offset:
         self._last: tuple[Point, float] | None = None
         self._straight_m = self._since_m = 0.0
 
-    def succeed(self, before: Offset) -> None:
+    def continue_from(self, before: Offset) -> None:
         """Take over the samples of a predecessor."""
         self._left_m = before._left_m
 
-    def note(self, at: Point, beside: Beside | None) -> None:
-        """Note a pose at x, y [m] beside its line; None for no line there."""
+    def record(self, at: Point, beside: Beside | None) -> None:
+        """Record a pose at x, y [m] beside its line; None for no line there."""
         before, self._last = self._last, (at, beside.heading) if beside else None
         if beside is None or before is None:
             self._straight_m = 0.0

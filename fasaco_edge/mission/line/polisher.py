@@ -79,7 +79,7 @@ class Polisher:
             end = self._polish(ahead, floor, first, last, lengths, NO_DETOURS)
             # The last point of the line is fixed.
             end += end >= len(ahead.line) - 1
-            ahead.note(min(begin, first), max(end, begin + 1), MOVED)
+            ahead.mark(min(begin, first), max(end, begin + 1), MOVED)
             is_all = ahead.line.first_below(MOVED) == len(ahead.line)
             if is_all or begins_m > NEAR_M:
                 return
@@ -91,7 +91,7 @@ class Polisher:
         first, last = _piece(lengths, begin, PIECE_M, held)
         farthest = FARTHEST_M / ahead.tally.unit_m
         end = self._polish(ahead, floor, first, last, lengths, farthest)
-        ahead.note(min(begin, first), max(end, begin + 1), POLISHED)
+        ahead.mark(min(begin, first), max(end, begin + 1), POLISHED)
 
     def _anneal(
         self,
@@ -122,7 +122,6 @@ class Polisher:
         self._put(ahead, first, last, piece, line)
 
     def _on(self, ahead: LineAhead, floor: FloorMap) -> tuple[kernel.Floor, kernel.Price]:
-        """Return floor and prices for the kernels."""
         unit = ahead.tally.unit_m
         radius, tool = floor.discs.radius_m / unit, floor.discs.tool_m / 2 / unit
         clear = floor.discs.clear_m / unit
@@ -149,7 +148,6 @@ class Polisher:
         lengths: NDArray[np.float64],
         farthest: float,
     ) -> int:
-        """Polish from one point to another; return the new index of the last one."""
         if last - first < 2:
             return last
         piece = ahead.line.part(first, last + 1)

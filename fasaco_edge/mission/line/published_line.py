@@ -55,7 +55,7 @@ class PublishedLine:
         self._common, self.differs_m = 0, 0.0
         self._due_since = math.inf
 
-    def look(self, xy: Points) -> None:
+    def compare(self, xy: Points) -> None:
         """Compare the line from the robot on, float64 (n, 2): x, y [m]; its first
         ``COMPARED_POINTS`` points suffice."""
         ahead, known = xy[1:COMPARED_POINTS], self._xy[self._next :]
@@ -107,22 +107,21 @@ class PublishedLine:
         return self.differs_m <= self._near_m and not leads_on(self._near())
 
     def _near(self) -> Points:
-        """Return the points of the next metre of the published line."""
         rest = self._xy[self._next :][:COMPARED_POINTS]
         ways = np.hypot(*np.diff(rest, axis=0).T) if len(rest) > 1 else np.empty(0)
         return rest[: int(np.searchsorted(np.cumsum(ways), self._near_m)) + 2]
 
-    def take(self, xy: Points, polished: int) -> None:
-        """Note that a line is published, and the number of its polished points."""
+    def record_published(self, xy: Points, polished: int) -> None:
+        """Record a line as published, with the number of its polished points."""
         self._xy, self._next, self._due_since = xy, 1, math.inf
         ways = np.hypot(*np.diff(xy[:COMPARED_POINTS], axis=0).T) if len(xy) > 1 else np.empty(0)
         held = int(np.searchsorted(np.cumsum(ways), HELD_M)) + 1
         self._last_held = min(held, polished - 1)
         self._common, self.differs_m = max(len(xy) - 1, 0), math.inf
 
-    def forget(self) -> None:
-        """Note that the robot has no line, or another one."""
-        self.take(NONE, 0)
+    def reset(self) -> None:
+        """Forget the line: the robot has none, or another one."""
+        self.record_published(NONE, 0)
 
 
 def _are_same(points: Points, others: Points) -> NDArray[np.bool_]:
@@ -151,19 +150,19 @@ class Publication:
         # Where the robot was last seen to move, x, y [m], and until when [s].
         self._at, self._moved_at = (math.inf, math.inf), -math.inf
 
-    def look(self, ahead: LineAhead) -> int:
+    def compare(self, ahead: LineAhead) -> int:
         """Compare the line with the published one; return how many of its points are held."""
-        self._line.look(ahead.next_xy(COMPARED_POINTS))
+        self._line.compare(ahead.next_xy(COMPARED_POINTS))
         return self._line.held
 
     @property
     def is_near(self) -> bool:
-        """Whether the robot is near what has changed, as of the last look."""
+        """Whether the robot is near what has changed, as of the last comparison."""
         return self._line.is_near
 
-    def forget(self) -> None:
-        """Note that the robot has no line, or another one."""
-        self._line.forget()
+    def reset(self) -> None:
+        """Forget the line: the robot has none, or another one."""
+        self._line.reset()
 
     def finish(
         self, ahead: LineAhead, update: PathUpdate | None, reason: str, now: float, *, is_way: bool
@@ -171,7 +170,7 @@ class Publication:
         """Return the update to publish now, with its line; None if there is none, or if it waits.
 
         Args:
-            ahead: the line, as at the last look.
+            ahead: the line, as at the last comparison.
             update: the new path, if there is one.
             reason: why the line changes; "" if it does not, or is polished.
             now: [s].
@@ -199,13 +198,13 @@ class Publication:
                 update = replace(waiting, revision=update.revision, cells=update.cells)
         self._waiting, self._why = None, ""
         if update.xy is not None:
-            self.forget()
+            self.reset()
             return update  # a way out, along no cells
         if not len(update.cells):
-            self.forget()
+            self.reset()
             return replace(update, xy=NONE)
         polished = ahead.line.first_below(POLISHED)
-        self._line.take(ahead.next_xy(len(ahead.line) + 1), polished)
+        self._line.record_published(ahead.next_xy(len(ahead.line) + 1), polished)
         return replace(update, xy=ahead.xy())
 
     def _stands(self, ahead: LineAhead, now: float) -> bool:
@@ -218,6 +217,8 @@ class Publication:
     def _is_settled(self, ahead: LineAhead) -> bool:
         """Whether neither a plan nor polish is under way that changes the next metres."""
         route = self._route
-        is_planned = not route.wanted and (route.pending is None or route.is_improving)
+        is_planned = not route.requests.wanted and (
+            route.requests.pending is None or route.requests.is_improving
+        )
         rough, lengths = ahead.line.first_below(POLISHED), ahead.lengths(HELD_M)
         return is_planned and (rough >= len(lengths) - 1 or float(lengths[rough]) > HELD_M)

@@ -207,7 +207,6 @@ class SweepTally:
 
 
 def _count_causes(state: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """Return the number of pixels with each cause, int64 (4,)."""
     causes = state & np.uint8(CAUSE)
     return np.array(
         [np.count_nonzero(causes == cause << CAUSE_SHIFT) for cause in (0, *OUT_OF_REACH)]

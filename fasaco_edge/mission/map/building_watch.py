@@ -133,7 +133,7 @@ class BuildingWatch:
         # If the newest map of the same building has changed, until the next pose: the agreement of
         # the map, and the pose at that time.
         self._shifted: tuple[Agreement, Pose2D] | None = None
-        # Whether a loop closure was found since the last ``take_closure``.
+        # Whether a loop closure was found since the last ``pop_closure``.
         self._has_closed = False
         # The last jump of the pose, and its time.
         self._jump: tuple[Motion, float] | None = None
@@ -143,28 +143,28 @@ class BuildingWatch:
         """Whether the newest map shows another building, judged by the poses received."""
         return self._foreign is not None
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Take the next map as the first one."""
         self.why, self._reference, self._newest = "", None, None
         self._foreign = self._jump = self._shifted = None
         self._has_closed = self._is_blind = False
 
-    def accept(self, now: float) -> None:
+    def accept_building(self, now: float) -> None:
         """Accept the newest map's building as the robot's."""
         self._changes = 1 + (self._changes if now - self._changed_at < SOON_S else 0)
         self._changed_at = now
         self._end(now)
         self.why = ""
 
-    def note_jump(self, start: Pose2D, end: Pose2D, now: float) -> None:
-        """Note a jump of the pose: a map that has moved with it may follow."""
+    def record_jump(self, start: Pose2D, end: Pose2D, now: float) -> None:
+        """Record a jump of the pose: a map that has moved with it may follow."""
         self._jump = Motion(start, end), now
 
-    def note_no_floor(self) -> None:
-        """Note a map without floor: it shows no building, and its time does not count."""
+    def receive_blank_map(self) -> None:
+        """Take in a map without floor: it shows no building, and its time does not count."""
         self._is_blind = True
 
-    def note_map(
+    def receive_map(
         self,
         lattice: CoverageLattice,
         pose: Pose2D | None,
@@ -207,8 +207,8 @@ class BuildingWatch:
             self._foreign = now, seen, pose
         return pose
 
-    def note_pose(self, pose: Pose2D, now: float) -> bool:
-        """Note a pose; return whether it explains the newest map, perhaps by a loop closure."""
+    def receive_pose(self, pose: Pose2D, now: float) -> bool:
+        """Take in a pose; return whether it explains the newest map, perhaps by a loop closure."""
         shifted, self._shifted = self._shifted, None
         if self._foreign is not None:
             _, seen, before = self._foreign
@@ -222,12 +222,12 @@ class BuildingWatch:
         self.why, self._has_closed = "", True
         return True
 
-    def take_closure(self) -> bool:
+    def pop_closure(self) -> bool:
         """Return whether a loop closure has been found since the last call."""
         has_closed, self._has_closed = self._has_closed, False
         return has_closed
 
-    def look(self, now: float) -> bool:
+    def update(self, now: float) -> bool:
         """Update ``why``; return whether the map has shown another building for long enough."""
         if self._is_blind:
             return False
@@ -267,7 +267,6 @@ class BuildingWatch:
             self._reference, self._reference_at = lattice, now
 
     def _end(self, now: float) -> None:
-        """Take the newest map as the reference."""
         self._reference, self._reference_at, self._agreed_at = self._newest, now, now
         self._foreign = self._jump = self._shifted = None
 

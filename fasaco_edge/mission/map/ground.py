@@ -43,7 +43,7 @@ class MissionGround:
         self._keep_out: tuple[Polygon, ...] = ()
         self.plain: CoverageLattice | None = None
 
-    def begin(self, grid: OccupancyGrid) -> LatticeChange:
+    def begin_lattice(self, grid: OccupancyGrid) -> LatticeChange:
         """Take the first map; return its lattice of cell centres.
 
         Raises:
@@ -55,7 +55,7 @@ class MissionGround:
         self._set_free(change if free_floor is None else None, grid)
         return change
 
-    def follow(self, maps: Maps, within: Window | None) -> LatticeChange:
+    def follow_map(self, maps: Maps, within: Window | None) -> LatticeChange:
         """Update to the next map; return the change of the lattice of cell centres.
 
         Args:
@@ -63,7 +63,7 @@ class MissionGround:
             within: window of the pixels that may differ, see ``LatticeChange.between``.
 
         Raises:
-            MapTooLarge, MapTooFar: see ``begin``.
+            MapTooLarge, MapTooFar: see ``begin_lattice``.
         """
         assert self.plain is not None
         footprint, most = self._config.footprint, self._config.max_lattice_cells
@@ -81,7 +81,7 @@ class MissionGround:
             self.change, self.lattice = change, change.after
         return plain
 
-    def close(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
+    def keep_out(self, polygons: tuple[Polygon, ...], grid: OccupancyGrid | None) -> None:
         """Replace the keep-out polygons (x, y) [m]."""
         is_other, self._keep_out = polygons != self._keep_out, polygons
         if grid is not None and (is_other or self.free_floor is None):

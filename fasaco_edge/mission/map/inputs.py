@@ -51,8 +51,8 @@ class FrameSelector:
         """Make a frame active unconditionally."""
         self.active = frame
 
-    def note_map(self, grid: OccupancyGrid) -> bool:
-        """Note a map; return whether its frame becomes active."""
+    def receive_map(self, grid: OccupancyGrid) -> bool:
+        """Take in a map; return whether its frame becomes active."""
         self._maps.pop(grid.frame, None)
         self._maps[grid.frame] = grid
         self._limit(self._maps)
@@ -61,7 +61,9 @@ class FrameSelector:
         self.active, self._is_open = grid.frame, False
         return True
 
-    def note_patches(self, patches: Sequence[MapPatch]) -> tuple[list[MapPatch], list[FasacoError]]:
+    def receive_patches(
+        self, patches: Sequence[MapPatch]
+    ) -> tuple[list[MapPatch], list[FasacoError]]:
         """Apply updates to maps of frames that are not active.
 
         Returns:
@@ -77,8 +79,8 @@ class FrameSelector:
             faults += [*updated.faults, *(WrongFrame(wrong, hint=hint) for _ in updated.windows)]
         return [patch for patch in patches if patch.frame not in others], faults
 
-    def note_pose(self, stamped: StampedPose, now: float) -> bool:
-        """Note a pose at ``now`` [s]; return whether its frame becomes active."""
+    def receive_pose(self, stamped: StampedPose, now: float) -> bool:
+        """Take in a pose at ``now`` [s]; return whether its frame becomes active."""
         frame = stamped.frame
         _, before = self._poses.pop(frame, (None, float("-inf")))
         self._poses[frame] = stamped, now
@@ -161,7 +163,6 @@ class FrameSelector:
         )
 
     def _limit(self, held: dict[str, OccupancyGrid] | dict[str, tuple[StampedPose, float]]) -> None:
-        """Keep the active frame and the newest other one."""
         others = [frame for frame in held if frame != self.active]
         most = 1 if self.active else 2
         for frame in others[: len(others) - most]:
@@ -180,7 +181,7 @@ class InputMonitor:
         on_line_m: longest possible drive along the line, also if the track between the two poses is
             unknown [m].
         pose_at, map_at: time of the last pose, and of the last map or update. Before the first
-            message, the time from which it is due; None before ``begin``.
+            message, the time from which it is due; None before ``start_timeouts``.
         driven: selects the poses that count for swept floor.
     """
 
@@ -199,22 +200,22 @@ class InputMonitor:
         # Number of the plan requested from the doubtful pose.
         self._answered_by = -1
 
-    def begin(self, now: float) -> None:
-        """Note that map and pose are due from ``now`` on, unless they have arrived."""
+    def start_timeouts(self, now: float) -> None:
+        """Count map and pose as due from ``now`` on, unless they have arrived."""
         self.pose_at = now if self.pose_at is None else self.pose_at
         self.map_at = now if self.map_at is None else self.map_at
 
-    def succeed(self, before: InputMonitor) -> None:
+    def continue_from(self, before: InputMonitor) -> None:
         """Take over the times of another monitor."""
         self._has_pose, self.pose_at = before._has_pose, before.pose_at
         self.map_at = before.map_at
 
-    def note_map(self, now: float) -> None:
-        """Note a map or an update."""
+    def receive_map(self, now: float) -> None:
+        """Take in a map or an update."""
         self.map_at = now
 
-    def note_pose(self, stamped: StampedPose, now: float) -> bool:
-        """Note a pose; return whether the track from the last one is unknown."""
+    def receive_pose(self, stamped: StampedPose, now: float) -> bool:
+        """Take in a pose; return whether the track from the last one is unknown."""
         last, lost, pose = self._pose, self.is_pose_lost(now), stamped.pose
         self._pose, self.pose_at, self._has_pose = stamped, now, True
         self.farthest_m = self.on_line_m = 0.0
@@ -253,12 +254,12 @@ class InputMonitor:
         """Trust the robot's pose."""
         self.doubt = ""
 
-    def note_request(self, number: int) -> None:
-        """Note that plan ``number`` starts at the robot's present position."""
+    def record_request(self, number: int) -> None:
+        """Record that plan ``number`` starts at the robot's present position."""
         self._answered_by = number
 
-    def note_plan(self, number: int) -> None:
-        """Note that plan ``number`` has arrived."""
+    def receive_plan(self, number: int) -> None:
+        """End the doubt if plan ``number`` starts at the doubtful pose."""
         if number == self._answered_by:
             self.doubt = ""
 

@@ -18,7 +18,7 @@ from fasaco_edge.errors import (
     WrongFrame,
 )
 from fasaco_edge.grid.changes import LatticeChange
-from fasaco_edge.grid.geometry import Polygon, StampedPose, Window, polygon_bounds
+from fasaco_edge.grid.geometry import StampedPose, Window, polygon_bounds
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice, lattice_window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid, without_base
 from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
@@ -86,7 +86,7 @@ class MapState(MissionGround):
         self._refused = ""
         self._free_area = FreeArea(config.footprint.free_at_most)
 
-    def take_map(self, grid: OccupancyGrid) -> bool:
+    def receive_map(self, grid: OccupancyGrid) -> bool:
         """Take in a full map; return whether its frame becomes active.
 
         Raises:
@@ -100,19 +100,19 @@ class MapState(MissionGround):
             lattice_window(
                 grid.geometry, self._config.footprint.cell_m, self._config.max_lattice_cells
             )
-            is_active_now = self.frames.note_map(grid)
+            is_active_now = self.frames.receive_map(grid)
             if grid.frame != (active := self.frames.active):
                 raise WrongFrame(
                     f"map in frame {grid.frame!r}, the mission's is {active!r}",
                     hint=f"publish the map in {active!r}; or `mission reset` to start over",
                 )
         try:
-            self._take_map(grid)
+            self._apply_map(grid)
         except (MapTooLarge, MapTooFar) as error:
             self._refused = str(error)
             raise
         self._patches_lost, self._refused = False, ""
-        return self.frames.note_map(grid) or is_active_now
+        return self.frames.receive_map(grid) or is_active_now
 
     def switch_frame(self) -> bool:
         """Switch to map and pose of the active frame; return whether the map is another one."""
@@ -120,35 +120,35 @@ class MapState(MissionGround):
         is_other = grid is not None and (self.grid is None or self.grid.frame != grid.frame)
         if grid is not None and is_other:
             self._patches_lost = False
-            self._take_map(grid)
+            self._apply_map(grid)
         if grid is not None and (self.pose is None or self.pose.frame != grid.frame):
             self.pose = self.frames.pose_in(grid.frame)
         return is_other
 
-    def take_patches(self, patches: Sequence[MapPatch]) -> tuple[bool, list[FasacoError]]:
+    def receive_patches(self, patches: Sequence[MapPatch]) -> tuple[bool, list[FasacoError]]:
         """Take in consecutive map updates as one: the map is copied and classified once.
 
         Returns:
             Whether the map has changed; and the faults of updates that could not be applied.
         """
-        own, faults = self.frames.note_patches(patches)
+        own, faults = self.frames.receive_patches(patches)
         if self.given is None or self._patches_lost:
             return False, faults + without_base(own, updates_lost=self._patches_lost)
         updated = self.given.with_updates(own)
         if updated.windows:
-            self._take_map(updated.grid, Window.around(*updated.windows))
-            self.frames.note_map(self.given)
+            self._apply_map(updated.grid, Window.around(*updated.windows))
+            self.frames.receive_map(self.given)
         return bool(updated.windows), faults + updated.faults
 
-    def lose_patches(self, count: int) -> None:
-        """Note that updates were lost; always raises PatchWithoutBase to report it."""
+    def receive_loss(self, count: int) -> None:
+        """Refuse updates until the next map, as some were lost; raise PatchWithoutBase."""
         self._patches_lost = True
         raise PatchWithoutBase(f"{count} map updates were lost")
 
     def draw_obstacles(self) -> None:
         """Draw the newest map again, as its obstacles have changed."""
         if self.given is not None:
-            self._take_map(self.given)
+            self._apply_map(self.given)
             self.has_moved = False  # obstacles move no walls
 
     def without_obstacles(self, lattice: CoverageLattice) -> CoverageLattice:
@@ -172,15 +172,15 @@ class MapState(MissionGround):
                 states[part.slices_in(window)] = UNKNOWN
         return replace(lattice, states=states)
 
-    def _take_map(self, given: OccupancyGrid, within: Window | None = None) -> None:
+    def _apply_map(self, given: OccupancyGrid, within: Window | None = None) -> None:
         grid, lattice, before = self.obstacles.on(given), self.lattice, self.given
         if self.grid is None or self.grid.frame != grid.frame:
-            change = self.begin(grid)
+            change = self.begin_lattice(grid)
             if self.grid is not None:
-                self.building.begin_anew()
+                self.building.reset()
             self.area = self._shown = None
         else:
-            change = self.follow((self.grid, grid), within)
+            change = self.follow_map((self.grid, grid), within)
         self._compare(change)
         self.shift = None
         is_other = lattice is not None and self.lattice is not lattice and self.shows_floor
@@ -201,15 +201,11 @@ class MapState(MissionGround):
             change = LatticeChange.to(self._shown, change.after)
         self.has_moved, self._shown = has_moved(change), change.after
 
-    def watch_on(self, building: BuildingWatch) -> None:
-        """Take over the building watch of another mission on the same cells."""
-        self.building = building
+    def continue_from(self, before: MapState) -> None:
+        """Take over a predecessor's doubt about the building; it had the same cells."""
+        self.building = before.building
 
-    def keep_out(self, polygons: tuple[Polygon, ...]) -> None:
-        """Replace the keep-out polygons (x, y) [m]."""
-        self.close(polygons, self.grid)
-
-    def take_pose(self, pose: StampedPose) -> None:
+    def receive_pose(self, pose: StampedPose) -> None:
         """Take in a pose.
 
         Raises:
@@ -269,8 +265,8 @@ class MapState(MissionGround):
         is_reachable = own is not None and self.area is not None and self.area.contains(own)
         return own if is_reachable else self.robot_cell()
 
-    def follow_path(self, cell: Cell | None) -> None:
-        """Note the robot's cell on its path; None while it is off its line."""
+    def set_path_cell(self, cell: Cell | None) -> None:
+        """Set the robot's cell on its path; None while it is off its line."""
         self.path_cell = cell
 
     def why_no_map(self) -> str:

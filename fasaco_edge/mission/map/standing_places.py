@@ -92,11 +92,11 @@ class StandingPlaces:
         if self._mask_frame == frame:
             self.note = replace(self.note, left_mask=self._mask)
 
-    def resume(self, note: PlacesNote) -> None:
+    def restore(self, note: PlacesNote) -> None:
         """Continue with the map noted before a restart."""
         self.note = note
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Let the places belong to the next map in use."""
         self.note = NO_PLACES
 

@@ -30,7 +30,6 @@ def in_zones(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[
 
 @lru_cache(maxsize=4)
 def _with_holes(zones: tuple[Zone, ...], window: Window, cell_m: float) -> NDArray[np.bool_]:
-    """Return ``in_zones`` for zones with holes or left-out rooms."""
     cells = np.zeros((window.rows, window.cols), bool)
     for zone in zones:
         if zone.polygon:

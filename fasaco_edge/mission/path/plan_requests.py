@@ -109,10 +109,10 @@ class Attempt:
             return None
         row, col = path.cells[path.index].tolist()
         try:
-            problem = orders.problem((row, col), path.ahead, attempt=number).after(HELD_CELLS)
+            whole = orders.part.problem((row, col), path.ahead, orders.goal(), attempt=number)
+            problem = replace(whole.after(HELD_CELLS), is_full=is_full)
         except FasacoError:
             return None  # the map has changed: a repair is due
-        problem = replace(problem, is_full=is_full)
         return cls(numbering, path.index, joint, problem)
 
     def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
@@ -144,20 +144,21 @@ class PlanRequests:
         plans, attempts: count the returned plans, and the attempts at better paths.
         wanted: why a new plan is wanted; "" if none is.
         pending: the request under way.
+        attempt: the attempt that the pending plan belongs to; None for a needed plan.
+        changed: window of the cells that changed since the last request.
     """
 
     def __init__(self) -> None:
         self.plans = self.attempts = 0
         self.wanted = ""
         self.pending: PlanRequest | None = None
-        # The attempt that the pending plan belongs to; None for a needed plan.
-        self._attempt: Attempt | None = None
+        self.attempt: Attempt | None = None
         # Whether the result of the pending plan is to be discarded.
         self._is_abandoned = False
         # Why a full plan is wanted; "" if none is.
         self._full = ""
-        # Window of the cells that changed since the last request; whether ``wanted`` is for them.
-        self._changed: Window | None = None
+        self.changed: Window | None = None
+        # Whether ``wanted`` is for the changed cells.
         self._is_by_map = False
         # Why the last plan failed, "" if it did not, and when [s].
         self._failure = "", 0.0
@@ -165,21 +166,33 @@ class PlanRequests:
         self._failures = 0
         self._has_map = False
 
+    def continue_from(self, before: PlanRequests) -> None:
+        """Continue the counts of a predecessor; its pending plan is discarded."""
+        self.plans, self.attempts = before.plans, before.attempts
+        self.pending, self.attempt = before.pending, before.attempt
+        self.discard_pending()
+
     @property
     def is_planning(self) -> bool:
         """Whether a needed plan is pending."""
-        return self.pending is not None and self._attempt is None
+        return self.pending is not None and self.attempt is None
 
     @property
     def is_improving(self) -> bool:
         """Whether the pending plan is only an attempt at a better path."""
-        return self.pending is not None and self._attempt is not None
+        return self.pending is not None and self.attempt is not None
 
     def want(self, reason: str, changed: Window | None = None) -> None:
         """Want a plan: because the cells in a window have changed, or for another reason."""
         self.wanted = reason
-        self._changed = Window.around(self._changed, changed)
+        self.changed = Window.around(self.changed, changed)
         self._is_by_map = changed is not None
+
+    def want_instead(self, reason: str, changed: Window | None) -> None:
+        """Want a plan in place of an outdated one, unless one is wanted for another reason."""
+        self.changed = Window.around(self.changed, changed)
+        if not self.wanted:
+            self.want(reason, changed)
 
     def want_full(self, reason: str) -> int:
         """Want a full search; return its number among the plans."""
@@ -187,10 +200,10 @@ class PlanRequests:
         self.forget_failure()
         return self.plans + (1 if self.pending is None or self.is_improving else 2)
 
-    def drop(self) -> None:
+    def want_none(self) -> None:
         """Want no plan."""
         self.wanted = self._full = ""
-        self._changed = None
+        self.changed = None
 
     def discard_pending(self) -> None:
         """Discard the result of the pending plan, if any."""
@@ -198,7 +211,7 @@ class PlanRequests:
 
     def abandon(self) -> None:
         """Want no plan, and discard the pending one: it is for another order."""
-        self.drop()
+        self.want_none()
         self.forget_failure()
         self.discard_pending()
 
@@ -212,14 +225,14 @@ class PlanRequests:
 
     def request_plan(self, problem: CoverageProblem) -> PlanRequest:
         """Request the wanted plan."""
-        changed = self._changed if self._is_by_map and not self._full else None
+        changed = self.changed if self._is_by_map and not self._full else None
         problem = replace(problem, is_full=bool(self._full) or problem.is_full)
         request = self._request(problem, self._full or self.wanted, changed)
-        self.drop()
+        self.want_none()
         return request
 
-    def _request_attempt(self, attempt: Attempt) -> PlanRequest:
-        self._attempt = attempt
+    def request_attempt(self, attempt: Attempt) -> PlanRequest:
+        self.attempt = attempt
         return self._request(attempt.problem, SPARE_TIME)
 
     def _request(
@@ -228,15 +241,15 @@ class PlanRequests:
         self.pending = PlanRequest(self.plans + self.attempts + 1, problem, reason, changed)
         return self.pending
 
-    def _close_request(self) -> bool:
+    def close(self) -> bool:
         """Count the pending plan as returned; return whether it was abandoned."""
-        self.plans += self._attempt is None
-        self.attempts += self._attempt is not None
-        self.pending = self._attempt = None
+        self.plans += self.attempt is None
+        self.attempts += self.attempt is not None
+        self.pending = self.attempt = None
         is_abandoned, self._is_abandoned = self._is_abandoned, False
         return is_abandoned
 
-    def _close_failed(self, event: PlanBroken, now: float) -> bool:
+    def close_failed(self, event: PlanBroken, now: float) -> bool:
         """Close the pending plan as failed at ``now`` [s]; return whether it was needed.
 
         The same problem would fail again, so it is not requested again at once.
@@ -244,7 +257,7 @@ class PlanRequests:
         request, is_improving = self.pending, self.is_improving
         if request is None or request.number != event.number:
             return False
-        if self._close_request() or is_improving:
+        if self.close() or is_improving:
             return False
         self.want(self.wanted or request.reason, request.changed)
         self._failure, self._has_map = (str(event.why), now), False
@@ -262,8 +275,8 @@ class PlanRequests:
         sooner = f"{with_map}, or " if pause_s < BROKEN_S else ""
         return f"{why}; tried again {sooner}after {BROKEN_S:g} s"
 
-    def note_map(self) -> None:
-        """Note another map: a plan that failed with the previous map may succeed now."""
+    def receive_map(self) -> None:
+        """Take in another map: a plan that failed with the previous map may succeed now."""
         self._has_map = True
 
     def forget_failure(self) -> None:

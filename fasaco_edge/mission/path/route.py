@@ -32,10 +32,11 @@ from fasaco_edge.mission.work.sequencer import Sequencer
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
 
 
-class Route(PlanRequests):
-    """Requests plans, and publishes paths from them. All times ``now`` are [s].
+class Route:
+    """Publishes paths from requested plans. All times ``now`` are [s].
 
     Attributes:
+        requests: the plans that are wanted and pending.
         path: the published path, and the robot's progress on it.
         revision: counts the published paths.
         unchanged, outdated: count the plans that were not published: they equal the current path,
@@ -50,16 +51,13 @@ class Route(PlanRequests):
     """
 
     def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
-        super().__init__()
+        self.requests = PlanRequests()
         self.path = PathProgress(NO_CELLS)
         # The part of a path kept for later: beyond a block, or the whole rest after a stop.
         self._kept = PathProgress(NO_CELLS)
         self.aside: NDArray[np.int32] | None = None
         # Heading at the end of the path [rad]; None for the heading of the last segment.
         self._end_yaw: float | None = None
-        # The path before a motion of the map, until the first pose on the moved map shows the
-        # motion.
-        self._before_motion: NDArray[np.int32] | None = None
         self.revision = 0
         # Numbers of the path and of its walk (a new path over the same cells is the same walk), and
         # of the last walk that was searched as a whole.
@@ -73,12 +71,11 @@ class Route(PlanRequests):
         self._spare = SpareTime(spare_share)
         self._checked_on: ReachableArea | None = None
 
-    def succeed(self, before: Route) -> None:
+    def continue_from(self, before: Route) -> None:
         """Continue the counts of another route; a plan pending there is dropped."""
-        self.revision, self.plans, self.attempts = before.revision, before.plans, before.attempts
+        self.requests.continue_from(before.requests)
+        self.revision = before.revision
         self.unchanged, self.outdated = before.unchanged, before.outdated
-        self.pending, self._attempt = before.pending, before._attempt
-        self.discard_pending()
 
     @property
     def path_to_keep(self) -> NDArray[np.int32]:
@@ -100,14 +97,14 @@ class Route(PlanRequests):
 
     def abandon(self) -> None:
         """Cancel the wanted plan, and discard the pending one: it is for another order."""
-        super().abandon()
-        self._kept, self._before_motion, self.aside = PathProgress(NO_CELLS), None, None
+        self.requests.abandon()
+        self._kept, self.aside = PathProgress(NO_CELLS), None
 
     def set_aside(self) -> bool:
         """Keep the path during an errand; return False if a path is kept already."""
         if self.aside is not None:
             return False
-        self.pause()
+        self.requests.pause()
         self.aside, self._kept = self.path_to_keep, PathProgress(NO_CELLS)
         return True
 
@@ -117,7 +114,7 @@ class Route(PlanRequests):
             return None
         update = self.publish(NO_CELLS, reason, now) if len(self.path.cells) else None
         self._kept, self.aside = PathProgress(self._from_nearer_end(self.aside)), None
-        self.want(reason)
+        self.requests.want(reason)
         return update
 
     def _from_nearer_end(self, cells: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -126,7 +123,12 @@ class Route(PlanRequests):
         A path that has to end at home is not reversed: the saved way would be driven at the end.
         """
         area, cell = self._map.area, self._map.robot_cell()
-        if area is None or cell is None or not len(cells) or self._orders.ends_home:
+        if (
+            area is None
+            or cell is None
+            or not len(cells)
+            or self._orders.order_state.returns_home_next
+        ):
             return cells
         ends = [area.shortest_path(cell, (int(row), int(col))) for row, col in cells[[0, -1]]]
         is_nearer = 0 < len(ends[1]) < len(ends[0])
@@ -136,7 +138,7 @@ class Route(PlanRequests):
         """Publish the kept path after a pause; want a plan if it is no longer valid."""
         area, cell, cells = self._map.area, self._map.robot_cell(), self._kept.ahead
         holds = (
-            not self.wanted
+            not self.requests.wanted
             and area is not None
             and len(cells) > 0
             and cell == tuple(cells[0].tolist())
@@ -144,24 +146,17 @@ class Route(PlanRequests):
         )
         if holds:
             return self.publish(cells, "resumed", now)
-        self.want("resumed")
+        self.requests.want("resumed")
         return None
 
-    def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` gets the motion."""
-        if self._before_motion is None:
-            self._before_motion = self.path_to_keep
-
-    def note_motion(self, motion: Motion | None, now: float) -> PathUpdate | None:
+    def move(self, before: NDArray[np.int32], motion: Motion, now: float) -> PathUpdate | None:
         """Move the path with the map, and want a plan that repairs it.
 
         Its drivable part is published at once: the robot must not follow the old position.
+        ``before``: int32 (n, 2), n >= 1, ``path_to_keep`` before the map moved.
         """
-        before, self._before_motion = self._before_motion, None
-        if before is None or motion is None or motion.is_still or not len(before):
-            return None
-        self.discard_pending()
-        self.want("map and pose moved")
+        self.requests.discard_pending()
+        self.requests.want("map and pose moved")
         assert self._map.lattice is not None
         cells = moved_cells(before, motion, self._map.lattice.cell_m)
         cell, area, was_driving = self._map.robot_cell(), self._map.area, len(self.path.cells) > 0
@@ -170,7 +165,7 @@ class Route(PlanRequests):
             lead = area.shortest_path(cell, (int(cells[0, 0]), int(cells[0, 1])))
             cells = np.concatenate((lead[:-1], cells))
             drivable = area.drivable_prefix(cells)
-        update = self.publish(cells[:drivable], self.wanted, now) if was_driving else None
+        update = self.publish(cells[:drivable], self.requests.wanted, now) if was_driving else None
         self._kept = PathProgress(cells[drivable:])
         return update
 
@@ -178,7 +173,7 @@ class Route(PlanRequests):
         """Request a better path; None without spare time, or if too little of the path is left."""
         if not self._spare.is_available(now, self._walks):
             return None
-        number = self.attempts + 1
+        number = self.requests.attempts + 1
         # A walk that was extended with the map, or cut to a part, has up to a third more turns
         # than a new search would find. So every other attempt searches the whole rest, once for
         # each walk.
@@ -189,23 +184,23 @@ class Route(PlanRequests):
             return None
         if is_full:
             self._searched = self._walks
-        return self._request_attempt(attempt)
+        return self.requests.request_attempt(attempt)
 
     def fail(self, event: PlanBroken, now: float) -> None:
         """Note that the pending plan failed: the same problem would fail again."""
         self._spare.rest(BROKEN_S, now)
-        self.outdated += self._close_failed(event, now)
+        self.outdated += self.requests.close_failed(event, now)
 
     def accept(self, event: PlanReady, now: float) -> PathUpdate | None:
         """Publish a requested plan, unless it is no longer valid."""
-        if self.is_improving:
+        if self.requests.is_improving:
             self._spare.spend(event.seconds, now, self._walks)
-        request, attempt, area = self.pending, self._attempt, self._map.area
+        request, attempt, area = self.requests.pending, self.requests.attempt, self._map.area
         if request is None or request.number != event.number:
             return None
-        is_abandoned = self._close_request()
+        is_abandoned = self.requests.close()
         if attempt is None:
-            self.forget_failure()
+            self.requests.forget_failure()
         cell = self._map.robot_cell()
         if is_abandoned or cell is None or area is None:
             self.outdated += attempt is None
@@ -215,9 +210,7 @@ class Route(PlanRequests):
         cells = self._from_here(event.path.cells, cell, area)
         if not len(cells) or area.drivable_prefix(cells) < len(cells):
             self.outdated += 1
-            self._changed = Window.around(self._changed, request.changed)
-            if not self.wanted:
-                self.want("the map changed while planning", request.changed)
+            self.requests.want_instead("the map changed while planning", request.changed)
             return None
         if np.array_equal(cells, self.path.ahead):
             # The follower has this path already; a path that ended at a cut is complete now.
@@ -231,7 +224,6 @@ class Route(PlanRequests):
     def _accept_better(
         self, attempt: Attempt, event: PlanReady, area: ReachableArea, now: float
     ) -> PathUpdate | None:
-        """Publish the path with a better rest; None if that saves too little."""
         if attempt.numbering != self._numberings:
             return None
         cells = attempt.joined(self.path, event.path.cells)
@@ -309,12 +301,12 @@ class Route(PlanRequests):
         self.published_at = now
         return PathUpdate(self.revision, self.path.ahead, reason, end_yaw=self._end_yaw)
 
-    def follow(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
-        """Note that the robot is in ``cell``, see ``PathProgress.driven_to``."""
+    def record_cell(self, cell: Cell, has_visited: Callable[[Cell], bool]) -> None:
+        """Record that the robot is in ``cell``, see ``PathProgress.driven_to``."""
         self._hold(self.held.driven_to(cell, has_visited))
 
-    def follow_line(self, index: int) -> None:
-        """Note the robot's index on the path, as its line shows."""
+    def record_index(self, index: int) -> None:
+        """Record the robot's index on the path, as its line shows."""
         held = self.held
         if held.index < index < len(held.cells):
             self._hold(replace(held, index=index))
@@ -349,8 +341,10 @@ class Route(PlanRequests):
         if drivable == len(ahead):
             return None
         row, col = ahead[drivable]
-        self.want(f"path blocked at cell ({row}, {col})", self._changed)
+        self.requests.want(f"path blocked at cell ({row}, {col})", self.requests.changed)
         beyond = PathProgress(np.concatenate((ahead[drivable:], self._kept.ahead)))
-        update = self.publish(ahead[:drivable], self.wanted, now, changed=self._changed)
+        update = self.publish(
+            ahead[:drivable], self.requests.wanted, now, changed=self.requests.changed
+        )
         self._kept = beyond
         return replace(update, may_wait=True)

@@ -19,29 +19,25 @@ from fasaco_edge.planners.path import CoveragePath
 
 
 class TrailLayer:
-    """Owns the living trail: each plan starts from it, and changes it."""
+    """Owns the living trail: each plan starts from it, and changes it.
+
+    Attributes:
+        trail: the trail; read-only.
+    """
 
     def __init__(self, config: MissionConfig, map_state: MapState, route: Route) -> None:
         self._config = config
         self._map, self._route = map_state, route
-        self._trail = LivingTrail(config.trail)
+        self.trail = LivingTrail(config.trail)
         # The lattice that the trail lies on.
         self._lattice: CoverageLattice | None = None
         # The robot's last path, and its index on it.
         self._path, self._index = NO_CELLS, 0
-        # The trail before a motion of the map, until the first pose on the moved map shows the
-        # motion.
-        self._before_motion: TrailSnapshot | None = None
-
-    @property
-    def trail(self) -> LivingTrail:
-        """The trail."""
-        return self._trail
 
     def snapshot(self) -> TrailSnapshot:
         """Return the trail on the newest map."""
         self._follow_map()
-        return self._trail.snapshot()
+        return self.trail.snapshot()
 
     def posed(self, request: PlanRequest) -> PlanRequest:
         """Return a request with the trail from which its ants start."""
@@ -49,45 +45,36 @@ class TrailLayer:
             return request
         return replace(request, problem=replace(request.problem, trail=self.snapshot()))
 
-    def take(self, plan: CoveragePath) -> None:
+    def receive_plan(self, plan: CoveragePath) -> None:
         """Take over the trail that the ants of a plan have left, even if the plan is not driven."""
         self._follow_map()
         if plan.trail is not None:
-            self._trail.take(plan.trail, plan.work.ants)
+            self.trail.take(plan.trail, plan.work.ants)
 
-    def resume(self, before: TrailSnapshot) -> None:
+    def restore(self, before: TrailSnapshot) -> None:
         """Continue with the trail from before a restart."""
-        self._trail, self._lattice = LivingTrail(self._config.trail, before), None
+        self.trail, self._lattice = LivingTrail(self._config.trail, before), None
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """Clear the trail: it belongs to another place."""
-        self._trail, self._lattice = LivingTrail(self._config.trail), None
-        self._before_motion = None
+        self.trail, self._lattice = LivingTrail(self._config.trail), None
 
-    def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``note_motion`` gets the motion."""
-        if self._before_motion is None:
-            self._before_motion = self._trail.snapshot()
-
-    def note_motion(self, motion: Motion | None) -> None:
-        """Move the trail with the map; ``motion`` is None if the map has not moved."""
-        before, self._before_motion = self._before_motion, None
-        if before is None or motion is None or motion.is_still:
-            return
+    def move(self, before: TrailSnapshot, motion: Motion) -> None:
+        """Move the trail with the map; ``before``: the trail before it moved."""
         self._follow_map()
         turn = math.remainder(motion.end.yaw - motion.start.yaw, math.tau)
         turns = round(turn / (0.5 * math.pi))
-        self._trail.move(
+        self.trail.move(
             before, lambda x, y: motion.back(1.0, x, y), turns, self._config.footprint.cell_m
         )
 
-    def note_drive(self) -> None:
+    def fade_driven(self) -> None:
         """Fade the trail along the driven part of the path."""
         self._follow_map()
         path = self._route.path
         begun = self._index if path.cells is self._path else 0
         if path.index > begun:
-            self._trail.fade(path.cells[begun : path.index + 1])
+            self.trail.fade(path.cells[begun : path.index + 1])
         self._path, self._index = path.cells, path.index
 
     def finish(self, update: PathUpdate | None) -> None:
@@ -95,7 +82,7 @@ class TrailLayer:
         self._follow_map()
         if update is not None and update.plan is not None:
             cells, cost = update.cells, self._config.cost
-            self._trail.strengthen(cells, cost.quality(_distinct(cells), cost.of_walk_us(cells)))
+            self.trail.strengthen(cells, cost.quality(_distinct(cells), cost.of_walk_us(cells)))
 
     def _follow_map(self) -> None:
         lattice, before = self._map.lattice, self._lattice
@@ -104,12 +91,11 @@ class TrailLayer:
         change = self._map.change
         is_next = change is not None and change.before is before and change.after is lattice
         changed = change.cells if change is not None and is_next and before is not None else None
-        self._trail.follow(lattice.window, lattice.steps, changed)
+        self.trail.follow(lattice.window, lattice.steps, changed)
         self._lattice = lattice
 
 
 def _distinct(cells: NDArray[np.int32]) -> int:
-    """Return the number of distinct cells of a path, int32 (n, 2)."""
     # Column by column: numpy takes several times as long for rows of two.
     rows, cols = np.ascontiguousarray(cells.T)
     rows, cols = rows - rows.min(), cols - cols.min()

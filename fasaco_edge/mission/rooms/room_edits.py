@@ -144,7 +144,6 @@ def _apart(rooms: Sequence[Room]) -> Room | None:
 
 
 def _is_inside(raster: RoomRaster, cut: Cut, room: int) -> bool:
-    """Return whether a cut goes through this room alone."""
     around = cut_window(cut, raster.square_m).intersection(raster.window)
     if around is None:
         return False

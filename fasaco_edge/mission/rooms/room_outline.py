@@ -76,7 +76,6 @@ def _without_pinches(mask: Mask) -> Mask:
 
 
 def _traced(mask: Mask) -> NDArray[np.int64]:
-    """Return the corners (row, col) of the outer border, int64 (n, 2)."""
     inside = np.pad(mask, 1)
     row, col = (int(first) for first in divmod(int(np.argmax(inside)), inside.shape[1]))
     begin, heading = (row, col), 0

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from fasaco_edge.errors import NotPublished
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.occupancy import OccupancyGrid, coarser
 from fasaco_edge.grid.rooms import FoundRooms, find_rooms
@@ -44,8 +43,6 @@ MOST_PIXELS = 1_000_000
 # A search waits up to this long for a step without a new map, as planning comes first [s].
 LATE_S = 1.0
 
-FAILED_HINT = "the robot goes on with the rooms it knows; report it with the log"
-
 
 class RoomWatch:
     """Finds the rooms of maps, and enters them in a book.
@@ -65,22 +62,11 @@ class RoomWatch:
         self._found: FoundRooms | None = None
         self._due = -math.inf
 
-    def look(self, grid: OccupancyGrid, now: float) -> None:
+    def update(self, grid: OccupancyGrid, now: float) -> None:
         """Search a map for rooms at ``now`` [s] if that is due.
 
-        Raises:
-            NotPublished: the search failed; the rooms known before stay.
-        """
-        try:
-            self._look(grid, now)
-        except Exception as error:
-            why = f"rooms of this map were not published: {type(error).__name__}: {error}"
-            raise NotPublished(why, hint=FAILED_HINT) from error
-
-    def _look(self, grid: OccupancyGrid, now: float) -> None:
-        """Search a map at ``now`` [s] if that is due.
-
-        An unchanged map is entered again until it causes no further change.
+        An unchanged map is entered again until it causes no further change. If the search fails,
+        the rooms known before stay.
         """
         came, self._newest = grid is not self._newest, grid
         self._is_seen &= not came
@@ -147,7 +133,6 @@ def update(book: RoomBook, found: FoundRooms, frame: str) -> None:
 
 
 def _widen(sheet: RoomSheet, factor: int) -> None:
-    """Make the squares of a sheet ``factor`` times as wide."""
     if factor > 1:
         sheet.lay(sheet.raster.coarser(factor), sheet.gone.coarser(factor))
         sheet.note({}, RoomRaster.empty(sheet.raster.square_m))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import get_args
 
 import numpy as np
@@ -20,38 +19,29 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import MissionOrder, Zone
 from fasaco_edge.mission.orders.zones import in_zones
-from fasaco_edge.mission.work.exploration import Exploration, frontier, is_in_reach
-from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.exploration import frontier, is_in_reach
+from fasaco_edge.mission.work.present_order import PresentOrder
 from fasaco_edge.planners.passes import Covers, edge_cells, wanted_by
 
 
+@dataclass(slots=True, eq=False)
 class CellsLeft:
-    """Derives the cells left from map, ledger and company; owns nothing.
+    """Derives the cells left from map, ledger, company and order; owns nothing."""
 
-    Args:
-        config, map_state, ledger, company: the sources of the cells.
-        state: the order and its progress.
-        exploration: the viewpoints.
-    """
-
-    def __init__(
-        self,
-        config: MissionConfig,
-        map_state: MapState,
-        ledger: MissionLedger,
-        company: Company,
-        state: Callable[[], OrderState],
-        exploration: Callable[[], Exploration],
-    ) -> None:
-        self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
-        self._state, self._exploration = state, exploration
-        # The last area, and its edge cells.
-        self._edge: tuple[ReachableArea | None, NDArray[np.bool_]] = None, np.empty((0, 0), bool)
+    _config: MissionConfig
+    _map: MapState
+    _ledger: MissionLedger
+    _company: Company
+    _order: PresentOrder
+    # The last area, and its edge cells.
+    _edge: tuple[ReachableArea | None, NDArray[np.bool_]] = field(
+        default=(None, np.empty((0, 0), bool)), init=False
+    )
 
     def open_cells(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` still need a visit, coverable or not."""
         open_cells = self.unswept(window)
-        self._exploration().mark(open_cells, window)
+        self._order.exploration.mark(open_cells, window)
         return open_cells
 
     def unswept(self, window: Window) -> NDArray[np.bool_]:
@@ -64,7 +54,7 @@ class CellsLeft:
         """Return the cells that this robot (in a fleet: in its part) still has to visit."""
         window = area.lattice.window
         cells = self._company.mine(self.unswept(window), area).copy()
-        self._exploration().mark(cells, window)
+        self._order.exploration.mark(cells, window)
         return cells
 
     @property
@@ -101,7 +91,7 @@ class CellsLeft:
 
     def asked_for(self, window: Window) -> NDArray[np.bool_]:
         """Return the cells of ``window`` that this robot has to cover, or has covered."""
-        state = self._state()
+        state = self._order.state
         zone, order = state.current_zone, state.order
         due = (zone,) if zone is not None else order.zones if order is not None else ()
         inside = in_zones(due, window, self._config.footprint.cell_m)
@@ -113,7 +103,7 @@ class CellsLeft:
     @property
     def is_at_edge(self) -> bool:
         """Whether only cells along walls and furniture are due."""
-        return self._state().current_pass.covers == "edge"
+        return self._order.state.current_pass.covers == "edge"
 
     def edge(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of ``window`` lie along walls and furniture, bool (rows, cols)."""
@@ -244,7 +234,6 @@ def zones_beyond(
 
 
 def _sticks_out(polygon: Polygon, lattice: CoverageLattice) -> bool:
-    """Return whether part of a polygon lies beyond the map."""
     x0, y0, x1, y1 = (edge / lattice.cell_m for edge in polygon_bounds(polygon))
     window = lattice.window
     return x0 < window.col0 or y0 < window.row0 or x1 > window.col1 or y1 > window.row1

@@ -75,13 +75,17 @@ class Exploration:
     _shut_since: float | None = None
     _shut_looked: float = float("-inf")
 
-    def begin(self) -> None:
+    def begin_zone(self) -> None:
         """Begin another zone."""
         self.looked.clear()
         self.is_shut, self._shut_since = False, None
 
-    def note_cell(self, cell: Cell) -> None:
-        """Note that the robot is in ``cell``."""
+    def aim_at(self, viewpoints: set[Cell]) -> None:
+        """Replace the viewpoints."""
+        self.viewpoints = viewpoints
+
+    def record_cell(self, cell: Cell) -> None:
+        """Record that the robot is in ``cell``."""
         if cell in self.viewpoints:
             self.viewpoints.discard(cell)
             self.reached += 1

@@ -56,7 +56,7 @@ class IdlePlaces:
         self._key: tuple[object, ...] = ()
         self._looked_at, self._said = float("-inf"), ""
 
-    def look(
+    def find(
         self, grid: OccupancyGrid, revision: int, order: OrderState, now: float, *, is_theirs: bool
     ) -> str:
         """Return which places have no effect, and why; "" for none.
@@ -111,14 +111,12 @@ class IdlePlaces:
     def _touches_free(
         self, corners: Polygon, reach: float, window: Window, grid: OccupancyGrid
     ) -> bool:
-        """Return whether a free pixel lies in or near a polygon, in pixels."""
         values = grid.cells[window.row0 : window.row1, window.col0 : window.col1]
         free = (values >= 0) & (values <= self._footprint.free_at_most)
         return bool(free.any() and (free & near_polygons((corners,), window, 1.0, reach)).any())
 
 
 def _around(corners: Polygon, reach: float, geometry: GridGeometry) -> Window:
-    """Return the window of a map within ``reach`` of a polygon [pixels]."""
     x0, y0, x1, y1 = polygon_bounds(corners)
     row0, row1 = _span(y0 - reach, y1 + reach, geometry.rows)
     col0, col1 = _span(x0 - reach, x1 + reach, geometry.cols)

@@ -13,43 +13,47 @@ from fasaco_edge.mission.coverage.loop_closure import Motion, moved_mask
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.work.reached_cells import ReachedCells
 
+CellsOn = tuple[Window, NDArray[np.bool_]]
+"""Cells, bool (rows, cols), of a window."""
+
 
 class OrderReach:
     """Remembers which cells have been reachable since an order began.
 
     Masks are bool (rows, cols) on the lattice of the area.
+
+    Attributes:
+        reached: a window around all maps received, and which of its cells have ever been reachable.
     """
 
     def __init__(self, map_state: MapState) -> None:
         self._map = map_state
         self._newest: ReachableArea | None = None
-        # A window around all maps received, and which of its cells have ever been reachable.
-        self._once: tuple[Window, NDArray[np.bool_]] | None = None
-        # ``_once`` before the map moved; and whether its cells have moved since the newest area.
-        self._before_motion: tuple[Window, NDArray[np.bool_]] | None = None
+        self.reached: CellsOn | None = None
+        # Whether these cells have moved since the newest area.
         self._have_moved = False
         # Cells that keep-out zones drawn during the order have cut off.
-        self._cut_off: tuple[Window, NDArray[np.bool_]] | None = None
+        self._cut_off: CellsOn | None = None
 
-    def begin(self, reached: ReachedCells | None) -> None:
+    def begin_order(self, reached: ReachedCells | None) -> None:
         """Start another order, or continue one with the cells reached before a restart."""
         self._newest = None
-        self._once = None if reached is None else (reached.window, reached.mask)
-        self._before_motion = self._cut_off = None
+        self.reached = None if reached is None else (reached.window, reached.mask)
+        self._cut_off = None
         self._have_moved = reached is not None and reached.have_moved
-        self.note_area()
+        self.record_area()
 
-    def succeed(self, before: OrderReach) -> None:
+    def continue_from(self, before: OrderReach) -> None:
         """Take over the reach of another mission with the same order on the same cells."""
-        self._newest, self._once = before._newest, before._once
+        self._newest, self.reached = before._newest, before.reached
         self._cut_off = before._cut_off
 
     @property
     def cells(self) -> ReachedCells | None:
         """The cells that have been reachable; None for none."""
-        return None if self._once is None else ReachedCells.of(self._once[1], self._once[0])
+        return None if self.reached is None else ReachedCells.of(self.reached[1], self.reached[0])
 
-    def note_area(self) -> None:
+    def record_area(self) -> None:
         """Remember the cells that are reachable now."""
         area = self._map.area
         if area is not None and area is not self._newest:
@@ -63,13 +67,13 @@ class OrderReach:
                 # coverable, and lie beside reachable cells.
                 here &= area.lattice.coverable | ~_widened(area.reachable)
             here |= reachable
-            self._once, self._newest, self._have_moved = (window, once), area, False
+            self.reached, self._newest, self._have_moved = (window, once), area, False
             if self._cut_off is not None:
                 window = area.lattice.window
                 self._cut_off = window, _on(window, self._cut_off) & ~area.reachable
 
-    def note_keep_outs(self, before: ReachableArea | None) -> None:
-        """Note that keep-outs have changed; ``before``: the area until then."""
+    def record_keep_outs(self, before: ReachableArea | None) -> None:
+        """Record that keep-outs have changed; ``before``: the area until then."""
         if before is not None and (area := self._map.area) is not None:
             window = area.lattice.window
             lost = _on(window, (before.lattice.window, before.reachable)) & ~area.reachable
@@ -77,29 +81,27 @@ class OrderReach:
             still = _on(window, self._cut_off) & self.without_keep_outs(area)
             self._cut_off = window, lost | still
 
-    def note_map_motion(self) -> None:
-        """Note that the newest map has moved; ``move`` follows with the motion."""
-        self._before_motion = self._before_motion or self._once
+    def move(self, before: CellsOn | None, motion: Motion) -> None:
+        """Move the cells with the map; drop what was noted since it moved: the pose was old.
 
-    def move(self, motion: Motion) -> None:
-        """Move the cells with the map; drop what was noted since it moved: the pose was old."""
-        before, self._before_motion = self._before_motion, None
+        ``before``: the cells before it moved.
+        """
         if before is not None and not motion.is_still:
             lattice = self._map.lattice
             assert lattice is not None
-            self._once = moved_mask(*before, motion, lattice.cell_m)
+            self.reached = moved_mask(*before, motion, lattice.cell_m)
             self._newest, self._have_moved, self._cut_off = None, True, None
-            self.note_area()
+            self.record_area()
 
     def shift(self, motion: Motion) -> None:
         """Move the cells with the newest map, whose area is not known yet."""
-        if self._once is not None and self._map.lattice is not None:
-            self._once = moved_mask(*self._once, motion, self._map.lattice.cell_m)
+        if self.reached is not None and self._map.lattice is not None:
+            self.reached = moved_mask(*self.reached, motion, self._map.lattice.cell_m)
             self._have_moved, self._cut_off = True, None
 
     def around(self, window: Window) -> Window:
         """Return the window around all maps received; around the newest alone if too large."""
-        whole = Window.around(window, None if self._once is None else self._once[0])
+        whole = Window.around(window, None if self.reached is None else self.reached[0])
         assert whole is not None
         return whole if whole.rows * whole.cols <= MAX_LATTICE_CELLS else window
 
@@ -125,7 +127,7 @@ class OrderReach:
 
     def on(self, window: Window) -> NDArray[np.bool_]:
         """Return which cells of a window have ever been reachable, bool (rows, cols)."""
-        return _on(window, self._once)
+        return _on(window, self.reached)
 
     def without_keep_outs(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells would be reachable without keep-outs, bool (rows, cols) of an area."""
@@ -139,22 +141,21 @@ class OrderReach:
     def is_map_cut(self) -> bool:
         """Whether the newest map lacks cells that were reachable."""
         lattice = self._map.lattice
-        if lattice is None or self._once is None:
+        if lattice is None or self.reached is None:
             return False
-        window, once = self._once
+        window, once = self.reached
         shown = carried(lattice.states != UNKNOWN, lattice.window, window)
         return bool((once & ~shown).any())
 
 
 def _widened(cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return cells and their eight neighbours, bool (rows, cols)."""
     padded = np.pad(cells, 1)
     rows = padded[:-2] | padded[1:-1] | padded[2:]
     widened: NDArray[np.bool_] = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
     return widened
 
 
-def _on(window: Window, cells: tuple[Window, NDArray[np.bool_]] | None) -> NDArray[np.bool_]:
+def _on(window: Window, cells: CellsOn | None) -> NDArray[np.bool_]:
     """Return a copy of cells, given with their window, on another window; None: no cells."""
     if cells is None:
         return np.zeros((window.rows, window.cols), bool)

@@ -120,10 +120,10 @@ class PlanScope:
         ahead_s *= int(np.count_nonzero(all_rooms)) / max(planned, 1)
         return self.worth.puts_other_first(open_cells, area.lattice.window, ahead_s)
 
-    def begin(self) -> None:
-        """Note that a pass begins."""
-        self.worth.begin()
-        self._room.begin()
+    def begin_pass(self) -> None:
+        """Choose anew what comes first."""
+        self.worth.begin_pass()
+        self._room.begin_pass()
 
     def give_up_first(self) -> bool:
         """Leave what is planned first until all else is done; return False if all is planned."""

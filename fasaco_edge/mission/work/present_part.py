@@ -9,19 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.grid.reachable_area import anchor_cell
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.work.by_room import RoomPrice
 from fasaco_edge.mission.work.cells_left import CellsLeft
 from fasaco_edge.mission.work.exploration import Exploration
 from fasaco_edge.mission.work.order_reach import OrderReach
-from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState, Stage
+from fasaco_edge.mission.work.order_state import Stage
 from fasaco_edge.mission.work.plan_scope import PlanScope
-from fasaco_edge.mission.work.reached_cells import ReachedCells
+from fasaco_edge.mission.work.present_order import PresentOrder
 from fasaco_edge.mission.work.uncovered import UncoveredCells
 from fasaco_edge.planners.problem import CoverageProblem
 
@@ -36,7 +34,6 @@ class PresentPart:
     """Poses the problems of the part of an order that is due. Times are [s].
 
     Attributes:
-        order_state: the order and its progress.
         reach: the cells that have been reachable since the order began.
         uncovered: the cells that stay uncovered.
         cells: the cells left.
@@ -50,74 +47,70 @@ class PresentPart:
         ledger: MissionLedger,
         company: Company,
         room_price: RoomPrice,
+        order: PresentOrder,
     ) -> None:
-        self.order_state = OrderState.idle(NO_ORDER)
         self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
+        self._order = order
         self.reach = OrderReach(map_state)
-        self.uncovered = UncoveredCells(map_state, ledger, self.reach, lambda: self.order_state)
-        self._exploration = Exploration()
+        self.uncovered = UncoveredCells(map_state, ledger, self.reach, order)
         # Number of cells done at the last path's end (-1 before the first path), and number of
         # paths in a row that did not increase it.
         self._done, self._in_vain = -1, 0
         # Whether the next plan begins a pass with other lanes than the pass before.
         self._has_new_lanes = False
-        self.cells = CellsLeft(
-            *(config, map_state, ledger, company),
-            state=lambda: self.order_state,
-            exploration=lambda: self._exploration,
-        )
+        self.cells = CellsLeft(config, map_state, ledger, company, order)
         self.scope = PlanScope(
-            config, map_state, self.cells, company, room_price, lambda: self.order_state
+            config, map_state, self.cells, company, room_price, lambda: order.state
         )
 
-    def _begin_part(self) -> None:
-        """Reset exploration, counts and worth for another part."""
-        self._exploration, self._has_new_lanes = Exploration(), False
-        self._done, self._in_vain = -1, 0
-        self.scope.begin()
+    def begin_order(self) -> None:
+        """Forget the viewpoints of the previous order, and what it tried in vain."""
+        self._order.exploration, self._has_new_lanes = Exploration(), False
+        self.try_all()
+        self.scope.begin_pass()
 
-    @property
-    def reached(self) -> ReachedCells | None:
-        """The cells that have been reachable since the order began; None without an open order."""
-        return self.reach.cells if self.order_state.is_open else None
+    def begin_pass(self, *, has_new_lanes: bool) -> None:
+        """Try all cells of another pass; ``has_new_lanes``: whether it sets lanes of its own."""
+        self._has_new_lanes = has_new_lanes
+        self.try_all()
+        if self._order.state.pass_number == 1:
+            self._order.exploration.begin_zone()
+
+    def begin_retry(self, cell: Cell) -> None:
+        """Try the cells left once more, and look at closed areas; ``cell``: the robot's cell."""
+        self._order.exploration.aim_at(self.uncovered.viewpoints() - {cell})
+        self.try_all()
+        # In a retry, one path without progress is enough to give up.
+        self._done, self._in_vain = self.done, MAX_IN_VAIN
+
+    def try_all(self) -> None:
+        """Forget which cells were tried in vain."""
+        self._done, self._in_vain = -1, 0
+        self._company.try_again()
 
     @property
     def can_plan(self) -> bool:
         """Whether a plan would have anything to cover."""
-        return self.order_state.stage is not Stage.RETURNING and self.cells.left() > 0
+        return self._order.state.stage is not Stage.RETURNING and self.cells.left() > 0
 
     @property
     def waits_for_others(self) -> bool:
         """Whether only parts of other robots are left, and those robots make progress."""
         return self._company.others_go_on and not self.cells.left_to_me()
 
-    def goal(self, errand: Errand = "home") -> Cell | None:
-        """Return the destination cell (row, col) of an errand; None for none."""
-        places, lattice = self._map.places, self._map.lattice
-        place = places.place(errand)
-        if place is None or lattice is None:
-            is_elsewhere = errand == "charge" and places.why_no_dock
-            return None if is_elsewhere else self.order_state.home
-        pose = place.stand
-        return anchor_cell(lattice, pose) or lattice.cell_at(pose.x, pose.y)
-
-    @property
-    def ends_home(self) -> bool:
-        """Whether the present path has to end at the robot's home."""
-        return self.order_state.returns_home_next
-
-    def note_cell(self, cell: Cell) -> None:
-        """Note that the robot is in ``cell``."""
-        self._exploration.note_cell(cell)
+    def record_cell(self, cell: Cell) -> None:
+        """Record that the robot is in ``cell``."""
+        self._order.exploration.record_cell(cell)
 
     def problem(
-        self, cell: Cell, before: NDArray[np.int32], *, attempt: int = 0
+        self, cell: Cell, before: NDArray[np.int32], home: Cell | None, *, attempt: int = 0
     ) -> CoverageProblem:
         """Return the planning problem of the cells that are open now.
 
         Args:
             cell: the robot's cell.
             before: int32 (n, 2), the current path from that cell on.
+            home: the cell (row, col) in which the order ends; None for none.
             attempt: see ``CoverageProblem``.
 
         Raises:
@@ -125,15 +118,15 @@ class PresentPart:
         """
         area = self._map.area
         assert area is not None
-        self._exploration.end_if_reached(self.order_state.current_zone, area)
-        problem = self.scope.problem(cell, before, self.goal(), attempt)
+        self._order.exploration.end_if_reached(self._order.state.current_zone, area)
+        problem = self.scope.problem(cell, before, home, attempt)
         # A repair would keep the lanes of the pass before.
         is_full, self._has_new_lanes = self._has_new_lanes, False
         return replace(problem, is_full=is_full)
 
     def explore(self, cell: Cell) -> str:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
-        exploration, zone = self._exploration, self.order_state.current_zone
+        exploration, zone = self._order.exploration, self._order.state.current_zone
         area = self._map.area
         free = None if area is None else self.scope.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
@@ -148,7 +141,7 @@ class PresentPart:
         """Return why the robot stands although a plan is wanted, or ""."""
         if self.waits_for_others:
             return "others sweep what is left"
-        return self._why_shut() if self._exploration.is_shut_still(now) else ""
+        return self._why_shut() if self._order.exploration.is_shut_still(now) else ""
 
     def why_looking(self, cell: Cell, now: float) -> str:
         """Return why the robot stands without a cell to cover, or "".
@@ -156,49 +149,45 @@ class PresentPart:
         It looks at ground beyond its map; or it waits for robots that block the way to its zone,
         for as long as the retries of an order take.
         """
-        exploration, policy = self._exploration, self._config.policy
+        exploration, policy = self._order.exploration, self._config.policy
         if exploration.waits_for_way(now, policy.retries * policy.retry_s):
             return self._why_shut()
         return exploration.why_looking(cell, now)
 
     def _why_shut(self) -> str:
-        zone = self.order_state.current_zone
+        zone = self._order.state.current_zone
         return "others stand in the way" + (f" to zone {zone.name!r}" if zone else "")
 
-    def note_path_end(self, why: str) -> bool:
-        """Note the end of a path; return whether the cells it left must wait for a retry.
+    def record_path_end(self, why: str) -> bool:
+        """Record the end of a path; return whether the cells it left must wait for a retry.
 
         ``why``: why the path left them; "" if unknown.
         """
         cells = self.cells.left_to_me()
         if cells > 0:
-            self.uncovered.note_failure(why)
+            self.uncovered.record_failure(why)
         # Cells done are counted, not cells left, as a new map may add cells.
         done = self.done
         self._in_vain = self._in_vain + 1 if cells and done <= self._done else 1
         self._done = done
         is_given_up = cells > 0 and self._in_vain > MAX_IN_VAIN
-        if is_given_up and self._exploration.skip_viewpoint():
+        if is_given_up and self._order.exploration.skip_viewpoint():
             return False
         if is_given_up and self.scope.give_up_first():
             return False
-        if is_given_up and self._company.has_company:
-            # Parts that other robots may leave unswept come before a retry.
-            is_given_up, self._in_vain = self._leave_to_others(), 0
+        area = self._map.area
+        if is_given_up and area is not None:
+            unswept = self.cells.unswept(area.lattice.window) & area.reachable
+            untried = self._company.give_up(unswept, area)
+            if untried is not None:
+                # Parts that other robots may leave unswept come before a retry.
+                is_given_up, self._in_vain = not untried.any(), 0
         return is_given_up
 
     @property
     def done(self) -> int:
         """Number of cells that this robot has covered, or has visited as viewpoints."""
-        return self._ledger.current.snapshot().cells + self._exploration.reached
-
-    def _leave_to_others(self) -> bool:
-        """Give up the cells tried in vain; return whether no untried cell is left."""
-        area = self._map.area
-        assert area is not None
-        unswept = self.cells.unswept(area.lattice.window) & area.reachable
-        self._company.give_up(self._company.mine(unswept, area), area)
-        return not self._company.untried(unswept, area).any()
+        return self._ledger.current.snapshot().cells + self._order.exploration.reached
 
     def pass_over_unreachable(self) -> bool:
         """In a fleet, pass over cells that are unreachable now; return whether there were any.
@@ -206,9 +195,7 @@ class PresentPart:
         Reachable cells of others' parts come before a retry.
         """
         area = self._map.area
-        if area is None or not self._company.has_company:
+        if area is None:
             return False
         unswept = self.cells.unswept(area.lattice.window) & area.reachable
-        mine = self._company.mine(unswept, area)
-        self._company.pass_over(mine, area)
-        return bool(mine.any())
+        return self._company.pass_over(unswept, area)

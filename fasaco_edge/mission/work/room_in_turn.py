@@ -34,8 +34,8 @@ class RoomInTurn:
         self._seen: NDArray[np.uint16] | None = None
         self._newest = 0
 
-    def begin(self) -> None:
-        """Note that a pass begins."""
+    def begin_pass(self) -> None:
+        """Forget which rooms were tried in vain."""
         self._given_up.clear()
 
     def give_up(self) -> bool:

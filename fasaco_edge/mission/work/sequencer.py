@@ -9,20 +9,23 @@ from functools import partial
 import numpy as np
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.placing import left_out
-from fasaco_edge.mission.orders.order import Zone
+from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.mission.rooms.room_book import MOST_LISTED
 from fasaco_edge.mission.work.by_room import RoomPrice
 from fasaco_edge.mission.work.cells_left import LeftBehind, zones_beyond
+from fasaco_edge.mission.work.order_reach import CellsOn
 from fasaco_edge.mission.work.order_state import AT_HOME, OrderState, Stage
-from fasaco_edge.mission.work.present_part import MAX_IN_VAIN, PresentPart
+from fasaco_edge.mission.work.present_order import PresentOrder
+from fasaco_edge.mission.work.present_part import PresentPart
+from fasaco_edge.mission.work.reached_cells import ReachedCells
 
 # A robot is shut in if it can reach less than this share of the area that it could ever reach:
 # MOST_SHARE, or HOME_SHARE if home is in reach, as a door to another room may be closed.
@@ -30,10 +33,12 @@ HOME_SHARE, MOST_SHARE = 0.1, 0.5
 CARRIED_OUT = "the order was carried out"
 
 
-class Sequencer(PresentPart):
+class Sequencer:
     """Decides which part of an order is next, on the present map. Times are [s].
 
     Attributes:
+        part: the part of the order that is due.
+        cells, scope, reach, uncovered: as of that part.
         ending: how the order ended.
     """
 
@@ -45,7 +50,11 @@ class Sequencer(PresentPart):
         company: Company,
         room_price: RoomPrice,
     ) -> None:
-        super().__init__(config, map_state, ledger, company, room_price)
+        self._config, self._map, self._ledger = config, map_state, ledger
+        self._order = order = PresentOrder()
+        self.part = part = PresentPart(config, map_state, ledger, company, room_price, order)
+        self.cells, self.scope = part.cells, part.scope
+        self.reach, self.uncovered = part.reach, part.uncovered
         # Whether floor opens while the robot is on its way home.
         self._left_behind = LeftBehind()
         # Time of the next retry [s]; None for none.
@@ -61,6 +70,26 @@ class Sequencer(PresentPart):
         self._sum_up = sum_up
 
     @property
+    def order_state(self) -> OrderState:
+        """The order and its progress."""
+        return self._order.state
+
+    @property
+    def reached(self) -> ReachedCells | None:
+        """The cells that have been reachable since the order began; None without an open order."""
+        return self.reach.cells if self.order_state.is_open else None
+
+    def goal(self, errand: Errand = "home") -> Cell | None:
+        """Return the destination cell (row, col) of an errand; None for none."""
+        places, lattice = self._map.places, self._map.lattice
+        place = places.place(errand)
+        if place is None or lattice is None:
+            is_elsewhere = errand == "charge" and places.why_no_dock
+            return None if is_elsewhere else self.order_state.home
+        pose = place.stand
+        return anchor_cell(lattice, pose) or lattice.cell_at(pose.x, pose.y)
+
+    @property
     def is_waiting(self) -> bool:
         """Whether the robot waits for a retry."""
         return self._retry_at is not None
@@ -68,36 +97,35 @@ class Sequencer(PresentPart):
     @property
     def is_over(self) -> bool:
         """Whether the order is over."""
-        return self.order_state.stage is Stage.OVER
+        return self._order.state.stage is Stage.OVER
 
-    def start(self, state: OrderState) -> None:
+    def begin_order(self, state: OrderState) -> None:
         """Begin with another order, or with none."""
-        self.order_state = replace(state, reached=None)
+        self._order.state = replace(state, reached=None)
         self._left_behind, self._retry_at = LeftBehind(), None
         is_over = state.stage is Stage.OVER and bool(state.why)
         self.ending = state.why if is_over else CARRIED_OUT
         self._retry_check = (None, False)
-        self._begin_part()
+        self.part.begin_order()
         # Floor behind temporary obstacles counts as reachable for the next order on the same map.
         is_crowded = state.home is not None and self._map.obstacles.closed > 0
-        self.uncovered.begin()
-        self.reach.begin(self.reach.cells if is_crowded else state.reached)
-        self._company.try_again()
+        self.uncovered.begin_order()
+        self.reach.begin_order(self.reach.cells if is_crowded else state.reached)
 
     def set_state(self, state: OrderState) -> None:
         """Continue with the same order in another state, after a command."""
-        self.order_state = state
+        self._order.state = state
 
     def move_home(self, motion: Motion) -> None:
         """Move home with the map, if home is a cell."""
-        if (home := self.order_state.home) is not None:
+        if (home := self._order.state.home) is not None:
             cells = np.array([home], np.int32)
             ((row, col),) = moved_cells(cells, motion, self._config.footprint.cell_m).tolist()
-            self.order_state = replace(self.order_state, home=(row, col))
+            self._order.state = replace(self._order.state, home=(row, col))
 
-    def move_reached(self, motion: Motion) -> None:
-        """Move the reached cells with the map."""
-        self.reach.move(motion)
+    def move_reached(self, before: CellsOn | None, motion: Motion) -> None:
+        """Move the reached cells with the map; ``before``: the cells before it moved."""
+        self.reach.move(before, motion)
         # The cells that were reachable have moved on the map.
         self._left_behind.set_out(None)
 
@@ -115,25 +143,21 @@ class Sequencer(PresentPart):
         share = HOME_SHARE if home is None or area.contains(home) else MOST_SHARE
         return reached < share * once and self.uncovered.is_any_left()
 
-    def begin(self, cell: Cell, now: float) -> str:
+    def begin_stage(self, cell: Cell, now: float) -> str:
         """Start the stage that is due, from ``cell``; return why a plan is wanted, or ""."""
         if self._retry_at is not None and not self._is_worth_trying():
             self.advance(now)
         if self._retry_at is not None:
             return self._begin_retry(cell) if now >= self._retry_at else ""
-        state = self.order_state = self.scope.by_priority(self._ledger)
+        state = self._order.state = self.scope.by_priority(self._ledger)
         if state.begun or state.order is None or state.stage is Stage.OVER or state.waits_for:
             return ""
         zone = state.current_zone
-        self.scope.begin()
+        self.scope.begin_pass()
         if zone is not None and not (state.order.keep_covered and state.pass_number == 1):
             self._forget(zone, state)
-        self._has_new_lanes = zone is not None and bool(zone.kinds)
-        self.order_state = replace(state, begun=True, home=state.home or cell)
-        self._done, self._in_vain = -1, 0
-        self._company.try_again()
-        if state.pass_number == 1:
-            self._exploration.begin()
+        self._order.state = replace(state, begun=True, home=state.home or cell)
+        self.part.begin_pass(has_new_lanes=zone is not None and bool(zone.kinds))
         return "" if state.automatic else state.title
 
     def _forget(self, zone: Zone, state: OrderState) -> None:
@@ -154,14 +178,14 @@ class Sequencer(PresentPart):
 
         A robot that is shut in waits, and tries the present part again.
         """
-        state, area = self.order_state, self._map.area
-        self._exploration.viewpoints.clear()
+        state, area = self._order.state, self._map.area
+        self._order.exploration.viewpoints.clear()
         if state.stage is not Stage.RETURNING and area is not None and self.is_shut_in(area):
             self._retry_at = now + self._config.policy.retry_s
             return
         following = state.next_pass()
         if following is not state:
-            self.order_state = following
+            self._order.state = following
             return
         if state.stage is Stage.RETRYING and not self.is_waiting:
             state = replace(state, tries=state.tries + 1)
@@ -169,14 +193,14 @@ class Sequencer(PresentPart):
             self._end()
             return
         # From here on the rest is counted over all zones.
-        self.order_state = replace(state, stage=Stage.RETRYING)
+        self._order.state = replace(state, stage=Stage.RETRYING)
         if state.tries < self._config.policy.retries and self._is_worth_trying():
             if self._retry_at is None:
                 self._retry_at = now + self._config.policy.retry_s
         elif state.returns_home_next:
             self._retry_at = None
             self._left_behind.set_out(area)
-            self.order_state = replace(state, stage=Stage.RETURNING, begun=False)
+            self._order.state = replace(state, stage=Stage.RETURNING, begun=False)
         else:
             self._end()
 
@@ -186,24 +210,23 @@ class Sequencer(PresentPart):
         An automatic order continues after its end. A robot on its way home turns back if floor has
         opened, at most ``retries`` + 1 times.
         """
-        state, area = self.order_state, self._map.area
+        state, area = self._order.state, self._map.area
         if state.late:
             return
         if state.automatic and state.stage is Stage.OVER:
-            self.order_state = replace(state, stage=Stage.COVERING, why="")
+            self._order.state = replace(state, stage=Stage.COVERING, why="")
         if state.stage is not Stage.RETURNING or area is None:
             return
         may_turn = self._left_behind.times <= self._config.policy.retries
         if may_turn and self._left_behind.is_open(self.cells.open_to_me(area), area):
             self._left_behind.turn_back()
-            self.order_state = replace(state, stage=Stage.RETRYING, begun=True)
-            self._done, self._in_vain = -1, 0
-            self._company.try_again()
+            self._order.state = replace(state, stage=Stage.RETRYING, begun=True)
+            self.part.try_all()
 
     def spend(self, seconds: float) -> None:
         """Count the robot's time [s] since the last call."""
-        state = self.order_state
-        self.order_state = replace(state, spent_s=state.spent_s + seconds)
+        state = self._order.state
+        self._order.state = replace(state, spent_s=state.spent_s + seconds)
 
     def run_out_of_time(self, minutes: float) -> None:
         """End the order at its time limit [min].
@@ -211,11 +234,11 @@ class Sequencer(PresentPart):
         The robot drives home first, unless it is on an errand or was sent home.
         """
         self._retry_at = None
-        self.scope.begin()
-        state = self.order_state = self.order_state.out_of_time(minutes)
+        self.scope.begin_pass()
+        state = self._order.state = self._order.state.out_of_time(minutes)
         is_sent_home = state.paused and state.why == AT_HOME
         if state.errand or is_sent_home:
-            self.order_state = replace(state, paused=state.paused and not is_sent_home)
+            self._order.state = replace(state, paused=state.paused and not is_sent_home)
             self._end()
 
     def waiting_reason(self) -> str:
@@ -223,21 +246,18 @@ class Sequencer(PresentPart):
         cells, policy = self.uncovered.found().cells, self._config.policy
         return (
             f"{cells} {'cell' if cells == 1 else 'cells'} not reached: tried again after "
-            f"{policy.retry_s:g} s ({self.order_state.tries + 1} of {policy.retries})"
+            f"{policy.retry_s:g} s ({self._order.state.tries + 1} of {policy.retries})"
         )
 
     def _begin_retry(self, cell: Cell) -> str:
         self._retry_at = None
-        self._exploration.viewpoints = self.uncovered.viewpoints() - {cell}
-        self._company.try_again()
-        # In a retry, one path without progress is enough to give up.
-        self._done, self._in_vain = self.done, MAX_IN_VAIN
-        return f"tried again, {self.order_state.tries + 1} of {self._config.policy.retries}"
+        self.part.begin_retry(cell)
+        return f"tried again, {self._order.state.tries + 1} of {self._config.policy.retries}"
 
     def _end(self) -> None:
-        order = self.order_state.order
+        order = self._order.state.order
         self._retry_at = None
-        state = self.order_state = replace(self.order_state, stage=Stage.OVER)
+        state = self._order.state = replace(self._order.state, stage=Stage.OVER)
         late = f"{state.late}: " if state.late else ""
         self.ending = late + self.uncovered.outcome() + self._sum_up()
         area, free = self._map.area, self._map.free
@@ -245,7 +265,7 @@ class Sequencer(PresentPart):
             self.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
         if order is not None and (rooms := left_out(order.zones)):
             self.ending += f"; left out: {', '.join(map(repr, rooms)):.{MOST_LISTED}}"
-        self.order_state = replace(state, why=self.ending)
+        self._order.state = replace(state, why=self.ending)
 
     def _is_worth_trying(self) -> bool:
         """Return whether a retry is worthwhile; recomputed if anything changed.

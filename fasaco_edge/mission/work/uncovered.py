@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
@@ -18,7 +17,8 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.orders.order import MissionOrder
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.mission.work.order_reach import OrderReach
-from fasaco_edge.mission.work.order_state import OrderState, Stage
+from fasaco_edge.mission.work.order_state import Stage
+from fasaco_edge.mission.work.present_order import PresentOrder
 
 # Limit on the areas listed, the largest first; the rest are only counted.
 MOST_AREAS = 20
@@ -91,39 +91,32 @@ def viewpoints_beside(closed: NDArray[np.bool_], reachable: NDArray[np.bool_]) -
     return [(row, col) for row, col in beside[largest].tolist()]
 
 
+@dataclass(slots=True, eq=False)
 class UncoveredCells:
     """Finds the cells of an order that stay uncovered, and why.
-
-    Args:
-        map_state, ledger: the map, and the covered cells.
-        reach: the cells that have been reachable since the order began.
-        state: returns the order and its progress.
 
     Masks are bool (rows, cols) on the lattice of the area.
     """
 
-    def __init__(
-        self,
-        map_state: MapState,
-        ledger: MissionLedger,
-        reach: OrderReach,
-        state: Callable[[], OrderState],
-    ) -> None:
-        self._map, self._ledger, self._reach, self._state = map_state, ledger, reach, state
-        # Number of paths that left cells over, and why the last path did; "" if unknown.
-        self._failures, self._why_left = 0, ""
-        self._found: tuple[object, UncoveredAreas] = (None, UncoveredAreas())
+    _map: MapState
+    _ledger: MissionLedger
+    _reach: OrderReach
+    _order: PresentOrder
+    # Number of paths that left cells over, and why the last path did; "" if unknown.
+    _failures: int = field(default=0, init=False)
+    _why_left: str = field(default="", init=False)
+    _found: tuple[object, UncoveredAreas] = field(default=(None, UncoveredAreas()), init=False)
 
-    def begin(self) -> None:
+    def begin_order(self) -> None:
         """Start another order."""
         self._failures, self._why_left = 0, ""
 
-    def succeed(self, before: UncoveredCells) -> None:
+    def continue_from(self, before: UncoveredCells) -> None:
         """Take over the failures of another mission with the same order."""
         self._failures, self._why_left = before._failures, before._why_left
 
-    def note_failure(self, why: str) -> None:
-        """Note that a path left cells over, and why."""
+    def record_failure(self, why: str) -> None:
+        """Record that a path left cells over, and why."""
         self._failures, self._why_left = self._failures + 1, why
 
     def found(self) -> UncoveredAreas:
@@ -131,7 +124,7 @@ class UncoveredCells:
 
         While the robot is on no coverable cell, the last result is returned.
         """
-        area, state = self._map.area, self._state()
+        area, state = self._map.area, self._order.state
         if state.order is None:
             return UncoveredAreas()
         key = (area, self._ledger.version, state)
@@ -152,7 +145,7 @@ class UncoveredCells:
 
     def outcome(self) -> str:
         """Return as text how much of the order is covered, and why the rest is not."""
-        order, area, lattice = self._state().order, self._map.area, self._map.lattice
+        order, area, lattice = self._order.state.order, self._map.area, self._map.lattice
         if order is None or lattice is None:
             return "the order was carried out"
         zones = "" if order.zones[0].polygon is None else " of the zones"
@@ -182,7 +175,7 @@ class UncoveredCells:
 
     def is_any_left(self) -> bool:
         """Return whether any ordered cell is left that was ever reachable."""
-        lattice, state = self._map.lattice, self._state()
+        lattice, state = self._map.lattice, self._order.state
         if state.order is None or state.next_pass() is not state:
             return True
         assert lattice is not None
@@ -203,7 +196,7 @@ class UncoveredCells:
         return asked
 
     def _reason(self, cause: Cause) -> str:
-        if self._state().late and cause is Cause.LEFT_OVER:
+        if self._order.state.late and cause is Cause.LEFT_OVER:
             return NO_TIME
         tries = "1 try" if self._failures == 1 else f"{self._failures} tries"
         why = f", {self._why_left}" if self._why_left else ""
@@ -211,7 +204,7 @@ class UncoveredCells:
 
     def viewpoints(self) -> set[Cell]:
         """Return the cells (row, col) from which the robot can look at closed areas."""
-        order, area = self._state().order, self._map.area
+        order, area = self._order.state.order, self._map.area
         if order is None or area is None:
             return set()
         window = area.lattice.window
@@ -246,7 +239,7 @@ class UncoveredCells:
             causes[free.coverable & (lattice.states == BLOCKED)] = Cause.KEPT_OUT
         behind = self._reach.without_keep_outs(area) & lattice.coverable & ~reachable
         causes[behind] = Cause.BEHIND_KEEP_OUT
-        if self._state().stage is not Stage.COVERING:
+        if self._order.state.stage is not Stage.COVERING:
             # While covering, reachable cells are still to come.
             causes[reachable] = Cause.LEFT_OVER
         causes[~self._uncovered(order, area)] = 0

@@ -81,11 +81,11 @@ class WorthFirst:
         self._cell_s = step_s
         self._is_given_up = False
 
-    def begin(self) -> None:
-        """Note that a pass begins."""
+    def begin_pass(self) -> None:
+        """Begin a pass with all floor."""
         self.least, self._is_given_up = 0, False
 
-    def take(self, given: OccupancyGrid | None) -> bool:
+    def receive(self, given: OccupancyGrid | None) -> bool:
         """Take priorities from a message; return whether a new plan is needed.
 
         Equal priorities change nothing.

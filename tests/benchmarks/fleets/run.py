@@ -152,7 +152,7 @@ class FleetRun:
         self.robots = []
         for name, (x, y) in zip(names, fleet.starts, strict=True):
             mission = Mission(fleet.config(), kind=FleetKind(name))
-            mission.covered.shared.begin(1)
+            mission.covered.shared.begin_epoch(1)
             world = World(fleet.truth, Pose2D(x, y), simulated)
             ledger, messages = CoverageLedger(fleet.cell_m), Messages(name, fleet.radius_m)
             self.robots.append(FleetRobot(name, mission, world, ledger, messages))

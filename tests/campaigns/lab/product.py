@@ -144,7 +144,7 @@ class Product:
         decision = runner.step(mission, [*events, *plans], now)
         for fault in decision.faults:
             self.faults[fault.code] = self.faults.get(fault.code, 0) + 1
-        if mission.route.wanted and mission.route.is_improving:
+        if mission.route.requests.wanted and mission.route.requests.is_improving:
             self._planning.interrupt(now)
         if decision.plan is not None:
             self._planning.submit(decision.plan, now)

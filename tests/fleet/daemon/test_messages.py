@@ -180,7 +180,7 @@ def test_a_robot_sends_pace_and_all_tiles_after_it_forgets_cells():
         ledger.visit((64 * row, 0))
     robot.mission.company.step_s = 7.5
     for now in (0.0, 1.0, 2.0):
-        robot.mission.covered.shared.note_forgotten()
+        robot.mission.covered.shared.record_forgotten()
         sender.publish(robot.mission, now)
     assert [said.step_s for said in listener.heard] == [7.5] * 3
     assert [len(said.swept) for said in listener.heard] == [TILES] * 3
@@ -191,7 +191,7 @@ def test_a_robot_sends_its_next_metres_for_any_cell_size(cell_m, monkeypatch):
     monkeypatch.setattr(world, "CELL", cell_m)
     footprint = Footprint(cell_m=cell_m, robot_radius_m=cell_m / 2)
     drive = Drive((0, 0), config=replace(WORLD, footprint=footprint), kind=FleetKind("r1"))
-    drive.mission.covered.shared.begin(1)
+    drive.mission.covered.shared.begin_epoch(1)
     drive.tell(MapReceived(building("." * 600)), pose_at(0, 0))
     drive.plan()
     line, listener = path_ahead(drive.mission), Listener()
@@ -211,7 +211,7 @@ def test_robots_on_a_map_in_utm_divide_its_cells(northing_m):
     drives, subscriptions = {}, {}
     for name, cell in ends.items():
         drives[name] = Drive(cell, config=WORLD, kind=FleetKind(name))
-        drives[name].mission.covered.shared.begin(1)
+        drives[name].mission.covered.shared.begin_epoch(1)
         drives[name].tell(MapReceived(building(*["." * 12] * 4, at=corner)), pose_at(*cell))
         drives[name].plan()
         subscriptions[name] = FleetReceiver(structs.replace(CONFIG, robot=RobotConfig(name=name)))

@@ -24,7 +24,7 @@ class FleetRobot(Drive):
         super().__init__(cell, config=config, kind=FleetKind(name))
         if before is not None:
             self.mission.restore(before)
-        self.mission.covered.shared.begin(1)
+        self.mission.covered.shared.begin_epoch(1)
         self.tell(MapReceived(building(*rows)), pose_at(*cell))
 
     def report(self):

@@ -22,6 +22,7 @@ from fasaco_edge.fleet.mission.shared_work import MOST_AHEAD
 from fasaco_edge.fleet.mission.tiles import TILE_BYTES, SweptQueue
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.mission.coverage.ledger import CoverageLedger
+from fasaco_edge.mission.coverage.loop_closure import Motion
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.orders.order import Zone
 from fasaco_edge.mission.orders.zones import in_zones
@@ -200,8 +201,8 @@ def test_cells_swept_by_others_survive_a_restart():
 )
 def test_unreadable_progress_of_others_is_received_again(kept):
     shared = SharedProgress()
-    shared.resume(kept)
-    shared.begin(9)
+    shared.restore(kept)
+    shared.begin_epoch(9)
     assert shared.epoch == 9
     assert not shared.swept(Window(0, 0, 9, 9)).any()
 
@@ -219,7 +220,7 @@ def test_an_unsweepable_cell_is_given_up_while_another_works():
     assert ours.mission.company.has_company
     assert "1 cell not reached: tried again after 30 s (1 of 1)" in reasons
     assert "0.1 m2 not reached: left over after" in reasons[-1]
-    assert ours.mission.route.plans < 40
+    assert ours.mission.route.requests.plans < 40
 
 
 def test_after_a_loop_closure_nothing_uncertain_is_given_back():
@@ -227,10 +228,10 @@ def test_after_a_loop_closure_nothing_uncertain_is_given_back():
         MissionLedger(0.3, 0.3, shared=SharedProgress()),
         {(row, col) for row in range(10) for col in range(10)},
     )
-    ledger.shared.begin(5)
+    ledger.shared.begin_epoch(5)
     ledger.shared.receive("r2", 1, tiles_of(block))
-    ledger.note_map_motion(Pose2D(1.5, 1.5))
-    ledger.forget_uncertain(Pose2D(2.1, 1.5))
+    ledger.lift_tool()
+    ledger.forget_uncertain(Motion(Pose2D(1.5, 1.5), Pose2D(2.1, 1.5)))
     left = ledger.shared.swept(Window(0, 0, 10, 10))
     # It was there wherever between its two places the map lay.
     assert left[:, 2:].all()
@@ -300,7 +301,7 @@ def everywhere(rows, _cols):
 )
 def test_disregarded_cells_count_once_swept_again(kept, counted):
     shared, cells = SharedProgress(), {(0, col) for col in range(20)}
-    shared.begin(1)
+    shared.begin_epoch(1)
     shared.receive("r2", 1, tiles_of(cells))
     shared.disregard(everywhere)
     # It has forgotten all but what it kept, and swept all again, out of hearing.
@@ -406,13 +407,13 @@ def test_robots_beyond_the_limit_do_not_replace_each_other():
 def test_a_robot_that_comes_and_goes_keeps_the_paths_of_others():
     fleet = FleetDrive(HALL, TWO)
     ours, other = fleet.robots.values()
-    report, plans = other.report(), ours.mission.route.plans
+    report, plans = other.report(), ours.mission.route.requests.plans
     for second in range(40):
         state = "covering" if second % 2 else "blocked"
         ours.tell(replace(report, state=state, x=1.0 + 0.1 * (second % 3)), after=0.0)
         ours.tick()
     assert 2 <= ours.mission.company.numbers.number <= 9
-    assert ours.mission.route.plans - plans <= 9
+    assert ours.mission.route.requests.plans - plans <= 9
 
 
 def test_a_robot_without_a_part_does_not_divide_again_and_again():

@@ -70,11 +70,11 @@ def test_a_robot_without_a_part_stands_while_another_sweeps():
     shared = Shared()
     shared.run(40)
     ours = shared.ours
-    plans = ours.mission.route.plans
+    plans = ours.mission.route.requests.plans
     shared.run(60)
     assert (ours.mission.state, ours.mission.reason) == ("covering", "others sweep what is left")
     assert not ours.walk
-    assert ours.mission.route.plans == plans
+    assert ours.mission.route.requests.plans == plans
     # By that others know that it does not hang.
     assert waits_for(ours.mission) == "r2"
     ours.command("pause", after=1.0)

@@ -44,7 +44,7 @@ def divided_by(member, number):
 def in_room():
     """A robot, r1, in a room."""
     robot = Robot(Mission(CONFIG, kind=FleetKind("r1")))
-    robot.mission.covered.shared.begin(1)
+    robot.mission.covered.shared.begin_epoch(1)
     robot.tell(MapReceived(room(4.5, 3.5)))
     return robot
 

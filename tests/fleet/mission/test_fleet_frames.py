@@ -178,7 +178,7 @@ class Robot(Drive):
         self.said, self.receiver = [], FleetReceiver(config)
         self.sender = FleetSender(self, config)
         super().__init__(cell, kind=FleetKind(name))
-        self.mission.covered.shared.begin(1)
+        self.mission.covered.shared.begin_epoch(1)
         map_frame = seen_from(Pose2D(0.0, 0.0), origin)
         grid = building(*rows)
         self.tell(MapReceived(replace(grid, geometry=replace(grid.geometry, origin=map_frame))))

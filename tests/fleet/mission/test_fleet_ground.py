@@ -137,7 +137,7 @@ def members():
     """What r1 knows of r2, which can reach more than itself."""
     ledger = MissionLedger(CELL, CELL, shared=SharedProgress())
     ledger.move_to("map")
-    ledger.shared.begin(1)
+    ledger.shared.begin_epoch(1)
     members = Members("r1", ledger, CELL)
     members.receive(LARGER, 1.0)
     return members

@@ -54,7 +54,7 @@ def swept_by_others(mission):
 def test_a_moved_map_of_another_robot_drops_its_earlier_cells():
     """It was restarted with an origin put right, and keeps its epoch."""
     receiver, drive = FleetReceiver(HALL), Drive((3, 3), kind=IN_FLEET)
-    drive.mission.covered.shared.begin(1)
+    drive.mission.covered.shared.begin_epoch(1)
     drive.tell(MapReceived(building(*["." * 60] * 20)), pose_at(3, 3))
     drive.tell(receiver.event(told_from(0.0)))
     assert swept_by_others(drive.mission) == BLOCK
@@ -72,7 +72,7 @@ def test_a_moved_map_of_another_robot_drops_its_earlier_cells():
 
 def test_cells_of_a_moved_robot_count_if_none_were_disregarded():
     shared, tiles = SharedProgress(), (((0, 0), bits_of(BLOCK)),)
-    shared.begin(1)
+    shared.begin_epoch(1)
     shared.receive("r2", 1, tiles)
     assert shared.receive("r2", 1, tiles, lattice=AT)
     assert shared.cells_of("r2") == 25
@@ -81,7 +81,7 @@ def test_cells_of_a_moved_robot_count_if_none_were_disregarded():
     assert shared.cells_of("r2") == 15
     kept = shared.encode()
     for again in (shared, SharedProgress()):
-        again.resume(kept)
+        again.restore(kept)
         again.receive("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
         again.receive("r2", 1, tiles, lattice=Pose2D(0.0, 0.0))
         assert again.cells_of("r2") == 0
@@ -95,16 +95,16 @@ def test_cells_of_a_moved_robot_count_if_none_were_disregarded():
 )
 def test_cells_from_before_a_correction_of_the_own_map_are_void(place):
     shared, tiles = SharedProgress(MapPlace((1.0, 2.0, 0.0))), (((0, 0), bits_of(BLOCK)),)
-    shared.begin(5)
+    shared.begin_epoch(5)
     shared.receive("r2", 1, tiles, lattice=AT)
     shared.receive("r3", 1, tiles)
     same, other = SharedProgress(MapPlace((1.0, 2.0, 0.0))), SharedProgress(place)
     for again in (same, other):
-        again.resume(shared.encode())
+        again.restore(shared.encode())
         assert again.epoch == 5
     assert [same.cells_of(robot) for robot in ("r2", "r3")] == [25, 25]
     assert not other.swept(Window(0, 0, 99, 99)).any()
-    other.resume(other.encode())
+    other.restore(other.encode())
     other.receive("r2", 1, tiles)
     assert other.cells_of("r2") == 25
 
@@ -126,7 +126,7 @@ class OnFloors(Drive):
         super().__init__((0, 0), kind=FleetKind("r1", place))
         if before is not None:
             self.mission.restore(before)
-        self.mission.covered.shared.begin(1)
+        self.mission.covered.shared.begin_epoch(1)
         fleet = FleetConfig("hall", frame, place.origin[0])
         self.receiver = FleetReceiver(structs.replace(HALL, fleet=fleet))
         self.listener = Listener()

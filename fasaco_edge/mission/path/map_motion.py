@@ -1,0 +1,100 @@
+"""Map motion: what lay on the map before it moved, kept until a pose shows how it moved.
+
+After a loop closure the moved map comes first. The new map changes reach, trail and path before the
+first pose on it shows the motion, so they are moved as they were before that map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.mission.coverage.loop_closure import Motion
+from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+from fasaco_edge.mission.events import PathUpdate
+from fasaco_edge.mission.path.route import Route
+from fasaco_edge.mission.path.trail_layer import TrailLayer
+from fasaco_edge.mission.work.order_reach import CellsOn
+from fasaco_edge.mission.work.sequencer import Sequencer
+from fasaco_edge.planners.living_trail import TrailSnapshot
+
+
+class _Before(NamedTuple):
+    """What lay on the map: the robot's pose, reached cells, trail, and path, int32 (n, 2)."""
+
+    pose: Pose2D | None = None
+    reached: CellsOn | None = None
+    trail: TrailSnapshot | None = None
+    path: NDArray[np.int32] | None = None
+
+
+@dataclass(slots=True, eq=False)
+class MapMotion:
+    """Moves coverage, reached cells, trail and path with the map."""
+
+    _ledger: MissionLedger
+    _orders: Sequencer
+    _trail: TrailLayer
+    _route: Route
+    _before: _Before = field(default=_Before(), init=False)
+    # The motion that the newest pose has shown, the path before it, and the number of cells that it
+    # makes uncertain; None once the path has moved.
+    _shown: tuple[Motion, NDArray[np.int32] | None, int] | None = field(default=None, init=False)
+
+    def receive_map(self, pose: Pose2D) -> None:
+        """Keep what lay on the map, as the newest one has moved under a robot at ``pose``.
+
+        If the map moves again before a pose shows how, the state before the first motion counts.
+        """
+        before = self._before
+        self._before = _Before(
+            pose,
+            before.reached or self._orders.reach.reached,
+            self._trail.trail.snapshot() if before.trail is None else before.trail,
+            self._route.path_to_keep if before.path is None else before.path,
+        )
+        self._ledger.lift_tool()
+
+    def receive_pose(self, pose: Pose2D) -> Motion | None:
+        """Return the motion that a pose shows, and move all but the path with it; None for none."""
+        before, self._before, self._shown = self._before, _Before(), None
+        if before.pose is None:
+            return None
+        motion, uncertain = Motion(before.pose, pose), 0
+        if not motion.is_still:
+            assert before.trail is not None
+            self._trail.move(before.trail, motion)
+            uncertain = self._ledger.forget_uncertain(motion)
+        self._orders.move_reached(before.reached, motion)
+        self._shown = motion, before.path, uncertain
+        return motion
+
+    def move_path(self, now: float) -> PathUpdate | None:
+        """Move the path once the reachable area on the moved map is known; want a plan.
+
+        Returns:
+            The path to publish at ``now`` [s]; None for none.
+        """
+        shown, self._shown = self._shown, None
+        if shown is None:
+            return None
+        motion, path, uncertain = shown
+        update = None
+        if path is not None and len(path) and not motion.is_still:
+            update = self._route.move(path, motion, now)
+        if uncertain:
+            self._route.requests.want(f"map and pose moved: {uncertain} cells to be covered again")
+        return update
+
+    def forget_order(self) -> None:
+        """Forget reached cells and path: another order begins."""
+        self._before = self._before._replace(reached=None, path=None)
+
+    def leave_map(self) -> None:
+        """Forget the trail and what is to be moved: they lay on another map."""
+        self._trail.reset()
+        self._before, self._shown = _Before(), None
