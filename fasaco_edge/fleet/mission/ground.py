@@ -27,7 +27,7 @@ from fasaco_edge.fleet.mission.tiles import (
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, Cell, CoverageLattice
-from fasaco_edge.kernels.lattice.ways import FAR, ways_from
+from fasaco_edge.kernels.lattice.reach import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.map.reachable_area import ReachableArea
 

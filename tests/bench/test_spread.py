@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.bench.benchmark import Goal
-from fasaco_edge.drawing.spread import Spread, document, median, percentile, text
+from fasaco_edge.bench.benchmark import MeasuredGoal
+from fasaco_edge.bench.spread import Spread, document, median, percentile, text
 
 numbers = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=300)
 
@@ -44,6 +44,6 @@ def test_a_spread_without_values_is_none():
      (4.0, True, False), (5.0, True, True), (6.0, True, True)],
 )  # fmt: skip
 def test_goal_is_met_up_to_and_at_its_limit(measured, at_least, met):
-    goal = Goal("speed", measured, 5.0, "s", at_least=at_least)
+    goal = MeasuredGoal("speed", measured, 5.0, "s", at_least=at_least)
     assert goal.met is met
     assert goal.document()["met"] is met
