@@ -26,7 +26,7 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class MeasuredGoal:
     """A limit and the measured value, in the same ``unit``.
 
     Attributes:
@@ -81,7 +81,7 @@ class Report:
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     figures: dict[str, Any]
-    goals: tuple[Goal, ...] = ()
+    goals: tuple[MeasuredGoal, ...] = ()
     remarks: tuple[str, ...] = ()
     further: tuple[ResultTable, ...] = ()
     faults: tuple[FasacoError, ...] = ()

@@ -8,7 +8,7 @@ from collections.abc import Generator, Sequence
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
-    Goal,
+    MeasuredGoal,
     Report,
     Say,
     positive,
@@ -22,7 +22,7 @@ from fasaco_edge.bench.processes import (
     warm_kernels,
     with_crate,
 )
-from fasaco_edge.drawing.spread import Spread, document, median, percentile, text
+from fasaco_edge.bench.spread import Spread, document, median, percentile, text
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.host.processes import cpu_seconds, own_mb, peak_mb, resident_mb
 
@@ -147,8 +147,11 @@ def _report(args: argparse.Namespace, runs: Sequence[DaemonRun]) -> Report:
             **delays,
         },
         goals=(
-            *(Goal(what, median(spreads[name]), most, unit) for name, what, most, unit in GOALS),
-            Goal("p99 without planning", delays["rest_ms"]["p99"], GOAL_REST_P99_MS, "ms"),
+            *(
+                MeasuredGoal(what, median(spreads[name]), most, unit)
+                for name, what, most, unit in GOALS
+            ),
+            MeasuredGoal("p99 without planning", delays["rest_ms"]["p99"], GOAL_REST_P99_MS, "ms"),
         ),
         remarks=(
             "kernels come from a warm cache",

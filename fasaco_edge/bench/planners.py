@@ -22,8 +22,8 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
+from fasaco_edge.bench.spread import Spread, document
 from fasaco_edge.config.config import PlannerConfig
-from fasaco_edge.drawing.spread import Spread, document
 from fasaco_edge.errors import FasacoError, IllegalWalk, PlannerFailed
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S, TookTooLongError
@@ -134,7 +134,7 @@ def _measure(args: argparse.Namespace, say: Say) -> Generator[Run, None, None]:
 def _own(
     own: Sequence[UserCode], budget_s: float | None, colony: ColonyConfig
 ) -> Generator[tuple[str, CoveragePlanner], None, None]:
-    from fasaco_edge.planners.own.planner import OwnPlanner  # noqa: PLC0415
+    from fasaco_edge.planners.own.problem import OwnPlanner  # noqa: PLC0415
 
     for code in own:
         yield code.name, OwnPlanner(code, colony.seed, budget_s or OWN_BUDGET_S)

@@ -21,8 +21,8 @@ from fasaco_edge.grid.occupancy import OccupancyGrid, highest
 from fasaco_edge.grid.walls import THRESHOLDS
 from fasaco_edge.kernels.lattice.areas import find_areas
 from fasaco_edge.kernels.rooms.clearance import clearances
-from fasaco_edge.kernels.rooms.doors import LEAST_SURE, DoorLimits, Pixels, find_doors
-from fasaco_edge.kernels.rooms.islands import Limits, furniture
+from fasaco_edge.kernels.rooms.doors import LEAST_SURE, DoorLimits, RoomPixels, find_doors
+from fasaco_edge.kernels.rooms.islands import FurnitureLimits, furniture
 from fasaco_edge.kernels.rooms.regions import beside_cuts, draw_cuts, grow
 
 # Approximate edge to which finer pixels are joined [m].
@@ -106,10 +106,10 @@ def _solid_and_doors(
     """Return the pixels that are neither free nor furniture, and the doors between them."""
     free = kinds == _FREE
     things = furniture(
-        ~free, Limits(round(LONGEST_M / pixel_m), SMALL_M / pixel_m, THICK_M / pixel_m)
+        ~free, FurnitureLimits(round(LONGEST_M / pixel_m), SMALL_M / pixel_m, THICK_M / pixel_m)
     )
     solid = ~free & ~things
-    pixels = Pixels(
+    pixels = RoomPixels(
         clearances(solid, round(CLEAR_M / pixel_m)),
         solid,
         (kinds == _WALL) & ~things,

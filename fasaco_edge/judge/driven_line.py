@@ -129,7 +129,7 @@ def _from_rest_to_rest(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DrivenLine:
+class RasterLine:
     """A driven line on the raster of a floor.
 
     Attributes:
@@ -140,7 +140,7 @@ class DrivenLine:
     ends: Points
 
     @classmethod
-    def of(cls, line_xy: Points, geometry: GridGeometry, driven: Mask | None) -> DrivenLine:
+    def of(cls, line_xy: Points, geometry: GridGeometry, driven: Mask | None) -> RasterLine:
         origin, yaw = geometry.origin, geometry.origin.yaw
         turned = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
         places = (line_xy - np.array([origin.x, origin.y])) @ turned / geometry.resolution

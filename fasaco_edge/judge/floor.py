@@ -33,8 +33,8 @@ from fasaco_edge.judge.driven_line import (
     TOUCH_TOLERANCE_PX,
     ArcBends,
     DriveLimits,
-    DrivenLine,
     Points,
+    RasterLine,
     drive_seconds,
 )
 from fasaco_edge.judge.pixels import Mask, Patches, through, within
@@ -187,7 +187,7 @@ def judge_floor(
             f"driven must have a member for each of {len(line_xy) - 1} segments, got {driven.shape}"
         )
     floor = _Floor.of(grid, robot)
-    line = DrivenLine.of(line_xy, floor.geometry, driven)
+    line = RasterLine.of(line_xy, floor.geometry, driven)
     reachable = floor.reachable_from(stands_at or tuple(line_xy[0].tolist()))
     swept = floor.under_tool(lambda radius_px: line.swept(radius_px, floor.free.shape))
     swept &= reachable
@@ -247,7 +247,7 @@ class _Floor:
         # Pixels are connected by their edges: a diagonal distance takes more steps.
         return under & through(self.free, near(self.radius_px), math.ceil(SQRT2 * beyond_px))
 
-    def illegal_share(self, line: DrivenLine) -> float:
+    def illegal_share(self, line: RasterLine) -> float:
         touched = within(~self.free, self.radius_px - TOUCH_SLACK_PX - TOUCH_TOLERANCE_PX)
         # Even a robot smaller than a pixel may not stand outside free floor.
         touched |= ~self.free
@@ -266,7 +266,7 @@ class _Floor:
         return illegal / length
 
 
-def _figures(floor: _Floor, line: DrivenLine, reachable: Mask, swept: Mask) -> FloorFigures:
+def _figures(floor: _Floor, line: RasterLine, reachable: Mask, swept: Mask) -> FloorFigures:
     pixel_m, robot = floor.geometry.resolution, floor.robot
     areas = _areas(reachable, swept, pixel_m)
     swept_m2 = areas["swept_m2"]

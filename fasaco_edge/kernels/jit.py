@@ -286,11 +286,6 @@ def _listen() -> None:
     event.register("numba:compiler_lock", _Locking())
 
 
-def kernel_folder() -> Path | None:
-    """Return the folder that this process loads its kernels from; None if none can be used."""
-    return _KEPT.folder
-
-
 def pack_loaded() -> None:
     """Take less memory for the kernels loaded so far: 40 MB less in a mission.
 

@@ -31,7 +31,7 @@ LEFT_BY_JUDGE = 1.6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ground:
+class PlanGround:
     """The cells and floor of a plan.
 
     Attributes:
@@ -56,7 +56,7 @@ class Ground:
         robot: RobotConfig,
         start_xy: tuple[float, float],
         align: str | float,
-    ) -> Ground:
+    ) -> PlanGround:
         """Return the ground of a line over the floor reachable from a point.
 
         Args:
@@ -108,7 +108,7 @@ class Ground:
         window = self.stands.lattice.window
         return row + window.row0, col + window.col0
 
-    def only(self, cells: NDArray[np.bool_], *, beyond: bool) -> Ground:
+    def only(self, cells: NDArray[np.bool_], *, beyond: bool) -> PlanGround:
         """Return this ground; only the floor in some cells has to be swept.
 
         Args:

@@ -16,7 +16,7 @@ from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.host.documents import converted
-from fasaco_edge.offline.ground import Ground, Line
+from fasaco_edge.offline.ground import Line, PlanGround
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.result import Plan
 from fasaco_edge.offline.search import Ending, Planning
@@ -147,11 +147,7 @@ def plan(
 
 
 def _cell(name: str, given: object, expectation: str) -> Cell:
-    """Return an argument as a cell, two whole numbers within the limit.
-
-    Raises:
-        BadConfiguration: it is not a cell.
-    """
+    """Return an argument as a cell, two whole numbers within the limit; else BadConfiguration."""
     try:
         row, col = (operator.index(at) for at in given)  # type: ignore[attr-defined]
         is_cell = abs(row) <= MOST_INDEX and abs(col) <= MOST_INDEX
@@ -162,11 +158,7 @@ def _cell(name: str, given: object, expectation: str) -> Cell:
 
 
 def _point(name: str, given: object) -> tuple[float, float]:
-    """Return an argument as a point.
-
-    Raises:
-        BadConfiguration: it is not a point.
-    """
+    """Return an argument as a point, two finite numbers; else BadConfiguration."""
     try:
         x, y = (float(at + 0.0) for at in given)  # type: ignore[attr-defined]
         is_point = math.isfinite(x) and math.isfinite(y)
@@ -194,7 +186,7 @@ def _ground(
     start_xy: tuple[float, float] | None,
     line: str,
     align: str | float | None,
-) -> Ground:
+) -> PlanGround:
     require(line in (CELLS, *LINES), "line", f"be one of {CELLS}, {', '.join(LINES)}", line)
     if line == CELLS and robot.turn_radius_m:
         raise BadConfiguration(
@@ -218,15 +210,15 @@ def _ground(
     if start is None:
         start = map.start(lattice) if start_xy is None else lattice.cell_at(*start_xy)
     if line == CELLS or map.grid is None:
-        return Ground(lattice, map.grid, start)
+        return PlanGround(lattice, map.grid, start)
     if start_xy is None:
         (xy,) = lattice.centres(np.array([start], np.int32)).tolist()
         start_xy = xy[0], xy[1]
-    return Ground.of_floor(map.grid, robot, start_xy, WALLS if align is None else align)
+    return PlanGround.of_floor(map.grid, robot, start_xy, WALLS if align is None else align)
 
 
 def _curve(
-    xy: Line, ground: Ground, line: str, robot: RobotConfig, *, is_end_fixed: bool
+    xy: Line, ground: PlanGround, line: str, robot: RobotConfig, *, is_end_fixed: bool
 ) -> Curve | None:
     """Return the curve along a line; None for a robot that turns on the spot."""
     config = robot.curves(LINES[line].price_s_m2) if line in LINES else None
@@ -237,7 +229,7 @@ def _curve(
 
 
 def _problem(
-    ground: Ground,
+    ground: PlanGround,
     robot: RobotConfig,
     end: str | Cell,
     covers: Covers = "all",

@@ -26,7 +26,7 @@ from fasaco_edge.offline.figures import (
     floor_words,
     judged_floor,
 )
-from fasaco_edge.offline.ground import Ground, Line
+from fasaco_edge.offline.ground import Line, PlanGround
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.rooms import RoomsUnderLine
 from fasaco_edge.offline.settings import CELLS, Search
@@ -86,7 +86,7 @@ class Plan:
     robot: RobotConfig
     line: str
     search: Search
-    ground: Ground
+    ground: PlanGround
     problem: CoverageProblem
     path: CoveragePath
     xy: Line

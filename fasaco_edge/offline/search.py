@@ -13,13 +13,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.offline.ground import Ground, Line, line_through
+from fasaco_edge.offline.ground import Line, PlanGround, line_through
 from fasaco_edge.offline.settings import CELLS, Search
 from fasaco_edge.planners.bound import LowerBound
 from fasaco_edge.planners.cost import SearchWork
 from fasaco_edge.planners.line import LineSearch
 from fasaco_edge.planners.own.loading import UserCode
-from fasaco_edge.planners.own.planner import OwnPlanner
+from fasaco_edge.planners.own.problem import OwnPlanner
 from fasaco_edge.planners.own.time_limit import OWN_BUDGET_S
 from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
@@ -151,7 +151,7 @@ class Planning:
     def __init__(
         self,
         problem: CoverageProblem,
-        ground: Ground,
+        ground: PlanGround,
         search: Search,
         own: UserCode | None,
         ending: Ending,

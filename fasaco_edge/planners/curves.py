@@ -89,7 +89,7 @@ class Curve:
         return float(np.hypot(*np.diff(self.xy, axis=0).T)[self.is_backward].sum())
 
 
-class Ground(Protocol):
+class FreePlaces(Protocol):
     """Places where the robot's disc fits: a part of ``Floor``."""
 
     @property
@@ -104,7 +104,7 @@ class Ground(Protocol):
 
 def curve_along(
     line_xy: Floats,
-    ground: Ground,
+    ground: FreePlaces,
     to_sweep: NDArray[np.bool_],
     config: CurveConfig,
     *,
@@ -130,7 +130,7 @@ class _Search:
     def __init__(
         self,
         line_xy: Floats,
-        floor: Ground,
+        floor: FreePlaces,
         to_sweep: NDArray[np.bool_],
         config: CurveConfig,
         start_yaw: float | None,
@@ -190,7 +190,7 @@ class _Search:
             ways = self._ways()
         return self._drawn(self._states(ways), ways)
 
-    def _places(self, points: Floats, headings: Floats) -> kernel.Line:
+    def _places(self, points: Floats, headings: Floats) -> kernel.LinePlaces:
         """Return the places to start from, and those along a line without repeated points."""
         legs = np.diff(points, axis=0)
         lengths = np.hypot(*legs.T)
@@ -204,7 +204,7 @@ class _Search:
         starts = np.column_stack([np.repeat(points[:1], len(headings), axis=0), headings])
         none = np.zeros(len(headings))
         way = np.concatenate([none, along])
-        return kernel.Line(
+        return kernel.LinePlaces(
             poses=np.concatenate([starts, poses]),
             way=way,
             leg=np.concatenate([np.full(len(headings), -1), leg]),
@@ -239,7 +239,7 @@ class _Search:
         ways.cost_s[: 2 * self._starts : 2] = 0.0
         if self._is_free_to_start:
             ways.cost_s[2 * self._starts] = 0.0
-        memory = kernel.Memory(
+        memory = kernel.WordMemory(
             np.zeros((MOST_WORDS, PIECES), np.int8),
             np.zeros((MOST_WORDS, PIECES)),
             np.zeros(MOST_WORDS),

@@ -324,7 +324,7 @@ def numbers_along(line: kernel.Line) -> list[int]:
     return numbers
 
 
-def memory_for_moves() -> kernel.Memory:
+def memory_for_moves() -> kernel.MoveMemory:
     """Return working memory of the kernels."""
 
     def points(count: int) -> NDArray[np.float64]:
@@ -333,7 +333,7 @@ def memory_for_moves() -> kernel.Memory:
     def stretches() -> NDArray[np.int64]:
         return np.zeros((kernel.MOST_CAPSULES, 2), np.int64)
 
-    return kernel.Memory(
+    return kernel.MoveMemory(
         before=points(kernel.MOST_CHAIN),
         after=points(kernel.MOST_CHAIN),
         new=points(kernel.MOST_NEW),

@@ -22,7 +22,7 @@ from fasaco_edge.errors import (
 )
 from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.ants.graph import Graph, Scratch
+from fasaco_edge.kernels.ants.graph import Graph, WalkScratch
 from fasaco_edge.kernels.lattice.reach import reachable_from, shortest_walk, walk_cost
 from fasaco_edge.kernels.local_search.walk_array import FRAME, ROOM_BIT, Ground, Prices
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
@@ -144,6 +144,11 @@ class CoverageProblem:
     def only_better(self) -> bool:
         """Whether a valid walk exists already, and a better one is wanted."""
         return self.attempt > 0
+
+    @property
+    def can_repair(self) -> bool:
+        """Whether there is a previous walk, and repairing it suffices."""
+        return not self.is_full and self.before is not None and len(self.before) > 0
 
     @property
     def cells(self) -> int:
@@ -272,10 +277,10 @@ def graph_of(problem: CoverageProblem) -> Graph:
     return Graph(steps.ravel(), wanted.ravel(), open_steps, offsets)
 
 
-def scratch_for(graph: Graph) -> Scratch:
+def scratch_for(graph: Graph) -> WalkScratch:
     """Return working memory for one thread."""
     size = graph.steps.size
-    return Scratch(
+    return WalkScratch(
         open_steps=np.empty_like(graph.open_steps),
         seen=np.zeros(size, np.int32),
         came_from=np.zeros(size, np.int8),

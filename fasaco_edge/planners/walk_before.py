@@ -15,16 +15,6 @@ from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 HELD_CELLS = 18
 
 
-def has_walk(problem: CoverageProblem) -> bool:
-    """Return whether there is a previous walk."""
-    return problem.before is not None and len(problem.before) > 0
-
-
-def can_repair(problem: CoverageProblem) -> bool:
-    """Return whether there is a previous walk, and repairing it suffices."""
-    return not problem.is_full and has_walk(problem)
-
-
 def completed(
     problem: CoverageProblem, framed: FramedGround, before: NDArray[np.int32], held: int = 0
 ) -> NDArray[np.int32]:

@@ -26,8 +26,7 @@ from fasaco_edge.kernels.floor.sweeps import Sweeps
 from fasaco_edge.kernels.lattice.areas import cells_beside, find_areas
 from fasaco_edge.kernels.lattice.pixels import count_free_beside
 from fasaco_edge.kernels.lattice.polygons import add_near, count_in, turn_inside
-from fasaco_edge.kernels.lattice.reach import update_reach
-from fasaco_edge.kernels.lattice.ways import ways_from
+from fasaco_edge.kernels.lattice.reach import update_reach, ways_from
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.curve_config import CurveConfig

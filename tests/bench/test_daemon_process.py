@@ -7,7 +7,7 @@ import pytest
 
 from fasaco_edge.bench.processes import DaemonProcess
 from fasaco_edge.errors import ProcessEnded
-from fasaco_edge.host.processes import peak_mb, resident_mb
+from fasaco_edge.host.processes import resident_mb
 
 
 def test_daemon_is_gone_after_the_block():
@@ -25,11 +25,6 @@ def test_daemon_that_ends_by_itself_says_why():
         pytest.raises(ProcessEnded, match=r"planner\.ants"),
     ):
         daemon.join()
-
-
-def test_memory_of_this_process():
-    pid = os.getpid()
-    assert 5.0 < resident_mb(pid) <= peak_mb(pid)
 
 
 def test_a_process_without_memory_has_none():

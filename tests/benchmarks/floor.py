@@ -13,8 +13,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
-from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report, Say
+from fasaco_edge.bench.spread import percentile
 from tests.benchmarks.calm import Calm
 from tests.benchmarks.harness import grid_name
 
@@ -271,18 +271,18 @@ def _row(run: FloorRun, ratio: float | None) -> tuple[str, ...]:
 
 def _goals(
     samples: Sequence[FloorRun], ratios: dict[tuple[str, str], float]
-) -> Generator[Goal, None, None]:
+) -> Generator[MeasuredGoal, None, None]:
     for case, (least, most) in GOALS.items():
         runs = [run for run in samples if run.case == case]
         if not runs:
             continue
         swept = statistics.median(run.swept_share for run in runs)
-        yield Goal(f"{case}: swept, median", round(swept, 4), least, at_least=True)
+        yield MeasuredGoal(f"{case}: swept, median", round(swept, 4), least, at_least=True)
         known = [ratios[run.building, case] for run in runs if (run.building, case) in ratios]
         if known:
-            yield Goal(f"{case}: ratio, median", round(statistics.median(known), 4), most)
+            yield MeasuredGoal(f"{case}: ratio, median", round(statistics.median(known), 4), most)
     if samples:
-        yield Goal("illegal share, worst", max(run.illegal_share for run in samples), 0.0)
+        yield MeasuredGoal("illegal share, worst", max(run.illegal_share for run in samples), 0.0)
 
 
 FLOOR = Benchmark(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
+from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report, Say, positive
 from fasaco_edge.errors import BadConfiguration
 from tests.benchmarks.floor import RADIUS_M, SPEED_M_S, TOOL_M, TURN_S
 from tests.benchmarks.harness import check_names, grid_name
@@ -242,7 +242,7 @@ def _row(run: PeerRun) -> tuple[str, ...]:
     )
 
 
-def _goals(samples: Sequence[PeerRun]) -> Iterator[Goal]:
+def _goals(samples: Sequence[PeerRun]) -> Iterator[MeasuredGoal]:
     ours = {
         run.building: run.s_m2 for run in samples if run.planner == OURS and run.s_m2 is not None
     }
@@ -253,7 +253,7 @@ def _goals(samples: Sequence[PeerRun]) -> Iterator[Goal]:
             if run.planner == name and run.s_m2 is not None and run.building in ours
         ]
         if ratios:
-            yield Goal(f"s/m2 to {name}, median", round(statistics.median(ratios), 4), 1.0)
+            yield MeasuredGoal(f"s/m2 to {name}, median", round(statistics.median(ratios), 4), 1.0)
 
 
 PEERS = Benchmark(

@@ -15,8 +15,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
-from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report, Say, positive
+from fasaco_edge.bench.spread import percentile
 from tests.benchmarks.buildings import FEWEST_CELLS, building
 
 if TYPE_CHECKING:
@@ -328,7 +328,7 @@ def _report(args: argparse.Namespace, samples: Sequence[Replan]) -> Report:
         for part, most_ms in zip(("total", "repair"), GOALS.get(runs[0].cells, ()), strict=False):
             if most_ms is not None:
                 measured = percentile(times.get(part, [0.0]), 99.0)
-                goals.append(Goal(f"{group}: {part}, p99", measured, most_ms, "ms"))
+                goals.append(MeasuredGoal(f"{group}: {part}, p99", measured, most_ms, "ms"))
     rows = (*names, "first map", "lines") if samples else ()
     return Report(
         title="replans of a line over the floor: processor time from map to line [ms]",

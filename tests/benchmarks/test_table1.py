@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fasaco_edge.drawing.spread import Spread
+from fasaco_edge.bench.spread import Spread
 from fasaco_edge.planners.path import WalkFigures
 from tests.benchmarks.__main__ import main
 from tests.benchmarks.table1.benchmark import TABLE1

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid import occupancy
-from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window, union_bounds
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D, union_bounds
 from fasaco_edge.grid.occupancy import OccupancyGrid, known_bounds
 
 
@@ -25,13 +25,6 @@ def test_known_bounds_follow_the_map_when_it_is_turned(monkeypatch, block):
     assert known_bounds(grid(cells)) == pytest.approx((0.2, 0.1, 0.5, 0.3))
     assert known_bounds(grid(cells, math.pi / 2)) == pytest.approx((-0.3, 0.2, -0.1, 0.5))
     assert known_bounds(grid(np.full((4, 6), -1))) is None
-
-
-def test_a_window_holds_all_that_is_marked():
-    mask = np.zeros((3, 4), bool)
-    assert Window.of(mask) is None
-    mask[0, 3] = mask[2, 1] = True
-    assert Window.of(mask) == Window(0, 1, 3, 4)
 
 
 def test_union_holds_all_parts():

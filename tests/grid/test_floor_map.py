@@ -132,25 +132,6 @@ def test_how_an_origin_is_rounded_makes_no_difference(cell_m):
         assert_same(floor, FloorMap(grids[1], plains[1], footprint, DISCS, PLENTY))
 
 
-def test_a_map_on_another_raster_is_looked_at_as_a_whole():
-    first, other = room(3.0, 2.0), room(3.0, 2.0, yaw=0.01)
-    floor = over(first)
-    floor.change((first, other), CoverageLattice.from_map(other, FOOTPRINT))
-    assert floor.shift is None
-    assert_same(floor, over(other))
-
-
-def test_pixels_that_move_say_by_how_much():
-    """And they move with what is known of them, by whole words."""
-    whole = room(9.0, 2.0)
-    # The first one begins in column 69 of the raster, the other in column 42.
-    first, grown = part_of(whole, 2, 30, 40, 150), part_of(whole, 1, 3, 40, 150)
-    floor = over(first)
-    floor.change((first, grown), CoverageLattice.from_map(grown, FOOTPRINT))
-    assert floor.shift == (0, 128)  # pixels of 0.05 m have two parts
-    assert_same(floor, over(grown))
-
-
 def test_a_map_that_grows_a_little_keeps_its_raster():
     """Else all that lies on the raster would move with each map."""
     whole = room(3.0, 2.0)
@@ -165,17 +146,6 @@ def test_a_map_that_grows_a_little_keeps_its_raster():
         assert floor.blocked is blocked
         assert_same(floor, over(grown))
         known = grown
-
-
-def test_floor_that_a_map_no_longer_shows_is_not_free():
-    """Also where it lies beyond the cells of the new map, but on the raster still."""
-    whole = room(6.0, 5.0)
-    less = part_of(whole, 20, 30, 70, 80)
-    floor = over(whole)
-    pixels = pixels_of(floor)
-    floor.change((whole, less), CoverageLattice.from_map(less, FOOTPRINT))
-    assert_same(floor, over(less))
-    assert_touched(floor, pixels)
 
 
 def test_a_map_that_grows_by_unknown_pixels_touches_little():

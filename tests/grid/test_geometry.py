@@ -73,12 +73,6 @@ def test_a_window_without_another_is_cut_into_rectangles(one, hole):
     assert set(cells) == cells_of(one) - cells_of(hole)
 
 
-@given(windows(), SIDES, SIDES)
-def test_a_moved_window_is_as_large(window, rows, cols):
-    moved = {(row + rows, col + cols) for row, col in cells_of(window)}
-    assert cells_of(window.moved(rows, cols)) == moved
-
-
 RESOLUTIONS = st.sampled_from([0.05, 0.1, 0.0375, float(np.float32(0.05))])
 YAWS = st.one_of(st.sampled_from([0.0, math.pi / 2, math.pi / 4]), st.floats(-7, 7))
 
@@ -136,13 +130,6 @@ def test_slices_pick_a_window_out_of_an_array(inner, outer):
     assert rows[picked].shape == (common.rows, common.cols)
     cells = zip(rows[picked].ravel().tolist(), cols[picked].ravel().tolist(), strict=True)
     assert set(cells) == cells_of(common)
-
-
-def test_a_window_is_laid_around_those_with_cells():
-    one, other, empty = Window(1, 2, 3, 4), Window(0, 5, 2, 9), Window(7, 7, 7, 9)
-    assert Window.around(one, None, other, empty) == Window(0, 2, 3, 9)
-    assert Window.around(None, one) == one
-    assert Window.around(empty, None) is None
 
 
 def test_a_window_is_rounded_outward_to_chunks():

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from fasaco_edge.grid.fine_raster import DECIMALS, PolygonsOnRaster
+from fasaco_edge.grid.fine_raster import PolygonsOnRaster
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 
 ROWS, COLS = 120, 170
@@ -35,15 +35,6 @@ def test_several_polygons_touch_the_union_of_their_cells(origin):
         assert np.array_equal(together.touched(part), expected[part.slices_in(whole)])
 
 
-def test_corners_lie_where_those_of_one_polygon_do_bit_for_bit():
-    geometry = GridGeometry(ROWS, COLS, 0.05, Pose2D(-123.4, 0.31, 0.4))
-    polygons = polygons_of(5)
-    together = PolygonsOnRaster.of(polygons, geometry)
-    for polygon, corners in zip(polygons, together.corners, strict=True):
-        expected = [np.round(geometry.to_pixels(x, y), DECIMALS).tolist() for x, y in polygon]
-        assert corners.tolist() == expected
-
-
 def test_the_work_depends_on_the_polygons_near_a_part():
     """Each part looked at each of two thousand: three seconds for these."""
     geometry = GridGeometry(ROWS, COLS, 0.05, Pose2D(100.0, 0.0))
@@ -53,14 +44,3 @@ def test_the_work_depends_on_the_polygons_near_a_part():
     for row in range(100):
         assert not far.touched(Window(row, 0, row + 20, COLS)).any()
     assert time.thread_time() - started < 0.5
-
-
-def test_touched_edges_do_not_depend_on_the_raster_origin():
-    """A zone drawn along pixel edges, on rasters with different origins."""
-    zone = ((1.1, 0.7), (1.6, 0.7), (1.6, 1.3), (1.1, 1.3))
-    shown = []
-    for col in range(12):
-        geometry = GridGeometry(80, 80, 0.025, Pose2D(0.025 * (col + 8), 0.3))
-        touched = PolygonsOnRaster.of([zone], geometry).touched(Window(0, 0, 80, 80 - col))
-        shown.append(touched[:, 12 - col : 72 - col])
-    assert all((each == shown[0]).all() for each in shown)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fasaco_edge.errors import MapTooLarge
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
-from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint
+from fasaco_edge.grid.lattice import COVERABLE, UNKNOWN, CoverageLattice, Footprint
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from tests import naive
 from tests.support.examples import examples
@@ -87,55 +87,6 @@ def known_cells(lattice):
         (row + window.row0, col + window.col0): (lattice.states[row, col], lattice.steps[row, col])
         for row, col in np.argwhere(lattice.states != UNKNOWN).tolist()
     }
-
-
-def test_a_turned_origin_gives_the_same_lattice():
-    """The same building, its pixels counted from another corner."""
-    random = np.random.default_rng(3)
-    cells = np.where(random.random((24, 33)) < 0.02, 100, 0)
-    height, width = 2.4, 3.3
-    straight = CoverageLattice.from_map(grid(cells, 0.1), CELL)
-    assert {BLOCKED, COVERABLE} <= set(np.unique(straight.states).tolist())
-    for turned in (
-        grid(np.rot90(cells, 1), 0.1, width, 0.0, math.pi / 2),
-        grid(np.rot90(cells, 2), 0.1, width, height, math.pi),
-        grid(np.rot90(cells, 3), 0.1, 0.0, height, -math.pi / 2),
-    ):
-        lattice = CoverageLattice.from_map(turned, CELL)
-        assert known_cells(lattice) == known_cells(straight)
-
-
-def test_an_obstacle_near_a_cell_blocks_it():
-    cells = np.zeros((30, 30), np.int8)
-    cells[4, 6] = 100  # 0.60 to 0.70 m, beside the middle of cell (1, 1) at 0.45 m
-    for radius, state in ((0.149, COVERABLE), (0.16, BLOCKED)):
-        lattice = CoverageLattice.from_map(grid(cells), Footprint(0.3, radius))
-        assert lattice.states[1, 1] == state
-
-
-@pytest.mark.parametrize("value", [-1, 26, 50, 64])
-def test_only_known_free_floor_is_coverable(value):
-    cells = np.zeros((30, 30), np.int8)
-    cells[4, 4] = value
-    lattice = CoverageLattice.from_map(grid(cells), CELL)
-    assert lattice.states[1, 1] == UNKNOWN
-    assert np.count_nonzero(lattice.coverable) == 99
-    assert not lattice.steps[1, 1]
-    assert not CoverageLattice.from_map(grid(np.full((9, 9), value)), CELL).coverable.any()
-
-
-def test_blocked_wins_over_unknown():
-    cells = np.zeros((3, 3), np.int8)
-    cells[1] = (-1, 0, 100)
-    lattice = CoverageLattice.from_map(grid(cells, 0.25), Footprint(0.75, 0.3))
-    assert lattice.states.tolist() == [[BLOCKED]]
-
-
-def test_a_map_without_pixels_has_nothing_coverable():
-    for shape in ((0, 0), (0, 7), (7, 0)):
-        lattice = CoverageLattice.from_map(grid(np.zeros(shape), 0.1, 0.21, 0.34), CELL)
-        assert lattice.states.size <= 4
-        assert not lattice.coverable.any()
 
 
 @pytest.mark.parametrize(

@@ -98,32 +98,11 @@ def test_the_picture_is_turned_upright_and_placed(tmp_path):
     assert not grid.cells.flags.writeable
 
 
-def test_the_default_mode_is_trinary(tmp_path):
-    image = grey([128])
-    assert read_map(described(tmp_path, image)).cells.tolist() == [[-1]]
-    assert read_map(described(tmp_path, image, mode="scale")).cells.tolist() == [[67]]
-
-
 @pytest.mark.parametrize("mode", ["L", "LA", "RGB", "RGBA", "P", "1"])
 def test_black_is_occupied_and_white_free_in_every_kind_of_image(tmp_path, mode):
     image = grey([0, 255]).convert(mode)
     path = described(tmp_path, image, occupied_thresh=0.9, free_thresh=0.1)
     assert read_map(path).cells.tolist() == [[100, 0]]
-
-
-@pytest.mark.parametrize("name", ["map.pgm", "map.bmp"])
-def test_other_image_formats_are_read(tmp_path, name):
-    grey([0, 255], [254, 205]).save(tmp_path / name)
-    assert read_map(_naming(tmp_path, name)).cells.tolist() == [[0, -1], [100, 0]]
-
-
-def test_a_jpeg_is_a_map_too(tmp_path):
-    sharp = np.full((16, 16), 254, np.uint8)
-    sharp[:, :8] = 0
-    Image.fromarray(sharp).save(tmp_path / "map.jpg", quality=95)
-    cells = read_map(_naming(tmp_path, "map.jpg")).cells
-    assert (cells[:, :8] == 100).all()
-    assert (cells[:, 8:] == 0).all()
 
 
 def test_thresholds_that_are_missing_are_those_of_map_saver(tmp_path):
@@ -207,12 +186,6 @@ def test_alpha_does_not_matter_to_raw_values(tmp_path):
     assert read_map(described(tmp_path, image, mode="raw")).cells.tolist() == [[42, 100, -1]]
 
 
-def test_numbers_as_yaml_cpp_reads_them(tmp_path):
-    path = described(tmp_path, grey([0]))
-    path.write_text(path.read_text().replace("0.05", "5e-2"))
-    assert read_map(path).geometry.resolution == 0.05
-
-
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
@@ -221,18 +194,10 @@ def test_numbers_as_yaml_cpp_reads_them(tmp_path):
         ({"free_thresh": -0.1}, "free_thresh: expected float >= 0.0, got -0.1"),
         ({"free_thresh": 0.7}, "free_thresh: must be less than occupied_thresh, 0.65, got 0.7"),
         ({"free_thresh": "low"}, "free_thresh: expected float, got 'low'"),
-        ({"free_thresh": True}, "free_thresh: expected float, got True"),
-        ({"resolution": 0}, "resolution: expected float >= 0.0001, got 0"),
-        (
-            {"resolution": -0.05},
-            "resolution: expected float >= 0.0001, got -0.05",
-        ),
         ({"resolution": math.nan}, "resolution: expected float >= 0.0001, got nan"),
-        ({"resolution": 1e-300}, "expected float >= 0.0001, got 1e-300"),
         ({"resolution": 1e300}, "expected float <= 100.0, got 1e+300"),
         ({"resolution": [["lol"] * 9] * 9}, "resolution: expected float, got [['lol', "),
         ({"origin": [1e300, 0, 0]}, "origin[0]: expected float <= 20000000.0, got 1e+300"),
-        ({"origin": [0, -2.1e7, 0]}, "origin[1]: expected float >= -20000000.0"),
         ({"origin": [0, 0, 1e300]}, "origin[2]: expected float <= 20000000.0"),
         ({"mode": "\x1b[2J"}, r"got '\x1b[2J'"),
         ({"origin": [0, 0]}, "origin: expected array of length 3, got [0, 0]"),
@@ -241,7 +206,6 @@ def test_numbers_as_yaml_cpp_reads_them(tmp_path):
         ({"negate": "maybe"}, "negate: expected 0 or 1, got 'maybe'"),
         ({"image": ""}, "image: expected str of length >= 1, got ''"),
         ({"image": "none.pgm"}, "image: no file"),
-        ({"image": "x" * 5000}, "image: no file"),
     ],
 )
 def test_impossible_values_are_named(tmp_path, changes, expected):
@@ -385,14 +349,6 @@ def test_probabilities_are_written_as_free_occupied_or_unknown(tmp_path):
     assert read_map(tmp_path / "w.yaml").cells.tolist() == [[0, 0, -1, -1, 100, 100, -1]]
 
 
-def test_a_coverage_grid_is_read(tmp_path):
-    free = np.array([[True, False], [True, True], [False, True]])
-    np.save(tmp_path / "grid.npy", free)
-    read = read_coverage_grid(tmp_path / "grid.npy")
-    assert read.dtype == np.bool_
-    np.testing.assert_array_equal(read, free)
-
-
 @pytest.mark.parametrize(
     "array",
     [
@@ -446,12 +402,6 @@ def test_an_archive_is_no_coverage_grid(tmp_path):
         np.savez(file, np.ones((2, 2), bool))
     with pytest.raises(MapFileError, match="an archive of arrays"):
         read_coverage_grid(tmp_path / "grid.npy")
-
-
-def test_a_path_is_found(tmp_path):
-    path = described(tmp_path, grey([0]))
-    assert find_map(path) == path
-    assert find_map(str(path)) == path
 
 
 @pytest.mark.parametrize("name", ["palace", "", "x" * 5000, "../maps/office", "~nobody-here/x"])

@@ -92,13 +92,6 @@ def test_a_wide_opening_does_not():
     assert find_rooms(grid_of(two_rooms(1.6))).count == 1
 
 
-@pytest.mark.parametrize("resolution", [0.025, 0.05, 0.1])
-def test_the_size_of_pixels_does_not_matter(resolution):
-    found = find_rooms(grid_of(two_rooms(resolution=resolution), resolution))
-    assert found.count == 2
-    assert numbers(found, LEFT, RIGHT) == [1, 2]
-
-
 def test_furniture_does_not_separate():
     cells = two_rooms()
     for x, y, width, depth in (

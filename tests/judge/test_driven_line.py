@@ -48,12 +48,6 @@ def test_a_bend_takes_what_a_simulated_robot_takes(bend_deg, way_m):
     assert expected_s(points) == pytest.approx(simulated_s(points), rel=0.01, abs=0.03)
 
 
-def test_a_bend_that_is_steered_is_no_stop():
-    bent = drive_seconds(np.array([1.0, 1.0]), np.array([0.5]), 0.25, LIMITS)
-    assert bent == drive_seconds(np.array([2.0]), np.empty(0), 0.25, LIMITS)
-    assert drive_seconds(np.empty(0), np.empty(0), 0.25, LIMITS) == 0.0
-
-
 @pytest.mark.parametrize("bend_deg", [2.0, 30.0, 58.0, 90.0, 180.0])
 def test_the_planner_and_the_judge_agree_on_turns(bend_deg):
     """On ways that are long enough to reach the speed; the judge and the planner share no code."""

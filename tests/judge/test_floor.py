@@ -95,14 +95,6 @@ def test_turns_count_by_their_angle() -> None:
     assert figures.seconds == pytest.approx((2.0 + math.sqrt(2.0)) / 0.5 + 2.5 * 2.0)
 
 
-def test_a_lane_from_wall_to_wall_leaves_two_patches() -> None:
-    # Along both walls a little, or the lane's round ends leave ways from side to side.
-    line = (0.2, 1.4), (0.2, 1.5), (3.8, 1.5), (3.8, 1.6)
-    figures = judged(room(4.0, 3.0), *line).figures
-    assert figures.patches_over_4_dm2 == 2
-    assert figures.largest_patch_m2 == pytest.approx(1.3 * 4.0, rel=0.02)
-
-
 def test_swept_floor_equals_a_comparison_pixel_by_pixel() -> None:
     grid = room(4.0, 3.0)
     rng = np.random.default_rng(3)
@@ -137,11 +129,6 @@ def test_a_pillar_is_no_floor(value: int) -> None:
     through = judged(grid, (1.0, 1.5), (3.0, 1.5)).figures
     # The robot touches it from its radius before to its radius behind.
     assert through.illegal_share == pytest.approx((0.5 + 2 * 0.2) / 2.0, abs=0.05)
-
-
-def test_floor_up_to_the_threshold_is_known_free() -> None:
-    grid = with_rectangle(room(4.0, 3.0), 2.0, 1.0, 2.5, 2.0, 25)
-    assert judged(grid, (1.0, 1.5), (3.0, 1.5)).figures.illegal_share == 0.0
 
 
 def test_a_line_through_a_wall_sweeps_nothing_behind_it() -> None:
@@ -206,11 +193,6 @@ def test_without_reachable_floor_there_is_no_share() -> None:
         assert (figures.reachable_m2, figures.swept_share) == (0.0, None)
         assert (figures.seconds_per_m2, figures.largest_patch_m2) == (None, 0.0)
         assert figures.illegal_share == 1.0
-
-
-def test_a_line_that_leaves_the_map_touches_what_is_not_known() -> None:
-    figures = judged(room(4.0, 3.0), (2.0, 1.5), (2.0, 1.5 + 30.0)).figures
-    assert figures.illegal_share == pytest.approx((30.0 - 1.3) / 30.0, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -282,13 +264,6 @@ def test_patches_as_found_by_spreading(shape: tuple[int, int]) -> None:
             assert {tuple(at) for at in np.argwhere(found)} == patch
         assert sorted(patches.pixels.tolist()) == sorted(sizes)
     assert not Patches.of(np.zeros(shape, np.bool_)).nearest_to(0.0, 0.0).any()
-
-
-def test_the_nearest_patch_is_found_from_outside() -> None:
-    mask = np.zeros((8, 9), np.bool_)
-    mask[2, 1:4] = mask[6:8, 6:] = True
-    assert np.argwhere(Patches.of(mask).nearest_to(-50.0, 2.5)).tolist() == [[2, 1], [2, 2], [2, 3]]
-    assert Patches.of(mask).nearest_to(5.1, 5.9).sum() == 6
 
 
 def test_a_robot_with_a_turning_radius_reverses_to_turn() -> None:

@@ -12,10 +12,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fasaco_edge.grid.lattice import CoverageLattice
-from fasaco_edge.kernels.ants.fold import AntRules, Colony
+from fasaco_edge.kernels.ants.fold import AntRules, DiscColony
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import Tally
-from fasaco_edge.kernels.local_search.perturbation import Memory
+from fasaco_edge.kernels.local_search.perturbation import SearchMemory
 from fasaco_edge.kernels.local_search.walk_array import (
     COST,
     FRAME,
@@ -184,7 +184,7 @@ def tally_on(ground, room, jumps=0):
 
 def memory_on(ground, room):
     size = ground.bound
-    return Memory(
+    return SearchMemory(
         saved=guarded(room, np.int32),
         best=guarded(room, np.int32),
         best_counts=guarded(3, np.int64),
@@ -200,7 +200,7 @@ def colony_on(ground, prices, ants=4, radius=(1, 4)):
     eta = prices.step_us / (prices.step_us + np.arange(5) * prices.quarter_turn_us)
     rules = AntRules(0.9, 0.1, 0.1, eta**2.0, ants, radius, np.array([8, 2, 1]), 1.0)
     plain = colony_for(ground.steps.size, rules)._asdict()
-    return Colony(
+    return DiscColony(
         **{
             name: guarded(it.shape, it.dtype, it) if isinstance(it, np.ndarray) else it
             for name, it in plain.items()

@@ -93,15 +93,8 @@ HARMS: dict[str, Callable[[Path], None]] = {
     "gone": Path.unlink,
     "empty": cut(0),
     "zeroed": zeroed,
-    "cut after a byte": cut(1),
-    "cut in the head": cut(40),
-    "cut after the head": cut(84),
     "cut in the middle": cut(0.5),
-    "cut before the last byte": cut(-1),
-    "altered in the first byte": altered(0),
-    "altered in the head": altered(30),
     "altered in the middle": altered(0.5),
-    "altered in the last byte": altered(-1),
 }
 # By somebody.
 MISDEEDS: dict[str, Callable[[Path], None]] = {

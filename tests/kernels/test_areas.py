@@ -42,25 +42,6 @@ def test_areas_of_small_and_uniform_grids(shape, value):
     assert_agrees(np.full(shape, value, np.uint8))
 
 
-def spiral(side):
-    """Return one area that winds inward: pieces met apart that turn out to be one."""
-    grid = np.zeros((side, side), np.uint8)
-    row, col = 0, -1
-    lengths = [side, *(n for n in range(side - 1, 0, -2) for _ in (0, 1))]
-    for turn, length in enumerate(lengths):
-        for _ in range(length):
-            row, col = row + (0, 1, 0, -1)[turn % 4], col + (1, 0, -1, 0)[turn % 4]
-            grid[row, col] = 1
-    return grid
-
-
-@pytest.mark.parametrize("side", [3, 8, 17])
-def test_a_spiral_is_one_area(side):
-    grid = spiral(side)
-    assert_agrees(grid)
-    assert len(find_areas(grid).cells) == 1
-
-
 def test_a_hundred_thousand_chambers_are_distinguished():
     side = 640
     grid = np.zeros((side, side), np.uint8)

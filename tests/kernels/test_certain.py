@@ -72,15 +72,6 @@ def test_twin_leaves_the_same(at, moved, share):
     assert len(left) > 1000 or moved != (0.0, 0.0, 0.0)
 
 
-def test_without_tiles_nothing_is_left():
-    motion = Motion(Pose2D(0.0, 0.0), Pose2D(0.3, 0.1, 0.2))
-    assert certain_floor(FloorSnapshot(), motion)({}) == []
-    tiles = tiles_of(0, (0, 0), 0.999)
-    left = certain_floor(FloorSnapshot(), motion)(tiles)
-    assert not any(bits.any() for _, bits in left)
-    assert [place for place, _ in left] == sorted(tiles)
-
-
 def test_kernel_and_tile_have_the_same_size():
     assert (certain.TILE, certain.BLOCKS) == (FLOOR_TILE, FLOOR_TILE // 8)
 

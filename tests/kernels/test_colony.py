@@ -11,9 +11,7 @@ from fasaco_edge.kernels.ants.colony import (
     settle,
     walk_ants,
 )
-from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem, graph_of, scratch_for
-from tests import naive
 from tests.support.grids import lattice
 
 ALPHA, TAU0 = 0.25, 0.5
@@ -85,60 +83,6 @@ def test_equation_8_strengthens_a_move_each_time_it_occurs():
     expected = np.full((3, 4), TAU0)
     expected[1, 0], expected[2, 2], expected[1, 2], expected[0, 0] = twice, once, once, once
     assert np.array_equal(ground.trail, expected)
-
-
-def test_a_column_deposits_north_and_south():
-    """With one column, a step north and a step east are the same difference of index."""
-    ground = Ground(".", ".")
-    deposit(ground.state(), 2.0, np.array([0, 1, 0], np.int32))
-    changed = np.argwhere(ground.trail != TAU0).tolist()
-    assert changed == [[0, 1], [1, 3]]
-
-
-def test_velocity_keeps_straight_on_past_a_stronger_trail():
-    ground = Ground("....", "....")
-    ground.trail[1, 1] = 9.0  # north out of cell 1 tempts whoever stops there
-    assert ground.walk(0, velocity=1)[:3] == [0, 1, 5]
-    ground = Ground("....", "....")
-    ground.trail[1, 1] = 9.0
-    assert ground.walk(0, velocity=3)[:4] == [0, 1, 2, 3]
-
-
-def test_a_dead_end_is_left_by_the_shortest_walk():
-    ground = Ground(".#.", "...")
-    # East first: 1, 2, north to 5; back to the nearest open cell, 3, by 2, 1, 0.
-    assert ground.walk(0) == [0, 1, 2, 5, 2, 1, 0, 3]
-
-
-def test_the_first_of_the_shortest_walks_of_a_group_is_found():
-    ground = Ground("...")
-    walks = ground.walks(1, ants=40, q0=0.0, seed=1)
-    assert {len(walk) for walk in walks} == {4}
-    assert (ground.best, ground.least_us) == (0, 3 * STEP_US)
-    ground = Ground("...", "...", "...")
-    lengths = [len(walk) for walk in ground.walks(1, ants=40, q0=0.0, seed=1)]
-    assert len(set(lengths)) > 1
-    assert ground.best == lengths.index(min(lengths))
-    assert ground.least_us == (min(lengths) - 1) * STEP_US
-
-
-def test_the_cheapest_walk_of_a_group_need_not_be_the_shortest():
-    cost = CoverageCost(1.0, 2.5)
-    ground = Ground(".....", "..#..", ".....", ".....")
-    walks = ground.walks(0, ants=60, q0=0.0, seed=0, turn_us=cost.quarter_turn_us)
-    costs = [naive.walk_us([divmod(cell, 5) for cell in walk], cost) for walk in walks]
-    assert (ground.best, ground.least_us) == (costs.index(min(costs)), min(costs))
-    assert len(walks[ground.best]) > min(map(len, walks))
-
-
-def test_a_walk_ends_where_it_is_asked_to():
-    ground = Ground("....", "#.#.")
-    # Row 0 is the last line, of which 1 and 3 can be entered; above them lie 4 to 7.
-    there = [4, 5, 6, 7, 3, 7, 6, 5, 1]
-    ends = {-1: [], 1: [], 5: [5], 6: [5, 6], 4: [5, 4], 3: [5, 6, 7, 3]}
-    assert {end: ground.walk(4, end=end) for end in ends} == {
-        end: there + way for end, way in ends.items()
-    }
 
 
 def test_a_walk_longer_than_its_array_is_cut_but_counted():

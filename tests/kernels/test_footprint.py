@@ -83,29 +83,6 @@ def test_a_robot_flush_with_both_walls_fits_the_corridor():
         assert not wider.coverable.any()
 
 
-@pytest.mark.parametrize(("row", "is_open"), [(9, True), (8, False), (1, False), (0, True)])
-def test_a_lane_is_closed_by_a_pixel_between_two_discs_that_fit(row, is_open):
-    cells = np.zeros((10, 20), np.int8)
-    cells[row, 10] = 100
-    # Centres at (5, 5) and (15, 5): the lane sweeps rows 1 to 8.
-    lattice = CoverageLattice.from_map(grid(cells, 1.0), Footprint(10.0, 4.0))
-    assert lattice.coverable.tolist() == [[True, True]]
-    assert (lattice.steps != 0).tolist() == [[is_open, is_open]]
-
-
-def test_steps_are_symmetric_and_join_coverable_cells_only():
-    random = np.random.default_rng(5)
-    cells = np.where(random.random((60, 70)) < 0.01, 100, 0)
-    lattice = CoverageLattice.from_map(grid(cells, 0.05, -1.3, 0.2, 0.4), Footprint(0.2, 0.13))
-    steps = np.pad(lattice.steps, 1)
-    assert steps.any()
-    for direction, (up, right) in enumerate(naive.DIRECTIONS):
-        leaves = (steps >> direction & 1).astype(bool)
-        arrives = np.roll(steps >> (direction + 2) % 4 & 1, (-up, -right), (0, 1)).astype(bool)
-        assert np.array_equal(leaves, arrives)
-    assert not lattice.steps[~lattice.coverable].any()
-
-
 def test_pixels_may_be_ever_so_much_smaller_than_the_robot():
     """As many of them under the disc as are allowed; smaller ones are refused with the map."""
     for yaw in (0.0, math.pi, 0.3, -0.3, 1.5):

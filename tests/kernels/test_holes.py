@@ -1,4 +1,4 @@
-"""Rays from holes against plain homology over the two-element field, on small grounds."""
+"""Rays from holes, and the sides they are passed on, against homology over two elements."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.local_search.holes import rays
-from tests.kernels.grounds import Task, guarded, tasks
+from fasaco_edge.kernels.local_search.proposals import improve
+from tests.kernels.grounds import (
+    PRICES,
+    Task,
+    cells_of,
+    guarded,
+    steps_taken,
+    stream,
+    tasks,
+    walk_on,
+)
 from tests.support.examples import examples
 from tests.support.grids import ROOMS, lattice
 
 EAST, NORTH = 0, 1
+EVERYWHERE = np.empty(0, np.int32)
 
 
 def throw(task):
@@ -131,20 +142,25 @@ def test_holes_are_counted(ground, holes):
     assert throw(task)[1] == holes
 
 
-def test_a_thin_wall_is_a_hole():
-    ground = lattice(*["...."] * 4)
-    steps = ground.steps.copy()
-    steps[1, 1] &= 15 - 1
-    steps[1, 2] &= 15 - 4
-    _, holes, crossed = throw(Task(steps, ground.coverable, []))
-    assert holes == 1
-    # Of the two steps north beside it, the one to the east is crossed.
-    assert np.count_nonzero(crossed) > 0
-    assert crossed[4 * 8 - 1] == 0
+def link_between(ground, one, other):
+    return min(one, other), 0 if abs(one - other) == 1 else 1
 
 
-def test_rays_are_the_same_for_the_same_ground():
-    ground = lattice(".....", ".#.#.", ".....")
-    first, second = (throw(Task(ground.steps, ground.coverable, []))[2] for _ in "12")
-    assert first.tolist() == second.tolist()
-    assert set(first.tolist()) > {0}
+def chain_of(ground, cells):
+    """The steps that are walked an odd number of times."""
+    times = steps_taken(cells)
+    return frozenset(link_between(ground, *ends) for ends in times if times[ends] % 2)
+
+
+@examples(80)
+@given(task=tasks(), prices=st.sampled_from((PRICES[1], PRICES[3])), seed=st.integers(0, 2**32))
+def test_local_search_never_changes_the_side_a_hole_is_passed_on(task, prices, seed):
+    ground = task.ground()
+    walk, links = walk_on(ground, task.cells(), prices), links_of(ground)
+    squares = Space(links)
+    for square in squares_of(links, task.width):
+        squares.add(square)
+    before = chain_of(ground, cells_of(walk))
+    for heat in (0, 3 * prices.step_us):
+        improve(ground, walk, prices, EVERYWHERE, heat, 2000, stream(seed))
+        assert not squares.left_of(before ^ chain_of(ground, cells_of(walk)))

@@ -119,19 +119,9 @@ assert parsed() is not None
 """
 
 
-def test_a_loaded_kernel_is_not_kept_a_second_time(compiled):
-    told = compiled.tell(f"{PACKED}\nseven.tell()")
-    assert (told.loaded, told.compiled, told.warnings) == (2, 0, [])
-
-
 def test_a_loaded_kernel_is_called_by_one_compiled_later(compiled):
     told = compiled.tell(f"{PACKED}{CALLS_IT}\nseven.tell()")
     assert (told.loaded, told.compiled, told.warnings) == (2, 0, [])
-
-
-def test_a_loaded_kernel_is_compiled_for_other_types_later(compiled):
-    told = compiled.tell(f"{PACKED}\nseven.tell(1.5); seven.tell()")
-    assert (told.loaded, told.compiled, told.warnings) == (1, 3, [])
 
 
 def test_other_types_are_added_by_who_compiles(compiled):

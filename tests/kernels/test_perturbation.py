@@ -3,23 +3,20 @@
 from collections import Counter
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from fasaco_edge.kernels.ants.fold import NOTHING
 from fasaco_edge.kernels.local_search.perturbation import (
-    COOLING,
     DRAWN,
     PERTURBATIONS,
+    LocalSearch,
     PerturbationRules,
-    Search,
     perturb,
     recall,
     remember,
 )
 from fasaco_edge.kernels.local_search.walk_array import COST, LENGTH
-from tests import naive
 from tests.kernels.grounds import (
     PRICES,
     assert_guards_hold,
@@ -34,10 +31,9 @@ from tests.kernels.grounds import (
     tasks,
     walk_on,
 )
-from tests.kernels.test_holes import Space, links_of, squares_of
-from tests.kernels.test_parity import chain_of
+from tests.kernels.test_holes import Space, chain_of, links_of, squares_of
 from tests.support.examples import examples
-from tests.support.grids import ROOMS, lattice
+from tests.support.grids import lattice
 
 EVERY_CELL = 1 << 30
 
@@ -58,7 +54,7 @@ def set_up(task, prices, room=None):
     walk = walk_on(ground, task.cells(), prices, room or 4 * len(task.walk) + 300)
     tally, memory = tally_on(ground, walk.cells.size), memory_on(ground, walk.cells.size)
     remember(walk, memory)
-    return Search(ground, walk, prices, tally, memory, colony_on(ground, prices))
+    return LocalSearch(ground, walk, prices, tally, memory, colony_on(ground, prices))
 
 
 def best_of(memory):
@@ -118,20 +114,6 @@ def test_perturbations_leave_a_sound_walk_and_remember_the_best(
     assert_guards_hold(walk, tally, memory, colony)
 
 
-@pytest.mark.parametrize("prices", PRICES, ids=str)
-@pytest.mark.parametrize("radius", [-1, 8])
-def test_many_perturbations_at_once_are_as_many_one_by_one(prices, radius):
-    task = task_on(ROOMS["rooms"][0].steps, (0, 0), np.random.default_rng(5))
-    ends = []
-    for pieces in ([30], [1] * 30, [7, 23]):
-        search = set_up(task, prices)
-        memory, random = search.memory, stream(9)
-        for times in pieces:
-            perturb(search, rules_for(prices, radius), times, DRAWN, random)
-        ends.append((cells_of(search.walk), best_of(memory), memory.work.tolist(), random.tolist()))
-    assert ends[0] == ends[1] == ends[2]
-
-
 def bare_perturbations(task, prices, times, seed):
     """The walks that single perturbations of one walk lead to, without any improvement."""
     rules = rules_for(prices, 0, proposals=0, patience=1e4)
@@ -178,19 +160,6 @@ def test_a_perturbation_finds_the_other_way_round_a_pillar():
     assert memory.best_counts[LENGTH] - 1 == 14
     perturb(search, rules_for(prices, -1), 20, DRAWN, stream(1))
     assert memory.best_counts[LENGTH] - 1 == 8
-
-
-@pytest.mark.parametrize("radius", [0, 1, 3])
-def test_a_spots_surroundings_are_improved_at_each_temperature(radius):
-    prices, task = PRICES[2], drawn_task(1, 7)
-    search = set_up(task, prices)
-    memory = search.memory
-    rules = rules_for(prices, radius, proposals=101, loops_of_256=0)
-    perturb(search, rules, 1, DRAWN, stream(1))
-    away = naive.distances(task.steps, task.unframed(memory.touched[0]))
-    near = {cell for cell, steps in away.items() if steps <= radius}
-    assert {task.unframed(cell) for cell in memory.area[: len(near)]} == near
-    assert memory.work.tolist() == [101 * len(near) // COOLING.size * COOLING.size, 1]
 
 
 @examples(60)

@@ -12,13 +12,12 @@ from hypothesis import strategies as st
 from fasaco_edge.kernels.lattice.reach import walk_cost
 from fasaco_edge.kernels.local_search.holes import rays
 from fasaco_edge.kernels.local_search.parity import JUMPS
-from fasaco_edge.kernels.local_search.perturbation import DRAWN, Search, perturb, remember
+from fasaco_edge.kernels.local_search.perturbation import DRAWN, LocalSearch, perturb, remember
 from fasaco_edge.kernels.local_search.proposals import improve
 from fasaco_edge.kernels.local_search.regions import (
     AFTER,
-    BEFORE,
-    Box,
     Jumps,
+    RegionBox,
     cut_ground,
     cut_walk,
     put_back,
@@ -37,7 +36,6 @@ from tests.kernels.grounds import (
     Task,
     assert_counts,
     assert_guards_hold,
-    assert_legal,
     assert_sound,
     cells_of,
     colony_on,
@@ -62,8 +60,8 @@ class Cut(NamedTuple):
 
     whole: Ground
     cells: np.ndarray
-    box: Box
-    search: Search
+    box: RegionBox
+    search: LocalSearch
     jumps: Jumps
 
     ground = property(lambda self: self.search.ground)
@@ -88,7 +86,7 @@ def box_round(labels, label, rows, cols, margin=0):
     row0, col0 = max(row.min() - margin, 0), max(col.min() - margin, 0)
     row1, col1 = min(row.max() + 1 + margin, rows), min(col.max() + 1 + margin, cols)
     framed = np.pad(labels, FRAME, constant_values=label).astype(np.int32).ravel()
-    return Box(
+    return RegionBox(
         framed, int(label), *map(int, (row0 + FRAME, col0 + FRAME, row1 - row0, col1 - col0))
     )
 
@@ -122,7 +120,7 @@ def cut(task, box, cells=None, prices=PRICES[0], jumps=200, room=None):
         whole,
         cells,
         box,
-        Search(ground, walk, prices, tally, memory, colony_on(ground, prices)),
+        LocalSearch(ground, walk, prices, tally, memory, colony_on(ground, prices)),
         cut_out,
     )
 
@@ -243,46 +241,6 @@ def there_and(*stops):
     return walk
 
 
-@pytest.mark.parametrize(
-    ("stops", "inside", "before", "sections", "after"),
-    [
-        # The region holds the start, and the end.
-        ((0, 9), range(10), 0, [], 10),
-        ((0, 9), range(5), 0, [], 6),
-        ((0, 9), range(5, 10), 4, [], 10),
-        ((0, 9), range(3, 6), 2, [], 7),
-        ((0, 9), [4], 3, [], 6),
-        # It is left for good at the last visit: that visit stands in its walk.
-        ((0, 9), range(9), 0, [], 10),
-        # Left and come back to: for one visit, for several, at both ends.
-        ((4, 9, 0), range(9), 0, [(5, 5)], 15),
-        ((4, 9, 0), range(7), 0, [(3, 7)], 15),
-        ((4, 9, 0, 9), range(3, 7), 0, [(3, 7), (12, 16)], 22),
-        # Twice by way of the same cell.
-        ((4, 8, 4, 9, 4), range(8), 0, [(4, 4), (12, 14)], 19),
-        # A section between two different cells.
-        ((0, 9), [0, 1, 2, 7, 8, 9], 0, [(3, 6)], 10),
-        ((0, 9, 0), [0, 9], 0, [(1, 8), (10, 17)], 19),
-    ],
-)
-def test_sections_and_limits_match_the_given_ones(stops, inside, before, sections, after):
-    walk = there_and(*stops)
-    _, region = corridor(*walk, cols_inside=list(inside))
-    made = int(region.tally.counts[JUMPS])
-    assert list(map(tuple, region.sections[:made].tolist())) == sections
-    assert (region.limits[BEFORE], region.limits[AFTER]) == (before, after)
-    # A section is three visits in the region's walk, whatever its length.
-    hidden = sum(last - first + 1 for first, last in sections)
-    assert region.walk.counts[LENGTH] == after - before - hidden + 3 * made
-    assert region.put_back().tolist() == region.cells.tolist()
-    inner = [there for there in cells_of(region.walk) if there >= region.ground.bound]
-    assert inner == [region.ground.bound + number for number in range(made)]
-
-
-def test_a_walk_that_misses_the_region_gives_none():
-    assert corridor(*range(5), cols_inside=[7, 8])[1] is None
-
-
 def test_a_region_that_does_not_fit_is_refused():
     walk = there_and(4, 8, 4, 9, 4)
     fits = corridor(*walk, cols_inside=range(8), jumps=2, room=30)[1]
@@ -290,34 +248,6 @@ def test_a_region_that_does_not_fit_is_refused():
     assert corridor(*walk, cols_inside=range(8), jumps=1)[1] is None
     longest = fits.walk.counts[LENGTH]
     assert corridor(*walk, cols_inside=range(8), room=int(longest) - 1)[1] is None
-
-
-def test_a_way_there_and_back_through_the_rim_is_left_out():
-    """Nothing to be done at cell 5: the two sections beside it come to follow each other."""
-    task, region = corridor(*there_and(3, 6, 5, 9), cols_inside=range(6), prices=PRICES[1])
-    assert region.tally.counts[JUMPS] == 1
-    improve(region.ground, region.walk, region.prices, EVERYWHERE, 0, 2000, stream(1))
-    assert [task.unframed(cell)[1] for cell in region.put_back().tolist()] == [*range(3, 10)]
-
-
-def test_sections_are_passed_in_either_direction():
-    """A perturbation orders the sections anew: each is there once, and some are reversed."""
-    turned, prices = 0, PRICES[1]
-    for seed in range(120):
-        task, region = drawn_cut(seed, prices)
-        if region is None or not region.tally.counts[JUMPS]:
-            continue
-        rules = rules_for(prices, 0, proposals=0, patience=1e4, loops_of_256=128, ants_of_256=128)
-        perturb(region.search, rules, 3, DRAWN, stream(seed))
-        after = region.put_back().tolist()
-        for first, last in region.sections[: region.tally.counts[JUMPS]].tolist():
-            section = region.cells[first : last + 1].tolist()
-            there, back = (any(way == after[at : at + len(way)] for at in range(len(after)))
-                           for way in (section, section[::-1]))  # fmt: skip
-            assert there or back
-            turned += not there
-        assert_legal(task, after)
-    assert turned >= 10
 
 
 @pytest.mark.parametrize("prices", PRICES[:4], ids=str)

@@ -14,9 +14,7 @@ import pytest
 import fasaco_edge as fe
 from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration, IllegalWalk, PlannerFailed
-from fasaco_edge.offline import search
-from fasaco_edge.planners.own.loading import CALLED_WITH, user_code
-from fasaco_edge.planners.own.problem import walked
+from fasaco_edge.planners.own.loading import CALLED_WITH
 from fasaco_edge.planners.registry import PLANNER_NAMES
 from tests.offline.test_plan import OWN_PLAN, OWN_PLANNER
 from tests.support.processes import ENVIRONMENT
@@ -199,14 +197,6 @@ def test_a_planner_that_cannot_be_called_gets_a_hint(planner):
     assert caught.value.hint == CALLED_WITH
 
 
-def test_a_planner_s_problem_is_at_hand():
-    known = plan(lambda problem: WALK)
-    assert walked(user_code(lambda problem: WALK), known.grid_problem).tolist() == list(
-        map(list, WALK)
-    )
-    assert known.grid_problem.start == WALK[0]
-
-
 def test_a_walk_ends_where_it_was_asked_to():
     with pytest.raises(IllegalWalk, match=r"must end in cell \(1, 0\), ends in \(1, 2\)"):
         plan(lambda problem: WALK, end="home")
@@ -275,27 +265,6 @@ def test_a_budget_ends_a_planner_that_does_not_end(mine, name, line, capsys):
     # Nothing is left of the limit.
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
     assert signal.getsignal(signal.SIGALRM) is signal.SIG_DFL
-
-
-def test_without_a_budget_a_planner_ends_too(monkeypatch):
-    def forever(problem):
-        while True:
-            pass
-
-    monkeypatch.setattr(search, "OWN_BUDGET_S", 0.1)
-    for settings in (None, fe.Search(seed=1)):
-        with pytest.raises(PlannerFailed, match=r"no walk after 0\.1 s, its budget"):
-            plan(forever, search=settings)
-
-
-def test_bench_continues_after_a_planner_that_never_ends(mine, capsys):
-    mine.write_text(ENDLESS)
-    np.save(mine.parent / "room.npy", np.ones((4, 5), bool))
-    words = ["--grids", str(mine.parent / "room.npy"), "--seeds", "2", "--budget", "0.1"]
-    assert main(["bench", "planners", "--planner", f"{mine}:loops", *words]) == 1
-    told = capsys.readouterr()
-    assert re.search(r"zigzag.*mine\.py:loops +no walk +- .*\n +after 0\.1 s ", told.out, re.S)
-    assert told.err.count("no walk after 0.1 s, its budget") == 1
 
 
 def test_an_interrupted_bench_says_where_and_keeps_the_others(mine, capsys):

@@ -98,18 +98,6 @@ def test_a_line_through_cells_has_passes_too():
     assert np.count_nonzero(np.diff(plans[2].cells[:, 0])) > 0.8 * plans[2].steps
 
 
-def test_a_slow_pass_takes_longer():
-    usual, slow = planned(fe.load_map(np.ones((6, 6), bool)), "auto", Pass(speed_m_s=0.1)).plans
-    assert slow.robot.speed_m_s == 0.1
-    assert slow.cost_s > 1.5 * usual.cost_s
-
-
-def test_the_time_of_all_is_by_the_speed_of_each():
-    plans = planned(fe.load_map("office"), Pass(speed_m_s=0.1), "auto", line="quick")
-    seconds = sum(plan.floor.seconds for plan in plans.plans)
-    assert plans.floor.seconds == plans.drive.seconds == pytest.approx(seconds)
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -139,6 +127,12 @@ def test_lanes_need_the_search():
     for options in ({"lanes": "up"}, {"covers": "half"}):
         with pytest.raises(BadConfiguration, match=next(iter(options))):
             fe.plan(fe.load_map("office"), **options)
+
+
+def test_a_slow_pass_takes_longer():
+    usual, slow = planned(fe.load_map(np.ones((6, 6), bool)), "auto", Pass(speed_m_s=0.1)).plans
+    assert slow.robot.speed_m_s == 0.1
+    assert slow.cost_s > 1.5 * usual.cost_s
 
 
 def test_the_command_writes_each_pass_with_its_number(tmp_path, capsys):

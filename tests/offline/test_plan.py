@@ -66,13 +66,6 @@ def test_an_array_is_covered_from_where_it_is_asked():
     assert plan.plot().size[0] > 100
 
 
-def test_a_map_does_not_follow_the_array_it_came_from():
-    free = np.ones((4, 4), bool)
-    map = fe.load_map(free)
-    free[:] = False
-    assert map.free.all()
-
-
 @pytest.mark.parametrize(
     ("options", "error", "said"),
     [
@@ -160,12 +153,6 @@ def test_a_picture_that_cannot_be_written_is_named_in_the_error(tmp_path):
     planned = fe.plan(fe.load_map(np.ones((3, 3), bool)), search=fe.Search(budget_s=0.05))
     with pytest.raises(FileNotFoundError, match=r"nowhere/walk\.png"):
         planned.plot(tmp_path / "nowhere" / "walk.png")
-
-
-def test_a_robot_is_shown_as_it_can_be_typed():
-    robot = fe.Robot(tool_width_m=0.36, turn_deg_s=90.0)
-    assert eval(repr(robot), {"Robot": fe.Robot}) == robot
-    assert "tool_width_m=0.36, speed_m_s=0.25, " in repr(robot)
 
 
 def test_a_time_says_whether_turns_count(capsys):

@@ -66,37 +66,6 @@ def test_twin_counts_the_same_cost_in_a_single_column(forwards, cost):
     assert walk_cost(flat, cost.step_us, cost.quarter_turn_us) == counted
 
 
-def test_a_half_turn_is_two_quarter_turns():
-    cost = CoverageCost(2.0, 0.5)
-    around_a_corner = np.array([[0, 0], [0, 1], [1, 1], [0, 1]], np.int32)
-    assert cost.of_walk(around_a_corner) == 3 * 2.0 + (1 + 2) * 0.5
-
-
-def test_a_walk_without_a_step_costs_nothing():
-    assert CoverageCost(2.0, 0.5).of_walk(np.array([[3, 4]], np.int32)) == 0.0
-    assert CoverageCost(2.0, 0.5).of_walk(np.empty((0, 2), np.int32)) == 0.0
-    assert walk_cost(np.array([5], np.int32), 1_000_000, 500_000) == 0
-
-
-def test_the_default_counts_steps():
-    assert CoverageCost().of_walk(np.array([[0, 0], [0, 1], [1, 1], [0, 1]], np.int32)) == 3.0
-
-
-def test_the_largest_costs_fit_into_a_kernel_s_integers():
-    cost = CoverageCost(3600.0, 3600.0)
-    assert 3 * 10**8 * cost.step_us < 2**63
-
-
-def test_a_robot_s_cost_is_in_whole_microseconds():
-    cost = CoverageCost.for_robot(cell_m=0.3, speed_m_s=0.25, quarter_turn_s=1.5)
-    assert (cost.step_us, cost.quarter_turn_us) == (1_200_000, 1_500_000)
-    assert CoverageCost(1 / 3, 2 / 3) == CoverageCost.for_robot(1.0, 3.0, 2 / 3)
-    assert (CoverageCost(1 / 3, 2 / 3).step_us, CoverageCost(1 / 3, 2 / 3).quarter_turn_us) == (
-        333_333,
-        666_667,
-    )
-
-
 @pytest.mark.parametrize(
     ("step_s", "quarter_turn_s", "said"),
     [

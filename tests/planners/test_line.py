@@ -16,7 +16,7 @@ from fasaco_edge.grid.map_files import find_map, read_map, suggested_start
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.judge.floor import SweepingRobot, judge_floor
 from fasaco_edge.planners.cost import CoverageCost
-from fasaco_edge.planners.line import LINES, DrivenLine, LineConfig, LineSearch, line_over
+from fasaco_edge.planners.line import DrivenLine, LineConfig, LineSearch, line_over
 from fasaco_edge.planners.planner import ignore
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.near_optimal import NearOptimal
@@ -72,17 +72,6 @@ def test_a_polished_line_is_better_by_the_judge(planned, price):
     assert line.swept_m2 == pytest.approx(figures.swept_m2, rel=0.01)
 
 
-def test_a_thorough_line_leaves_little(planned):
-    grid, floor, stands, walk = planned
-    quick, thorough = (
-        line_over(walk, stands, floor, LINES[name], is_end_fixed=False)
-        for name in ("quick", "thorough")
-    )
-    figures = judge_floor(grid, thorough.xy, ROBOT).figures
-    assert figures.swept_share > 0.955
-    assert quick.swept_m2 < thorough.swept_m2
-
-
 def test_the_same_work_gives_the_same_line(planned):
     _, floor, stands, walk = planned
     config = LineConfig(moves_m2=500)
@@ -110,16 +99,6 @@ def test_a_longer_search_is_never_worse(planned):
     assert costs[-1] < 0.98 * costs[0]
 
 
-def test_a_search_ends_with_a_line_whenever_it_is_stopped(planned):
-    _, floor, stands, walk = planned
-    config = LineConfig(moves_m2=1000)
-    at_once = line_over(walk, stands, floor, config, is_end_fixed=False)
-    calls = iter([False, False, True])
-    later = line_over(walk, stands, floor, config, is_end_fixed=False, stop=lambda: next(calls))
-    assert later.cost_s(config.price_s_m2) <= at_once.cost_s(config.price_s_m2)
-    assert next(calls, None) is None
-
-
 def test_a_share_that_is_asked_for_is_swept_in_the_least_time(planned):
     _, floor, stands, walk = planned
     config = LineConfig(moves_m2=1000, swept=0.992)
@@ -136,39 +115,12 @@ def test_a_share_that_is_asked_for_is_swept_in_the_least_time(planned):
     assert enough_s[-1] < enough_s[0]
 
 
-def test_a_share_is_reached_within_few_stages(planned):
-    """A plan that asks for a share completes three, whatever its budget."""
-    _, floor, stands, walk = planned
-    config = LineConfig(moves_m2=1000, swept=0.995)
-    search = LineSearch(walk, stands, floor, config, is_end_fixed=False)
-    for _ in search.run():
-        if search.stages == 3:
-            break
-    assert search.best is not None
-    assert search.best.swept_m2 >= 0.995 * floor.reachable_m2
-
-
 def test_a_fixed_end_stays(planned):
     _, floor, stands, walk = planned
     line = line_over(walk, stands, floor, LineConfig(moves_m2=1000), is_end_fixed=True)
     plain = floor.to_map(stands.points(walk))
     assert line.xy[-1].tolist() == plain[-1].tolist()
     assert line.xy[0].tolist() == plain[0].tolist()
-
-
-def test_the_line_keeps_the_robots_radius_from_walls(planned):
-    grid, floor, stands, walk = planned
-    line = line_over(walk, stands, floor, LineConfig(moves_m2=1000), is_end_fixed=False)
-    geometry = grid.geometry
-    rows, cols = np.nonzero((grid.cells < 0) | (grid.cells > 25))
-    for a, b in zip(line.xy[:-1], line.xy[1:], strict=True):
-        count = math.ceil(math.dist(a, b) / 0.02) + 1
-        for x, y in np.linspace(a, b, count):
-            col, row = geometry.to_pixels(x, y)
-            dx = np.maximum(np.maximum(cols - col, col - cols - 1), 0.0)
-            dy = np.maximum(np.maximum(rows - row, row - rows - 1), 0.0)
-            # As near as touching counts as free, and floats round [pixels].
-            assert np.hypot(dx, dy).min() * geometry.resolution > ROBOT.radius_m - 1e-4
 
 
 def distances_m(grid, line: DrivenLine) -> np.ndarray:

@@ -167,18 +167,6 @@ def test_a_path_that_comes_again_and_again_stands_out():
     assert tau[0, 1:3, 2] == pytest.approx(0.125, rel=0.01)
 
 
-def test_a_path_that_turned_round_is_forgotten_step_by_step():
-    trail = ready()
-    for _ in range(30):
-        trail.strengthen(EASTWARD, 0.75)
-    there = []
-    for _ in range(6):
-        trail.strengthen(EASTWARD[::-1], 0.75)
-        east, west = trail.snapshot().tau[0, 1, [0, 2]]
-        there.append(west > east)
-    assert there == [False, False, True, True, True, True]
-
-
 def test_an_earlier_snapshot_does_not_change():
     trail = ready()
     before = trail.snapshot()
@@ -188,24 +176,6 @@ def test_an_earlier_snapshot_does_not_change():
     np.testing.assert_array_equal(before.tau, copy)
     with pytest.raises(ValueError, match="read-only"):
         before.tau[0, 0, 0] = 1.0
-
-
-def test_changes_are_counted():
-    trail = ready()
-    before = trail.changes
-    trail.fade(EASTWARD[:1])
-    trail.follow(Window(0, 0, 1, 4), row_of(4), None)
-    assert trail.changes == before
-    trail.fade(EASTWARD)
-    assert trail.changes > before
-
-
-def test_moves_off_the_lattice_strengthen_nothing():
-    trail = ready()
-    before = trail.snapshot().tau
-    trail.strengthen(np.array([(5, 5), (5, 6), (-1, 0), (0, 0), (2, 0)], np.int32), 0.75)
-    trail.strengthen(EASTWARD[:0], 0.75)
-    np.testing.assert_array_equal(trail.snapshot().tau, before)
 
 
 @pytest.mark.parametrize("quarter", [0, 1, 2, 3])

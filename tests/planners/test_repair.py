@@ -21,7 +21,7 @@ from fasaco_edge.planners.search.repair import (
     PERTURBATIONS_AT_ONCE,
     repaired,
 )
-from fasaco_edge.planners.walk_before import HELD_CELLS, can_repair, completed
+from fasaco_edge.planners.walk_before import HELD_CELLS, completed
 from tests.benchmarks.judge import check_walk
 from tests.support.examples import examples
 
@@ -162,7 +162,7 @@ def test_the_planner_keeps_what_holds_of_the_walk_before():
     row, col = walk[-40]
     changed[row, col] = False
     problem = CoverageProblem.of(CoverageLattice.from_free(changed), (0, 0), before=walk)
-    assert can_repair(problem)
+    assert problem.can_repair
     path = NearOptimal().plan(problem, never)
     judge(problem, path.cells)
     old, new = (

@@ -70,14 +70,6 @@ def test_a_search_is_repeated(planner, question):
     assert repeated.work == path.work
 
 
-def test_a_search_that_was_never_stopped_repeats_so():
-    problem = poor_problem()
-    stop = StopRecorder(never)
-    path = NearOptimal().plan(problem, stop)
-    assert stop.stops == []
-    assert np.array_equal(NearOptimal().plan(problem, StopAt(())).cells, path.cells)
-
-
 def test_the_search_after_a_poor_repair_is_short():
     """A robot of a fleet that gets another share had to wait as long as for its first plan."""
     free = np.random.default_rng(0).random((24, 24)) > 0.15

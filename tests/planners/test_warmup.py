@@ -47,7 +47,7 @@ from tests.support.processes import ENVIRONMENT
 # Kernels that take less than half a second to compile for a constant, too.
 SMALL = {
     *("baselines._add", "holes._has", "line.prepare_edges", "nearest._quarters"),
-    *("reorder._square", "repair._begin", "ways._add_half"),
+    *("reorder._square", "repair._begin"),
 }
 
 

@@ -16,8 +16,7 @@ from fasaco_edge.fleet.mission.traffic import AHEAD_M, Neighbour, Points, least_
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.lattice.reach import shortest_walk
-from fasaco_edge.kernels.lattice.ways import FAR, ways_from
+from fasaco_edge.kernels.lattice.reach import FAR, shortest_walk, ways_from
 from fasaco_edge.mission.line.way import comes_nearer, corner_past
 
 Places = Callable[[NDArray[np.int32]], Points]

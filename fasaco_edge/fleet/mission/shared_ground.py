@@ -28,7 +28,7 @@ from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, Cell, CoverageLattice
 from fasaco_edge.grid.reachable_area import ReachableArea
-from fasaco_edge.kernels.lattice.ways import FAR, ways_from
+from fasaco_edge.kernels.lattice.reach import FAR, ways_from
 from fasaco_edge.mission.coverage.ledger import TILE
 
 # Largest number of cells that the ground of others may add to the lattice; more are left out.

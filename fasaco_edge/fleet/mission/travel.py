@@ -11,7 +11,7 @@ from fasaco_edge.errors import StartBlocked
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.reachable_area import anchor_cell
-from fasaco_edge.kernels.lattice.ways import FAR, ways_from
+from fasaco_edge.kernels.lattice.reach import FAR, ways_from
 
 # Largest distance at which a coverable cell replaces a cell that is not coverable [cells].
 SNAP = 2

@@ -26,14 +26,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
-from fasaco_edge.kernels.ants.graph import Graph, Scratch, append_way, begin, close, open_steps_of
+from fasaco_edge.kernels.ants.graph import (
+    Graph,
+    WalkScratch,
+    append_way,
+    begin,
+    close,
+    open_steps_of,
+)
 from fasaco_edge.kernels.jit import as_value, inner_kernel, kernel, lean_kernel
 
 
 @lean_kernel
 def sweep(
     graph: Graph,
-    scratch: Scratch,
+    scratch: WalkScratch,
     start: int,
     order: tuple[int, int, int, int],
     turns_along: bool,
@@ -79,8 +86,8 @@ def sweep(
 NO_NODE = -1
 
 
-class Blocks(NamedTuple):
-    """Flat cells ``row * cols + col``, n of them, their nodes, and how often steps are walked.
+class TreeSteps(NamedTuple):
+    """The walk around the tree: flat cells ``row * cols + col``, their nodes, counts of steps.
 
     Attributes:
         steps: step masks, uint8 (n,).
@@ -97,139 +104,139 @@ class Blocks(NamedTuple):
 
 
 @inner_kernel
-def _has_step(blocks: Blocks, cell: int, direction: int) -> bool:
+def _has_step(tree: TreeSteps, cell: int, direction: int) -> bool:
     """Return whether the step exists and leads to a cell to cover."""
-    if not blocks.steps[cell] >> direction & 1:
+    if not tree.steps[cell] >> direction & 1:
         return False
-    return bool(blocks.node[cell + blocks.offsets[direction]] != NO_NODE)
+    return bool(tree.node[cell + tree.offsets[direction]] != NO_NODE)
 
 
 @inner_kernel
-def _add(blocks: Blocks, cell: int, direction: int, times: int) -> None:
+def _add(tree: TreeSteps, cell: int, direction: int, times: int) -> None:
     """Walk a step ``times`` more often (or less, below 0), seen from either of its cells."""
     if direction > NORTH:
-        cell += blocks.offsets[direction]
-    blocks.times[cell, direction & 1] += times
+        cell += tree.offsets[direction]
+    tree.times[cell, direction & 1] += times
 
 
 @inner_kernel
-def _times(blocks: Blocks, cell: int, direction: int) -> int:
+def _times(tree: TreeSteps, cell: int, direction: int) -> int:
     if direction > NORTH:
-        cell += blocks.offsets[direction]
-    return int(blocks.times[cell, direction & 1])
+        cell += tree.offsets[direction]
+    return int(tree.times[cell, direction & 1])
 
 
 @inner_kernel
-def _inner_directions(blocks: Blocks, cell: int) -> tuple[int, int]:
+def _inner_directions(tree: TreeSteps, cell: int) -> tuple[int, int]:
     """Return the two directions that stay in the cell's block."""
-    row, col = cell // blocks.offsets[NORTH], cell % blocks.offsets[NORTH]
+    row, col = cell // tree.offsets[NORTH], cell % tree.offsets[NORTH]
     return (EAST if col % 2 == 0 else WEST), (NORTH if row % 2 == 0 else SOUTH)
 
 
 @inner_kernel
-def _grow_node(blocks: Blocks, first: int, number: int) -> None:
+def _grow_node(tree: TreeSteps, first: int, number: int) -> None:
     """Label the connected part of the block around cell ``first``; give it its closed walk."""
     cells = np.empty(4, np.int64)
     cells[0] = first
-    blocks.node[first] = number
+    tree.node[first] = number
     size, sides = 1, 0
     index = 0
     while index < size:
         here = cells[index]
         index += 1
-        for direction in _inner_directions(blocks, here):
-            if not _has_step(blocks, here, direction):
+        for direction in _inner_directions(tree, here):
+            if not _has_step(tree, here, direction):
                 continue
             sides += 1
-            after = here + blocks.offsets[direction]
-            if blocks.node[after] != number:
-                blocks.node[after] = number
+            after = here + tree.offsets[direction]
+            if tree.node[after] != number:
+                tree.node[after] = number
                 cells[size] = after
                 size += 1
-                _add(blocks, here, direction, 2)
+                _add(tree, here, direction, 2)
     if sides == 8:
         # All four sides, seen from both ends: the cycle takes each once.
         for index in range(4):
             here = cells[index]
-            for direction in _inner_directions(blocks, here):
+            for direction in _inner_directions(tree, here):
                 if direction <= NORTH:
-                    blocks.times[here, direction] = 1
+                    tree.times[here, direction] = 1
 
 
 @inner_kernel
-def _join(blocks: Blocks, here: int, direction: int) -> None:
+def _join(tree: TreeSteps, here: int, direction: int) -> None:
     """Join the closed walks of two nodes across the step from ``here`` in a direction."""
-    after = here + blocks.offsets[direction]
-    horizontal, vertical = _inner_directions(blocks, here)
+    after = here + tree.offsets[direction]
+    horizontal, vertical = _inner_directions(tree, here)
     along = vertical if direction % 2 == 0 else horizontal
-    if _has_step(blocks, here, along) and _has_step(blocks, after, along):
-        beside = here + blocks.offsets[along]
+    if _has_step(tree, here, along) and _has_step(tree, after, along):
+        beside = here + tree.offsets[along]
         doubled = (
-            _has_step(blocks, beside, direction)
-            and _times(blocks, here, along) > 0
-            and _times(blocks, after, along) > 0
+            _has_step(tree, beside, direction)
+            and _times(tree, here, along) > 0
+            and _times(tree, after, along) > 0
         )
         if doubled:
-            _add(blocks, here, along, -1)
-            _add(blocks, after, along, -1)
-            _add(blocks, here, direction, 1)
-            _add(blocks, beside, direction, 1)
+            _add(tree, here, along, -1)
+            _add(tree, after, along, -1)
+            _add(tree, here, direction, 1)
+            _add(tree, beside, direction, 1)
             return
-    _add(blocks, here, direction, 2)
+    _add(tree, here, direction, 2)
 
 
 @inner_kernel
-def _step_out(blocks: Blocks, reached: NDArray[np.uint8], first: int) -> tuple[int, int]:
+def _step_out(tree: TreeSteps, reached: NDArray[np.uint8], first: int) -> tuple[int, int]:
     """Return the first step (cell, direction) out of a node to one not reached; (-1, 0) for none.
 
     ``first`` is one of the node's cells, ``reached`` uint8 (nodes,).
     """
-    cols, number = blocks.offsets[NORTH], blocks.node[first]
+    cols, number = tree.offsets[NORTH], tree.node[first]
     # The block's corner with the smallest indices, then its four cells.
     corner_row, corner_col = first // cols // 2 * 2, first % cols // 2 * 2
     for direction in range(4):
         for place in range(4):
             row, col = corner_row + place // 2, corner_col + place % 2
             here = row * cols + col
-            if col >= cols or here >= blocks.node.size or blocks.node[here] != number:
+            if col >= cols or here >= tree.node.size or tree.node[here] != number:
                 continue
-            if not _has_step(blocks, here, direction):
+            if not _has_step(tree, here, direction):
                 continue
-            if not reached[blocks.node[here + blocks.offsets[direction]]]:
+            if not reached[tree.node[here + tree.offsets[direction]]]:
                 return here, direction
     return -1, 0
 
 
 @inner_kernel
-def _span(blocks: Blocks, start: int, nodes: int) -> None:
+def _span(tree: TreeSteps, start: int, nodes: int) -> None:
     """Span the nodes by a tree, depth first from that of ``start``, and join along it."""
     reached = np.zeros(nodes, np.uint8)
     first = np.full(nodes, -1, np.int64)
-    for cell in range(blocks.node.size):
-        number = blocks.node[cell]
+    for cell in range(tree.node.size):
+        number = tree.node[cell]
         if number != NO_NODE and first[number] < 0:
             first[number] = cell
     stack = np.empty(nodes, np.int64)
-    stack[0] = blocks.node[start]
+    stack[0] = tree.node[start]
     reached[stack[0]] = 1
     depth = 1
     while depth:
-        here, direction = _step_out(blocks, reached, first[stack[depth - 1]])
+        here, direction = _step_out(tree, reached, first[stack[depth - 1]])
         if here < 0:
             depth -= 1
             continue
-        after = blocks.node[here + blocks.offsets[direction]]
+        after = tree.node[here + tree.offsets[direction]]
         reached[after] = 1
-        _join(blocks, here, direction)
+        _join(tree, here, direction)
         stack[depth] = after
         depth += 1
 
 
 @inner_kernel
-def _circuit(blocks: Blocks, start: int) -> NDArray[np.int32]:
+def _circuit(tree: TreeSteps, start: int) -> NDArray[np.int32]:
     """Return an Eulerian circuit from ``start`` by Hierholzer's algorithm; uses up ``times``."""
     length = 0
-    for count in blocks.times.flat:
+    for count in tree.times.flat:
         length += int(count)
     stack = np.empty(length + 1, np.int64)
     heading = np.empty(length + 1, np.int64)
@@ -242,9 +249,9 @@ def _circuit(blocks: Blocks, start: int) -> NDArray[np.int32]:
         # Left first: clockwise around the tree, if there is a choice.
         for turn in (1, 0, 3, 2):
             direction = (heading[depth - 1] + turn) & 3
-            if _has_step(blocks, here, direction) and _times(blocks, here, direction):
-                _add(blocks, here, direction, -1)
-                stack[depth], heading[depth] = here + blocks.offsets[direction], direction
+            if _has_step(tree, here, direction) and _times(tree, here, direction):
+                _add(tree, here, direction, -1)
+                stack[depth], heading[depth] = here + tree.offsets[direction], direction
                 depth += 1
                 moved = True
                 break
@@ -274,11 +281,11 @@ def spanning_tree_walk(
         if to_cover[cell // cols, cell % cols] == 1:
             node[cell] = unlabelled
     offsets = np.array([1, cols, -1, -cols], np.int64)
-    blocks = Blocks(steps.ravel(), node, np.zeros((size, 2), np.int8), offsets)
+    tree = TreeSteps(steps.ravel(), node, np.zeros((size, 2), np.int8), offsets)
     nodes = as_value(0)
     for cell in range(size):
         if node[cell] == unlabelled:
-            _grow_node(blocks, cell, nodes)
+            _grow_node(tree, cell, nodes)
             nodes += 1
-    _span(blocks, start, nodes)
-    return _circuit(blocks, start)
+    _span(tree, start, nodes)
+    return _circuit(tree, start)

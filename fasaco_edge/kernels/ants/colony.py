@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.graph import (
     Graph,
-    Scratch,
+    WalkScratch,
     append_way,
     begin,
     close,
@@ -85,7 +85,7 @@ class ColonyState(NamedTuple):
 
 @lean_inner_kernel
 def _visibility(
-    colony: ColonyState, scratch: Scratch, here: int, direction: int, velocity: int
+    colony: ColonyState, scratch: WalkScratch, here: int, direction: int, velocity: int
 ) -> float:
     """Return eta ** beta of equation (5) for the open neighbour in a direction."""
     graph, rules = colony.graph, colony.rules
@@ -102,7 +102,7 @@ def _visibility(
 
 
 @lean_inner_kernel
-def _weigh(colony: ColonyState, scratch: Scratch, here: int, velocity: int) -> None:
+def _weigh(colony: ColonyState, scratch: WalkScratch, here: int, velocity: int) -> None:
     """Fill ``scratch.weights`` with tau * eta ** beta of the open neighbours."""
     mask = open_steps_of(colony.graph, scratch, here)
     for direction in range(4):
@@ -148,7 +148,7 @@ def _choose(
 @lean_inner_kernel
 def _walk_one(
     colony: ColonyState,
-    scratch: Scratch,
+    scratch: WalkScratch,
     velocity: int,
     random: NDArray[np.int64],
     walk: NDArray[np.int32],
@@ -189,7 +189,7 @@ def _walk_one(
 @lean_kernel
 def walk_ants(
     colony: ColonyState,
-    scratch: Scratch,
+    scratch: WalkScratch,
     velocity: int,
     streams: NDArray[np.int64],
     walks: NDArray[np.int32],

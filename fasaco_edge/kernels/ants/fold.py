@@ -28,7 +28,7 @@ FARTHEST = 300
 # No heading, as before the first move.
 AHEAD = 4
 NOTHING = -1
-# Entries of ``Colony.counts``.
+# Entries of ``DiscColony.counts``.
 SEARCHES, DISCS, ANTS = range(3)
 
 
@@ -54,7 +54,7 @@ class AntRules(NamedTuple):
     amount: float
 
 
-class Colony(NamedTuple):
+class DiscColony(NamedTuple):
     """The trail, and the working memory of the ants.
 
     A sequence describes a walk through a disc: cells, and tunnels as ``-1 - end``. Tunnel i has
@@ -141,7 +141,7 @@ def direction_of(ground: Ground, one: int, other: int) -> int:
 
 
 @lean_inner_kernel
-def end_at(colony: Colony, cell: int) -> int:
+def end_at(colony: DiscColony, cell: int) -> int:
     """Return the first tunnel end at a cell that is not taken, or NOTHING."""
     end = colony.first_end[cell]
     while end != NOTHING and colony.is_taken[end >> 1]:
@@ -150,7 +150,7 @@ def end_at(colony: Colony, cell: int) -> int:
 
 
 @lean_inner_kernel
-def inward_from(ground: Ground, colony: Colony, cells: NDArray[np.int32], end: int) -> int:
+def inward_from(ground: Ground, colony: DiscColony, cells: NDArray[np.int32], end: int) -> int:
     """Return the direction of the first step into a tunnel, or AHEAD if it has no step."""
     first, last = colony.tunnels[end >> 1, 0], colony.tunnels[end >> 1, 1]
     if first == last:
@@ -161,7 +161,7 @@ def inward_from(ground: Ground, colony: Colony, cells: NDArray[np.int32], end: i
 
 
 @lean_inner_kernel
-def _mark(ground: Ground, walk: Walk, colony: Colony, centre: int, radius: int) -> int:
+def _mark(ground: Ground, walk: Walk, colony: DiscColony, centre: int, radius: int) -> int:
     """Label the cells of a disc and list them in ``colony.area``; return their number."""
     cells, labels, number = walk.cells, colony.labels, colony.counts[DISCS]
     colony.queue[0] = centre
@@ -182,7 +182,7 @@ def _mark(ground: Ground, walk: Walk, colony: Colony, centre: int, radius: int) 
 
 @lean_inner_kernel
 def fold(
-    ground: Ground, walk: Walk, prices: Prices, colony: Colony, centre: int, radius: int
+    ground: Ground, walk: Walk, prices: Prices, colony: DiscColony, centre: int, radius: int
 ) -> Disc:
     """Fold the walk at a disc; no cells if there are too many tunnels."""
     cells, length, labels = walk.cells, walk.counts[LENGTH], colony.labels
@@ -219,7 +219,7 @@ def fold(
 
 
 @lean_inner_kernel
-def list_ends(walk: Walk, colony: Colony, disc: Disc, is_listed: bool) -> None:
+def list_ends(walk: Walk, colony: DiscColony, disc: Disc, is_listed: bool) -> None:
     """List the tunnels' ends by their cells, or remove them from the list."""
     for tunnel in range(disc.tunnels):
         for side in range(2):
@@ -232,7 +232,7 @@ def list_ends(walk: Walk, colony: Colony, disc: Disc, is_listed: bool) -> None:
 
 
 @lean_inner_kernel
-def open_disc(ground: Ground, colony: Colony, disc: Disc) -> int:
+def open_disc(ground: Ground, colony: DiscColony, disc: Disc) -> int:
     """Open the cells and tunnels of a disc; return their number."""
     count = disc.tunnels
     for index in range(disc.cells):
@@ -249,7 +249,7 @@ def unfold(
     ground: Ground,
     walk: Walk,
     prices: Prices,
-    colony: Colony,
+    colony: DiscColony,
     head: int,
     items: int,
     saved: NDArray[np.int32],

@@ -31,7 +31,7 @@ class Graph(NamedTuple):
     offsets: NDArray[np.int64]
 
 
-class Scratch(NamedTuple):
+class WalkScratch(NamedTuple):
     """Working memory of one thread.
 
     Attributes:
@@ -52,7 +52,7 @@ class Scratch(NamedTuple):
 
 
 @lean_inner_kernel
-def begin(graph: Graph, scratch: Scratch, start: int) -> int:
+def begin(graph: Graph, scratch: WalkScratch, start: int) -> int:
     """Open all wanted cells but the start; return their number."""
     for index in range(graph.open_steps.size):
         scratch.open_steps[index] = graph.open_steps[index]
@@ -64,7 +64,7 @@ def begin(graph: Graph, scratch: Scratch, start: int) -> int:
 
 
 @lean_inner_kernel
-def close(graph: Graph, scratch: Scratch, cell: int) -> None:
+def close(graph: Graph, scratch: WalkScratch, cell: int) -> None:
     """Note the visit of ``cell``: it is no longer open, so the steps to it lead to no open cell."""
     at = cell + graph.offsets[1]
     for direction in range(4):
@@ -72,13 +72,13 @@ def close(graph: Graph, scratch: Scratch, cell: int) -> None:
 
 
 @lean_inner_kernel
-def open_steps_of(graph: Graph, scratch: Scratch, cell: int) -> int:
+def open_steps_of(graph: Graph, scratch: WalkScratch, cell: int) -> int:
     """Return the mask of steps from ``cell`` to open cells."""
     return int(scratch.open_steps[cell + graph.offsets[1]])
 
 
 @lean_inner_kernel
-def _find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
+def _find(graph: Graph, scratch: WalkScratch, here: int, goal: int) -> int:
     """Search breadth first; return ``goal``, or with goal -1 the nearest open cell."""
     scratch.searches[0] += 1
     search = scratch.searches[0]
@@ -107,7 +107,7 @@ def _find(graph: Graph, scratch: Scratch, here: int, goal: int) -> int:
 
 @lean_inner_kernel
 def append_way(
-    graph: Graph, scratch: Scratch, walk: NDArray[np.int32], length: int, here: int, goal: int
+    graph: Graph, scratch: WalkScratch, walk: NDArray[np.int32], length: int, here: int, goal: int
 ) -> tuple[int, int]:
     """Append a shortest walk from ``here`` to ``goal``, or with goal -1 to the nearest open cell.
 

@@ -66,8 +66,8 @@ NO_END = -(2**30)
 SEARCHED_PER_CELL, SEARCHED_AT_LEAST = 10, 10_000
 
 
-class Ground(NamedTuple):
-    """A lattice of n cells, and memory for the bounds of its blocks.
+class BlockBounds(NamedTuple):
+    """Bounds of the blocks of a lattice of n cells, and the lattice.
 
     Attributes:
         steps: step masks, uint8 (n,).
@@ -110,43 +110,43 @@ def covering_bound(
         start: first flat cell ``row * cols + col`` of the walk.
         end: its last flat cell, reachable; -1 for anywhere.
     """
-    ground = _ground(steps, required)
-    ground.wanted[start] = 1
+    bounds = _bounds_for(steps, required)
+    bounds.wanted[start] = 1
     # Steps that a walk saves if it ends in the cell or beyond it instead of returning to the cell.
     saved = np.full(steps.size, NO_END, np.int32)
     if end < 0:
         for cell in range(steps.size):
-            if ground.wanted[cell]:
+            if bounds.wanted[cell]:
                 saved[cell] = 0
     else:
-        ground.wanted[end] = 1
+        bounds.wanted[end] = 1
         saved[end] = 0
-    blocks = biconnected_blocks(ground.steps, ground.offsets, start)
+    blocks = biconnected_blocks(bounds.steps, bounds.offsets, start)
     closed = 0
     for number in range(blocks.first.size - 1):
         cells = blocks.cells[blocks.first[number] : blocks.first[number + 1]]
-        count = wanted_first(cells, ground.wanted)
+        count = wanted_first(cells, bounds.wanted)
         if count == 1:
             continue
         top = cells[0]
-        ground.wanted[top] = 1
-        around = _bound_block(ground, cells, count, number + 1)
+        bounds.wanted[top] = 1
+        around = _bound_block(bounds, cells, count, number + 1)
         closed += around
         for cell in cells[1:count]:
             if saved[cell] > NO_END:
-                saved[top] = max(saved[top], saved[cell] + around - ground.open_steps[cell])
+                saved[top] = max(saved[top], saved[cell] + around - bounds.open_steps[cell])
     return int(closed - saved[start])
 
 
 @inner_kernel
-def _ground(steps: NDArray[np.uint8], required: NDArray[np.uint8]) -> Ground:
+def _bounds_for(steps: NDArray[np.uint8], required: NDArray[np.uint8]) -> BlockBounds:
     rows, cols = steps.shape
     size = rows * cols
     colour = np.empty((rows, cols), np.uint8)
     for row in range(rows):
         for col in range(cols):
             colour[row, col] = (row + col) & 1
-    return Ground(
+    return BlockBounds(
         steps=steps.ravel(),
         offsets=np.array([1, cols, -1, -cols], np.int64),
         colour=colour.ravel(),
@@ -163,69 +163,69 @@ def _ground(steps: NDArray[np.uint8], required: NDArray[np.uint8]) -> Ground:
 
 
 @inner_kernel
-def _bound_block(ground: Ground, cells: NDArray[np.int32], count: int, number: int) -> int:
+def _bound_block(bounds: BlockBounds, cells: NDArray[np.int32], count: int, number: int) -> int:
     """Return the bound of a closed walk over a block; write those of open ones.
 
     Args:
-        ground: the lattice; ``open_steps`` is written for all wanted cells but the top.
+        bounds: the lattice; ``open_steps`` is written for all wanted cells but the top.
         cells: int32, the block's cells: the top, the other wanted ones, the rest.
         count: how many of them are wanted, the top among them.
         number: of the block, from 1.
     """
     if cells.size == 2:
-        ground.open_steps[cells[1]] = 1
+        bounds.open_steps[cells[1]] = 1
         return 2
-    _cut_out(ground, cells, number)
-    pairing, top = ground.pairing, cells[0]
-    graph = Bipartite(cells[:count], ground.links, ground.colour, ground.offsets)
+    _cut_out(bounds, cells, number)
+    pairing, top = bounds.pairing, cells[0]
+    graph = Bipartite(cells[:count], bounds.links, bounds.colour, bounds.offsets)
     sea = Sea(
-        cells, count, ground.inside, ground.offsets, ground.island, ground.away, pairing.queue
+        cells, count, bounds.inside, bounds.offsets, bounds.island, bounds.away, pairing.queue
     )
     match(graph, pairing, SEARCHED_AT_LEAST + SEARCHED_PER_CELL * count)
     for cell in cells[1:count]:
-        ground.open_steps[cell] = 0
-    same = 1 if ground.colour[top] else 0
+        bounds.open_steps[cell] = 0
+    same = 1 if bounds.colour[top] else 0
     closed, first = 0, -1
     for attempt in range(3):
         # The first two sets are largest sets that leave out as many cells of one colour as
         # possible; the second leaves out the top, of that colour, if a largest set can. If so, the
         # third leaves out the top, and of the other colour the cells that can be left out with it.
         if attempt == 2:
-            if ground.chosen[top]:
+            if bounds.chosen[top]:
                 break
             first = pairing.mate[top]
         side = same if attempt == 1 else 1 - same
-        closed = max(closed, _bound_by_set(ground, graph, sea, side, first))
+        closed = max(closed, _bound_by_set(bounds, graph, sea, side, first))
     if count < cells.size:
         measure_from(sea, top)
         for cell in cells[1:count]:
             steps = closed - sea.away[cell]
-            ground.open_steps[cell] = max(ground.open_steps[cell], steps)
+            bounds.open_steps[cell] = max(bounds.open_steps[cell], steps)
     return closed
 
 
 @inner_kernel
-def _cut_out(ground: Ground, cells: NDArray[np.int32], number: int) -> None:
+def _cut_out(bounds: BlockBounds, cells: NDArray[np.int32], number: int) -> None:
     """Write the step masks inside a block, and to its wanted cells."""
     for cell in cells:
-        ground.block[cell] = number
+        bounds.block[cell] = number
     for cell in cells:
         inside, links = 0, 0
         for direction in range(4):
-            if ground.steps[cell] >> direction & 1:
-                after = cell + ground.offsets[direction]
-                if ground.block[after] == number:
+            if bounds.steps[cell] >> direction & 1:
+                after = cell + bounds.offsets[direction]
+                if bounds.block[after] == number:
                     inside |= 1 << direction
-                    if ground.wanted[after]:
+                    if bounds.wanted[after]:
                         links |= 1 << direction
-        ground.inside[cell], ground.links[cell] = inside, links
+        bounds.inside[cell], bounds.links[cell] = inside, links
 
 
 @inner_kernel
-def _bound_by_set(ground: Ground, graph: Bipartite, sea: Sea, side: int, first: int) -> int:
+def _bound_by_set(bounds: BlockBounds, graph: Bipartite, sea: Sea, side: int, first: int) -> int:
     """Bound walks over a block, as ``_bound_block`` does, by one independent set."""
-    colour, chosen, island = ground.colour, ground.chosen, sea.island
-    size = choose_independent(graph, ground.pairing, side, first, chosen)
+    colour, chosen, island = bounds.colour, bounds.chosen, sea.island
+    size = choose_independent(graph, bounds.pairing, side, first, chosen)
     black, white = find_islands(sea, chosen, colour)
     tree, round_trip = 0, 0
     if black + white > 1:
@@ -243,6 +243,6 @@ def _bound_by_set(ground: Ground, graph: Bipartite, sea: Sea, side: int, first: 
             between = max(tree, 2 * white - ends_white, 2 * black - (2 - ends_white))
         steps = 2 * size - top_chosen - end_chosen + between
         steps += (steps + top_colour + end_colour) & 1
-        ground.open_steps[cell] = max(ground.open_steps[cell], steps)
+        bounds.open_steps[cell] = max(bounds.open_steps[cell], steps)
     closed = 2 * size + round_trip
     return int(closed + (closed & 1))

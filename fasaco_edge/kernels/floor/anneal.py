@@ -19,7 +19,7 @@ from fasaco_edge.kernels.floor.line import (
     TRIED,
     Floor,
     Line,
-    Memory,
+    MoveMemory,
     Price,
     gain_above,
     has_room,
@@ -53,7 +53,9 @@ def _length(random: NDArray[np.uint64], farthest: float) -> float:
 
 
 @lean_inner_kernel
-def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
+def _move(
+    line: Line, memory: MoveMemory, random: NDArray[np.uint64], begin: int, far: float
+) -> int:
     """Move the point after ``begin``: along either edge, or in any direction."""
     points, new = line.points, memory.new
     middle = line.next[begin]
@@ -72,7 +74,9 @@ def _move(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, fa
 
 
 @lean_inner_kernel
-def _shift(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
+def _shift(
+    line: Line, memory: MoveMemory, random: NDArray[np.uint64], begin: int, far: float
+) -> int:
     """Shift the edge after ``begin``'s next point; its ends may slide along the edges beside it."""
     points, new = line.points, memory.new
     a = line.next[begin]
@@ -92,7 +96,7 @@ def _shift(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, f
 
 @lean_inner_kernel
 def _shift_lanes(
-    line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float
+    line: Line, memory: MoveMemory, random: NDArray[np.uint64], begin: int, far: float
 ) -> tuple[int, int]:
     """Shift three edges behind ``begin``'s next point together, as two lanes side by side."""
     points, new = line.points, memory.new
@@ -110,7 +114,7 @@ def _shift_lanes(
 
 
 @lean_inner_kernel
-def _cut(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far: float) -> int:
+def _cut(line: Line, memory: MoveMemory, random: NDArray[np.uint64], begin: int, far: float) -> int:
     """Cut the corner behind ``begin``."""
     points, new = line.points, memory.new
     middle = line.next[begin]
@@ -125,7 +129,7 @@ def _cut(line: Line, memory: Memory, random: NDArray[np.uint64], begin: int, far
 
 @lean_inner_kernel
 def _round_left(
-    line: Line, floor: Floor, memory: Memory, random: NDArray[np.uint64], begin: int, far: float
+    line: Line, floor: Floor, memory: MoveMemory, random: NDArray[np.uint64], begin: int, far: float
 ) -> int:
     """Reroute the edge after ``begin`` over the unswept floor of a block nearby."""
     points, left, new, place = line.points, floor.sweeps.left, memory.new, memory.place
@@ -160,7 +164,7 @@ def _round_left(
 
 @lean_inner_kernel
 def _draw_move(
-    line: Line, floor: Floor, memory: Memory, random: NDArray[np.uint64], begin: int
+    line: Line, floor: Floor, memory: MoveMemory, random: NDArray[np.uint64], begin: int
 ) -> tuple[int, int]:
     """Draw a move at a point.
 
@@ -199,7 +203,7 @@ def anneal(
     line: Line,
     floor: Floor,
     price: Price,
-    memory: Memory,
+    memory: MoveMemory,
     random: NDArray[np.uint64],
     margin: int,
     heat: tuple[float, float],

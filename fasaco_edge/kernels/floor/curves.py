@@ -28,7 +28,7 @@ LEAST_GAIN_S = 1e-6
 NONE = BLOCKED = -1
 
 
-class Line(NamedTuple):
+class LinePlaces(NamedTuple):
     """Places on a line, in its order.
 
     Attributes:
@@ -89,7 +89,7 @@ class Ways(NamedTuple):
     lengths: NDArray[np.float64]
 
 
-class Memory(NamedTuple):
+class WordMemory(NamedTuple):
     """Words from one state to another, and points on one of them."""
 
     sides: NDArray[np.int8]
@@ -164,7 +164,7 @@ def _trace(
 
 @lean_inner_kernel
 def _left_s(
-    line: Line,
+    line: LinePlaces,
     first: int,
     last: int,
     width: float,
@@ -197,7 +197,7 @@ def _left_s(
 
 @inlined
 def _step(
-    line: Line, base: Base, clear: NDArray[np.uint64], number: int, back: int, ways: Ways
+    line: LinePlaces, base: Base, clear: NDArray[np.uint64], number: int, back: int, ways: Ways
 ) -> None:
     """Drive on along a straight, or turn at its beginning, on the spot if it is a large bend."""
     state, before = 2 * number + back, 2 * number - 2 + back
@@ -223,14 +223,14 @@ def _step(
 
 @lean_inner_kernel
 def _link(
-    line: Line,
+    line: LinePlaces,
     base: Base,
     places: NDArray[np.uint64],
     clear: NDArray[np.uint64],
     before: int,
     state: int,
     ways: Ways,
-    memory: Memory,
+    memory: WordMemory,
 ) -> None:
     """Drive a word from one state to another, if that is cheaper than the way known."""
     begun = ways.cost_s[before]
@@ -275,12 +275,12 @@ def _link(
 
 @lean_kernel
 def find_ways(
-    line: Line,
+    line: LinePlaces,
     base: Base,
     places: NDArray[np.uint64],
     clear: NDArray[np.uint64],
     ways: Ways,
-    memory: Memory,
+    memory: WordMemory,
 ) -> None:
     """Find the cheapest way to each place.
 

@@ -10,7 +10,7 @@ from fasaco_edge.kernels.floor.line import (
     TRIED,
     Floor,
     Line,
-    Memory,
+    MoveMemory,
     Price,
     copy_point,
     gain_above,
@@ -62,7 +62,7 @@ def nearest_place(places: NDArray[np.uint64], place: NDArray[np.float64], reach:
 
 @lean_inner_kernel
 def _round_over(
-    line: Line, floor: Floor, price: Price, memory: Memory, begin: int, best: float
+    line: Line, floor: Floor, price: Price, memory: MoveMemory, begin: int, best: float
 ) -> tuple[float, int]:
     """Try five detours over ``memory.place`` from the edge after ``begin``.
 
@@ -118,7 +118,7 @@ def detour(
     line: Line,
     floor: Floor,
     price: Price,
-    memory: Memory,
+    memory: MoveMemory,
     begin: int,
     farthest: float,
     least: int,
@@ -214,7 +214,7 @@ def sweep_patches(
     line: Line,
     floor: Floor,
     price: Price,
-    memory: Memory,
+    memory: MoveMemory,
     farthest: float,
     patches: NDArray[np.bool_],
     most_tried: int,

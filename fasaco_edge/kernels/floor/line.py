@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.kernels.floor.capsule import is_clear
-from fasaco_edge.kernels.floor.nearness import near_px
+from fasaco_edge.kernels.floor.capsule import is_clear, near_px
 from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.sweeps import (
     BLOCK,
@@ -95,7 +94,7 @@ class Price(NamedTuple):
     near_s: float
 
 
-class Memory(NamedTuple):
+class MoveMemory(NamedTuple):
     """Memory for a move: points before and after, float64 (MOST_CHAIN, 2); the points to insert,
     those of the best move so far, and a place, float64 (MOST_NEW, 2)."""
 
@@ -136,7 +135,7 @@ def left_around(
 
 
 class Chains(NamedTuple):
-    """The points in ``Memory.before`` and ``after``: those replaced, and up to two on either side.
+    """The points in ``MoveMemory.before`` and ``after``: those replaced, and up to two beside them.
 
     Attributes:
         lead: number of the first point whose edge changes; the one before it defines a turn.
@@ -152,7 +151,7 @@ class Chains(NamedTuple):
 
 
 @lean_inner_kernel
-def _chains(line: Line, memory: Memory, begin: int, end: int, count: int) -> Chains:
+def _chains(line: Line, memory: MoveMemory, begin: int, end: int, count: int) -> Chains:
     points, following, preceding = line.points, line.next, line.previous
     old, new = memory.before, memory.after
     lead = 0
@@ -214,7 +213,7 @@ def gain_above(
     line: Line,
     floor: Floor,
     price: Price,
-    memory: Memory,
+    memory: MoveMemory,
     begin: int,
     end: int,
     count: int,
@@ -298,7 +297,7 @@ def has_room(line: Line) -> bool:
 
 @lean_inner_kernel
 def _sweep_between(
-    line: Line, floor: Floor, memory: Memory, begin: int, end: int, times: int
+    line: Line, floor: Floor, memory: MoveMemory, begin: int, end: int, times: int
 ) -> None:
     """Count the edges between two points in (``times`` 1) or out again (-1)."""
     points, following = line.points, line.next
@@ -311,7 +310,7 @@ def _sweep_between(
 
 @lean_inner_kernel
 def replace_points(
-    line: Line, floor: Floor, memory: Memory, begin: int, end: int, count: int
+    line: Line, floor: Floor, memory: MoveMemory, begin: int, end: int, count: int
 ) -> None:
     """Replace the points between two others by ``memory.new[:count]``."""
     points, following, preceding, tool = line.points, line.next, line.previous, floor.tool

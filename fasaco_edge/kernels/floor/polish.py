@@ -19,7 +19,7 @@ from fasaco_edge.kernels.floor.line import (
     TRIED,
     Floor,
     Line,
-    Memory,
+    MoveMemory,
     Price,
     gain_above,
     has_room,
@@ -68,7 +68,7 @@ def meeting(
 
 
 @lean_inner_kernel
-def _move(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, int]:
+def _move(line: Line, memory: MoveMemory, begin: int, attempt: int) -> tuple[int, int]:
     """Move the point after ``begin`` by a shift in one of six directions."""
     points, new = line.points, memory.new
     middle = line.next[begin]
@@ -90,7 +90,7 @@ def _move(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, in
 
 
 @lean_inner_kernel
-def _move_to_meeting(line: Line, memory: Memory, begin: int) -> tuple[int, int]:
+def _move_to_meeting(line: Line, memory: MoveMemory, begin: int) -> tuple[int, int]:
     """Move the point after ``begin`` to where the edges before and after its own would meet."""
     points, following, preceding, new = line.points, line.next, line.previous, memory.new
     middle = following[begin]
@@ -114,7 +114,7 @@ def slide(
     place: NDArray[np.float64],
     a: NDArray[np.float64],
     b: NDArray[np.float64],
-    memory: Memory,
+    memory: MoveMemory,
     ay: float,
     ax: float,
     by: float,
@@ -131,7 +131,7 @@ def slide(
 
 
 @lean_inner_kernel
-def _shift(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, int]:
+def _shift(line: Line, memory: MoveMemory, begin: int, attempt: int) -> tuple[int, int]:
     """Shift the edge after ``begin``'s next point; then also slide its ends."""
     points, following, new = line.points, line.next, memory.new
     a = following[begin]
@@ -156,7 +156,7 @@ def _shift(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, i
 
 
 @lean_inner_kernel
-def _propose(line: Line, memory: Memory, begin: int, attempt: int) -> tuple[int, int]:
+def _propose(line: Line, memory: MoveMemory, begin: int, attempt: int) -> tuple[int, int]:
     """Write the points of an attempt at a point into ``memory.new``.
 
     Returns:
@@ -186,7 +186,7 @@ def _after_gain(attempt: int) -> int:
 
 @lean_kernel
 def polish(
-    line: Line, floor: Floor, price: Price, memory: Memory, farthest: float, most_tried: int
+    line: Line, floor: Floor, price: Price, memory: MoveMemory, farthest: float, most_tried: int
 ) -> float:
     """Polish a line until no move gains, or a number of moves were tried.
 

@@ -1,4 +1,4 @@
-"""Reachability over a lattice and its update after a change; shortest walks, cost of a walk.
+"""Reachability over a lattice and its update after a change; shortest walks, and costs of walks.
 
 After some cells have changed, the cost of updating reachability depends only on these. Steps
 have changed only in a part of the lattice. If the cells at its rim - those with a step across
@@ -18,6 +18,8 @@ from fasaco_edge.kernels.jit import as_value, kernel, lean_inner_kernel, lean_ke
 
 UNSEEN = 255
 ROOT = 254
+# Distance of an unreachable cell [steps]; twice this does not overflow.
+FAR = 1 << 28
 
 
 @lean_inner_kernel
@@ -107,6 +109,25 @@ def shortest_walk(
         if index:
             cell -= offsets[came_from[cell]]
     return walk
+
+
+@kernel
+def ways_from(steps: NDArray[np.uint8], start: int) -> NDArray[np.int32]:
+    """Return the steps from a flat cell to each cell, int32 (rows * cols,), FAR where none lead.
+
+    Args:
+        steps: step masks, uint8 (rows, cols).
+        start: flat cell.
+    """
+    cols = steps.shape[1]
+    offsets = np.array([1, cols, -1, -cols], np.int64)
+    came_from = np.full(steps.size, UNSEEN, np.uint8)
+    ways, queue = np.full(steps.size, FAR, np.int32), np.empty(steps.size, np.int32)
+    reached = search(steps.ravel(), offsets, start, as_value(-1), came_from, queue)
+    ways[start] = 0
+    for cell in queue[1:reached]:
+        ways[cell] = ways[cell - offsets[came_from[cell]]] + 1
+    return ways
 
 
 @lean_kernel

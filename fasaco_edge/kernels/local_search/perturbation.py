@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.ants.disc import cohort, rebuild_disc, strengthen
-from fasaco_edge.kernels.ants.fold import Colony
+from fasaco_edge.kernels.ants.fold import DiscColony
 from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.local_search.parity import (
     Tally,
@@ -39,7 +39,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
 )
 from fasaco_edge.kernels.random import draw, index_of
 
-# Entries of ``Memory.work``.
+# Entries of ``SearchMemory.work``.
 PROPOSALS, PERTURBATIONS = 0, 1
 # No cells are given: what a perturbation changes is drawn.
 DRAWN = -1
@@ -75,7 +75,7 @@ class PerturbationRules(NamedTuple):
     strict: bool = False
 
 
-class Memory(NamedTuple):
+class SearchMemory(NamedTuple):
     """The best walk of a search, and working memory.
 
     Attributes:
@@ -97,7 +97,7 @@ class Memory(NamedTuple):
     work: NDArray[np.int64]
 
 
-class Search(NamedTuple):
+class LocalSearch(NamedTuple):
     """A local search: where the walk goes, the walk, its prices, working memory, and ants.
 
     The walk is changed in place; a worse one than ``memory.best`` may be left behind.
@@ -107,12 +107,12 @@ class Search(NamedTuple):
     walk: Walk
     prices: Prices
     tally: Tally
-    memory: Memory
-    colony: Colony
+    memory: SearchMemory
+    colony: DiscColony
 
 
 @lean_kernel
-def remember(walk: Walk, memory: Memory) -> None:
+def remember(walk: Walk, memory: SearchMemory) -> None:
     """Store the walk as the best one."""
     copy(walk.cells, memory.best, walk.counts[LENGTH])
     for index in range(walk.counts.size):
@@ -129,7 +129,7 @@ def _load(
 
 
 @lean_kernel
-def recall(ground: Ground, walk: Walk, prices: Prices, memory: Memory) -> None:
+def recall(ground: Ground, walk: Walk, prices: Prices, memory: SearchMemory) -> None:
     """Go back to the best walk."""
     _load(ground, walk, prices, memory.best, memory.best_counts[LENGTH])
 
@@ -222,7 +222,7 @@ def _settle(
     ground: Ground,
     walk: Walk,
     prices: Prices,
-    memory: Memory,
+    memory: SearchMemory,
     rules: PerturbationRules,
     touched: int,
     radius: int,
@@ -253,7 +253,11 @@ def _settle(
 
 @lean_kernel
 def perturb(
-    search: Search, rules: PerturbationRules, times: int, given: int, random: NDArray[np.uint64]
+    search: LocalSearch,
+    rules: PerturbationRules,
+    times: int,
+    given: int,
+    random: NDArray[np.uint64],
 ) -> None:
     """Perturb the walk ``times`` times; ``memory.best`` holds the best walk.
 

@@ -112,7 +112,7 @@ def neighbourhood(
 BEFORE, AFTER = 0, 1
 
 
-class Box(NamedTuple):
+class RegionBox(NamedTuple):
     """A region: the cells with its label, and the rectangle they lie in.
 
     Its own ground is the rectangle with a frame around it.
@@ -149,13 +149,13 @@ class Jumps(NamedTuple):
 
 
 @inlined
-def _bound(box: Box) -> int:
+def _bound(box: RegionBox) -> int:
     """Return the number of cells of the region's ground with its frame."""
     return (box.rows + 2 * FRAME) * (box.cols + 2 * FRAME)
 
 
 @inlined
-def _local(ground: Ground, box: Box, cell: int) -> int:
+def _local(ground: Ground, box: RegionBox, cell: int) -> int:
     """Return a cell of the large ground, inside or just beside the box, as a cell of the region."""
     width = ground.offsets[NORTH]
     row, col = cell // width - box.row, cell % width - box.col
@@ -163,7 +163,7 @@ def _local(ground: Ground, box: Box, cell: int) -> int:
 
 
 @inlined
-def _large(ground: Ground, box: Box, cell: int) -> int:
+def _large(ground: Ground, box: RegionBox, cell: int) -> int:
     """Return a cell of the region as a cell of the large ground."""
     width = box.cols + 2 * FRAME
     row, col = cell // width - FRAME + box.row, cell % width - FRAME + box.col
@@ -171,7 +171,7 @@ def _large(ground: Ground, box: Box, cell: int) -> int:
 
 
 @lean_kernel
-def cut_ground(ground: Ground, box: Box, region: Ground) -> int:
+def cut_ground(ground: Ground, box: RegionBox, region: Ground) -> int:
     """Fill the region's steps and needs; return how many cells it has."""
     region.steps[:] = 0
     region.needed[:] = FIXED
@@ -195,7 +195,7 @@ def cut_ground(ground: Ground, box: Box, region: Ground) -> int:
 
 @lean_kernel
 def cut_walk(
-    ground: Ground, box: Box, cells: NDArray[np.int32], walk: NDArray[np.int32], jumps: Jumps
+    ground: Ground, box: RegionBox, cells: NDArray[np.int32], walk: NDArray[np.int32], jumps: Jumps
 ) -> tuple[int, int]:
     """Write the parts of a walk that lie in the region, with jumps between them.
 
@@ -250,7 +250,7 @@ def cut_walk(
 @lean_kernel
 def put_back(
     ground: Ground,
-    box: Box,
+    box: RegionBox,
     cells: NDArray[np.int32],
     walk: NDArray[np.int32],
     jumps: Jumps,

@@ -40,7 +40,7 @@ WIDER, OTHER, OTHER_HALF_SEEN = 1.32, 1.1, 0.8
 MOST_GAPS = 20_000
 
 
-class Pixels(NamedTuple):
+class RoomPixels(NamedTuple):
     """What the pixels of a map are, each (rows, cols).
 
     Attributes:
@@ -111,7 +111,7 @@ def _way(solid: NDArray[np.bool_], place: _Place, most: float) -> float:
 
 
 @lean_inner_kernel
-def _face(pixels: Pixels, place: _Place, most: float) -> float:
+def _face(pixels: RoomPixels, place: _Place, most: float) -> float:
     """Return how far a wall reaches from a place inside it, in the place's direction [pixels].
 
     Negative if what begins there has not been seen, 0 if it is further than ``most``.
@@ -129,7 +129,7 @@ def _face(pixels: Pixels, place: _Place, most: float) -> float:
 
 
 @lean_inner_kernel
-def _nearest_solid(pixels: Pixels, row: float, col: float) -> tuple[int, int, bool]:
+def _nearest_solid(pixels: RoomPixels, row: float, col: float) -> tuple[int, int, bool]:
     """Return the solid pixel at a point, or the nearest beside it, and whether one is occupied.
 
     The row is -1 without one.
@@ -153,7 +153,7 @@ def _nearest_solid(pixels: Pixels, row: float, col: float) -> tuple[int, int, bo
 
 
 @lean_inner_kernel
-def _jamb_along(pixels: Pixels, end: _Place, wall: float) -> int:
+def _jamb_along(pixels: RoomPixels, end: _Place, wall: float) -> int:
     """Return the kind of the jamb that begins at the end of a chord, in that direction."""
     marks, kind = 0, THIN
     left_before, right_before = 0.0, 0.0
@@ -190,7 +190,7 @@ def _jamb_along(pixels: Pixels, end: _Place, wall: float) -> int:
 
 
 @lean_inner_kernel
-def _jamb(pixels: Pixels, end: _Place, wall: float) -> int:
+def _jamb(pixels: RoomPixels, end: _Place, wall: float) -> int:
     """Return the kind of the jamb at the end of a chord."""
     best = _jamb_along(pixels, end, wall)
     for turned in range(3):
@@ -238,9 +238,12 @@ def _is_mouth(
 
 @lean_inner_kernel
 def _door_at(
-    pixels: Pixels, centre: tuple[int, int], directions: NDArray[np.float64], limits: DoorLimits,
+    pixels: RoomPixels,
+    centre: tuple[int, int],
+    directions: NDArray[np.float64],
+    limits: DoorLimits,
     door: NDArray[np.float64],
-) -> bool:  # fmt: skip
+) -> bool:
     """Fill in the door through a pixel, as a row of ``find_doors``; return whether it is one."""
     row, col = centre[0] + 0.5, centre[1] + 0.5
     shortest, ahead, chord = limits.width, 0.0, -1
@@ -286,7 +289,7 @@ def _door_at(
 
 @kernel
 def find_doors(
-    pixels: Pixels, directions: NDArray[np.float64], limits: DoorLimits
+    pixels: RoomPixels, directions: NDArray[np.float64], limits: DoorLimits
 ) -> NDArray[np.float64]:
     """Return the chords of all doors and mouths of passages, several of each, float64 (n, 5).
 

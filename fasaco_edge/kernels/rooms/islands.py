@@ -14,7 +14,7 @@ from fasaco_edge.kernels.jit import kernel, lean_inner_kernel
 from fasaco_edge.kernels.lattice.areas import root
 
 
-class Limits(NamedTuple):
+class FurnitureLimits(NamedTuple):
     """Which islands are furniture.
 
     Attributes:
@@ -60,7 +60,7 @@ def _join(solid: NDArray[np.bool_], labels: NDArray[np.int32], parents: NDArray[
 
 
 @kernel
-def furniture(solid: NDArray[np.bool_], limits: Limits) -> NDArray[np.bool_]:
+def furniture(solid: NDArray[np.bool_], limits: FurnitureLimits) -> NDArray[np.bool_]:
     """Return the pixels of islands that are furniture, bool (rows, cols).
 
     Args:

@@ -1,4 +1,10 @@
-"""Memory of the dynamic program over a window, and its inputs: walk, window and cell."""
+"""Memory of the dynamic program, prices of the walk, and rules for the cell that is decided.
+
+An open end of a piece of the walk has an identifier. Identifiers ``2 * column + lane`` are lanes of
+the frontier below the decided cells, two more are the lanes ahead of the cell that is decided, then
+come the slots at the window's rim, and four spare ones for the lanes that lead into that cell. A
+state is an array by identifier: the mate of each open end, or NO_END.
+"""
 
 from typing import NamedTuple
 
@@ -7,12 +13,11 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import inlined
 
-# Marks that there is no end of a piece; a cost above all costs.
+# In place of a mate: the slot is no open end. A cost above all costs.
 NO_END = -1
-MUCH = 1 << 60
+TOO_MUCH = 1 << 60
 
-# Identifiers in a state: two for each column of the frontier, two for the side ahead, the slots at
-# the window's rim, and four while a cell is decided. Windows that need more are left alone.
+# Limit on the identifiers of a state; windows that need more are left alone.
 MOST_IDS = 192
 # Limit on the choices for a cell, and number of kinds of incoming sides with a list of choices.
 MOST_CHOICES, KINDS = 600, 18
@@ -27,7 +32,7 @@ CODE_BITS, AHEAD, BELOW, ENDING, PAIRING = 12, 10, 8, 7, 127
 FIRST_NEW, SECOND_NEW, NO_PAIR = 1, 2, 4
 
 
-class Choice(NamedTuple):
+class Choices(NamedTuple):
     """A cell's choices by kind of incoming sides, cheapest first.
 
     Attributes:
@@ -44,7 +49,7 @@ class Choice(NamedTuple):
     keys: NDArray[np.int64]
     named: NDArray[np.int32]
     ends: NDArray[np.int16]
-    how: NDArray[np.uint8]
+    new_ends: NDArray[np.uint8]
 
 
 class Parts(NamedTuple):
@@ -75,8 +80,8 @@ class States(NamedTuple):
     """States before and after a cell.
 
     Attributes:
-        mates: int16 (2, states, MOST_IDS), for each state and each identifier at an end of a piece,
-            the identifier at the other end; one layer before the cell and one after it.
+        mates: int16 (2, states, MOST_IDS), the states, see above: one layer before the cell, and
+            one after it.
         words: int64 (2, states, MOST_IDS / 4), the same memory.
         cost: int64 (2, states).
         closed: uint8 (2, states), whether the ring is closed.
@@ -106,7 +111,7 @@ class States(NamedTuple):
     clock: NDArray[np.int64]
 
 
-class Cells(NamedTuple):
+class WindowCells(NamedTuple):
     """The cells of the window, and the slots at its rim.
 
     Attributes:
@@ -141,20 +146,20 @@ class Program(NamedTuple):
     """
 
     pairs: NDArray[np.int8]
-    choice: Choice
+    choice: Choices
     states: States
     kept_parent: NDArray[np.int32]
     kept_code: NDArray[np.int64]
-    cells: Cells
+    cells: WindowCells
     reduced: NDArray[np.int64]
     left: NDArray[np.int64]
     taken: NDArray[np.int16]
-    kinds: NDArray[np.int64]
+    sides: NDArray[np.int64]
     at: NDArray[np.int64]
     parts: Parts
 
 
-class Terms(NamedTuple):
+class WalkPrices(NamedTuple):
     """Costs and end of the walk.
 
     Attributes:
@@ -178,47 +183,6 @@ class Terms(NamedTuple):
     room: int = 0
 
 
-class Window(NamedTuple):
-    """A rectangle of framed cells.
-
-    Attributes:
-        row, col: its first row and column.
-        rows, cols: its size.
-        width: of the framed ground.
-        mirrored: bits of ``kernels.windows.order``: the corner the program begins in.
-    """
-
-    row: int
-    col: int
-    rows: int
-    cols: int
-    width: int
-    mirrored: int
-
-
-class Aim(NamedTuple):
-    """Positions and sizes of windows.
-
-    Attributes:
-        cells: int32 (k,), framed cells that windows are laid around.
-        rows, cols: of the framed ground.
-        frame: cells of its frame on each side.
-        least_side, most_side: of a window's shorter side.
-        least_area, most_area: of a window at first, and in the end.
-        beam: limit on the states kept.
-    """
-
-    cells: NDArray[np.int32]
-    rows: int
-    cols: int
-    frame: int
-    least_side: int
-    most_side: int
-    least_area: int
-    most_area: int
-    beam: int
-
-
 LAYER_STAMP, EXPANDED = 0, 1
 
 # Entries of ``Program.at``: number and line of the next cell; the layer before it and the number of
@@ -228,7 +192,7 @@ LAYER_STAMP, EXPANDED = 0, 1
 NUMBER, LINE, LAYER, STATES, LIMIT, COUNT, LAST, IDS, BEGIN_ID, END_ID, RING_PRICE = range(11)
 
 
-class Here(NamedTuple):
+class CurrentCell(NamedTuple):
     """The cell being decided.
 
     Attributes:
@@ -255,7 +219,7 @@ class Here(NamedTuple):
     spare_id: int
 
 
-class Ends(NamedTuple):
+class EndRules(NamedTuple):
     """The walk's ends and ring rules at a cell.
 
     Attributes:
@@ -280,7 +244,7 @@ class Ends(NamedTuple):
 
 
 @inlined
-def at_rim(ident: NDArray[np.int16], cell: int, direction: int) -> int:
+def lanes_at_rim(ident: NDArray[np.int16], cell: int, direction: int) -> int:
     """Return how many lanes of a side lead out of the window; the first lanes are used first."""
     if ident[cell, 2 * direction] == NO_END:
         return 0

@@ -3,7 +3,7 @@
 A walk that enters a part leaves it again, or ends there. So an even number of open ends leads into
 each part; into one part an odd number may lead if the walk may end there. At least one leads into
 each part with a cell to cover; none has to if the part may have a ring, a closed walk, of its own.
-States that break these rules are dropped. Read ``memory`` (identifiers, mates) first.
+States that break these rules are dropped.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel
 from fasaco_edge.kernels.lattice.areas import root
 from fasaco_edge.kernels.local_search.walk_array import Ground
-from fasaco_edge.kernels.windows.memory import NO_END, Cells, Parts
+from fasaco_edge.kernels.windows.memory import NO_END, Parts, WindowCells
 from fasaco_edge.kernels.windows.passages import END
 
 # Limit on the parts that are checked: bits of a word.
@@ -25,7 +25,7 @@ PARTS, LEADS = 0, 1
 
 @lean_inner_kernel
 def prepare_parts(
-    ground: Ground, parts: Parts, cells: Cells, count: int, ahead: int, below: int, begin: int
+    ground: Ground, parts: Parts, cells: WindowCells, count: int, ahead: int, below: int, begin: int
 ) -> None:
     """Find the cut vertices of parts; label the parts of the whole window."""
     for number in range(count):
@@ -48,7 +48,7 @@ def prepare_parts(
 
 @lean_inner_kernel
 def label_parts(
-    ground: Ground, parts: Parts, cells: Cells, first: int, count: int, begin: int
+    ground: Ground, parts: Parts, cells: WindowCells, first: int, count: int, begin: int
 ) -> None:
     """Label the parts of the cells from number ``first`` on."""
     for number in range(first, count):

@@ -1,9 +1,10 @@
-"""A covering walk as passages through cells, the form in which windows are re-optimised.
+"""Passages: a covering walk taken apart into its visits of cells.
 
-A step is walked at most twice: a lane each. So a cell has two lanes to each of four sides, eight
-slots ``2 * direction + lane``; a passage joins two of them. The walk's two ends are slots, too:
-BEGIN in its first cell, END in its last one. A virtual connection from END to BEGIN outside the
-ground closes every walk, so all its passages are on one ring.
+A step is walked at most twice, each time in a lane of its own. So a cell has eight slots
+``2 * direction + lane``, two lanes at each of its four sides, and a visit is a passage, which joins
+two of the slots. The walk's two ends are slots, too: BEGIN in its first cell, END in its last one.
+END is taken to be connected with BEGIN outside of the ground, so that every walk is one ring of
+passages.
 """
 
 from typing import NamedTuple

@@ -1,11 +1,4 @@
-"""A window of a walk, re-optimised exactly or nearly so by dynamic programming over its frontier.
-
-Cell by cell, line by line (``order``), the program chooses the cell's passages. A
-state is the information that the remaining cells need: the open ends of the walk so far at the
-frontier and at the window's rim, and which of them belong to the same piece; the walk outside the
-window joins the ends at its rim. Of equal states the cheapest is kept (Simpath; Inoue and Minato
-2016 name it the frontier method). A ring may close once, when all cells are covered: so the result
-is one walk, as before.
+"""Dynamic program over a window, see ``kernels.windows``: begin, lines of cells, and result.
 
 Costs are reduced by the prices of steps (``kernels.bound.turns``): no passage has a negative
 reduced cost, so the undecided cells cost at least the sum of their cheapest passages, and states
@@ -13,7 +6,7 @@ that cannot be cheaper than the present walk are dropped. If more states are lef
 takes, the most expensive ones are dropped, too. All amounts are half microseconds.
 
 On a whole ground a narrow beam soon holds no state that can still become a single ring. So several
-rings may close there at a price (``ring_price``), and ``kernels.windows.rings`` joins them.
+rings may close there at a price (``ring_price``), and ``kernels.windows.search`` joins them.
 """
 
 import numpy as np
@@ -21,8 +14,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.kernels.jit import as_value, inlined, lean_inner_kernel, lean_kernel
 from fasaco_edge.kernels.local_search.walk_array import Ground
-from fasaco_edge.kernels.windows.choices import price_cells, real_cost
-from fasaco_edge.kernels.windows.decide import decide
+from fasaco_edge.kernels.windows.choices import decide, price_cells, real_cost
 from fasaco_edge.kernels.windows.memory import (
     AHEAD,
     BEGIN_ID,
@@ -41,15 +33,13 @@ from fasaco_edge.kernels.windows.memory import (
     PAIRING,
     RING_PRICE,
     STATES,
-    Cells,
-    Ends,
-    Here,
+    CurrentCell,
+    EndRules,
     Parts,
     Program,
-    Terms,
-    Window,
+    WalkPrices,
+    WindowCells,
 )
-from fasaco_edge.kernels.windows.order import cell_at, directions_of, shape_of
 from fasaco_edge.kernels.windows.parts import (
     FEW_CELLS,
     LEADS,
@@ -59,14 +49,20 @@ from fasaco_edge.kernels.windows.parts import (
     prepare_parts,
 )
 from fasaco_edge.kernels.windows.passages import BEGIN, END, NONE, SLOTS, Passages, across
+from fasaco_edge.kernels.windows.window import (
+    WalkWindow,
+    cell_at,
+    directions_of,
+    shape_of,
+)
 
 
 @lean_kernel
 def begin_window(
     ground: Ground,
     passages: Passages,
-    terms: Terms,
-    window: Window,
+    terms: WalkPrices,
+    window: WalkWindow,
     program: Program,
     noise: int,
     allowance: int,
@@ -129,7 +125,12 @@ def _begin_of(passages: Passages, at: NDArray[np.int64]) -> int:
 
 @lean_kernel
 def advance_window(
-    ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program, beam: int
+    ground: Ground,
+    passages: Passages,
+    terms: WalkPrices,
+    window: WalkWindow,
+    program: Program,
+    beam: int,
 ) -> bool:
     """Decide the next line of cells; return whether any are left. ``beam``: most states kept."""
     lines, wide = shape_of(window)
@@ -157,7 +158,7 @@ def advance_window(
         price = at[RING_PRICE]
         may_close = price > 0 or number >= at[LAST]
         is_given = end_id >= 0 and not is_free and cell == passages.ends[1]
-        ends = Ends(begins, end_id, is_needed, may_close, price, is_given, is_free, is_checked)
+        ends = EndRules(begins, end_id, is_needed, may_close, price, is_given, is_free, is_checked)
         at[STATES] = decide(program, here, ends, at[LAYER], at[STATES], beam, at[LIMIT])
         at[LAYER] = 1 - at[LAYER]
         at[NUMBER] = number + 1
@@ -167,7 +168,7 @@ def advance_window(
 
 @lean_kernel
 def end_window(
-    ground: Ground, passages: Passages, terms: Terms, window: Window, program: Program
+    ground: Ground, passages: Passages, terms: WalkPrices, window: WalkWindow, program: Program
 ) -> int:
     """Put the best state's passages back, if it is better.
 
@@ -195,7 +196,9 @@ def end_window(
 
 
 @lean_inner_kernel
-def _name_rim(ground: Ground, passages: Passages, cells: Cells, first: int, count: int) -> int:
+def _name_rim(
+    ground: Ground, passages: Passages, cells: WindowCells, first: int, count: int
+) -> int:
     """Give identifiers to the slots that lead out of the window; return their number, or -1."""
     ids = first
     for index in range(count):
@@ -219,7 +222,7 @@ def _name_rim(ground: Ground, passages: Passages, cells: Cells, first: int, coun
 def _join_outside(
     ground: Ground,
     passages: Passages,
-    cells: Cells,
+    cells: WindowCells,
     mates: NDArray[np.int16],
     first: int,
     ids: int,
@@ -240,7 +243,7 @@ def _join_outside(
 
 @lean_inner_kernel
 def _part_with(
-    ground: Ground, parts: Parts, cells: Cells, cell: int, index: int, count: int, begin: int
+    ground: Ground, parts: Parts, cells: WindowCells, cell: int, index: int, count: int, begin: int
 ) -> bool:
     """Take a cell out of its part; return whether to check states for it."""
     label = parts.label[cell]
@@ -254,7 +257,7 @@ def _part_with(
 
 @lean_inner_kernel
 def _list_frontier(
-    ground: Ground, parts: Parts, window: Window, line: int, place: int, here: Here
+    ground: Ground, parts: Parts, window: WalkWindow, line: int, place: int, here: CurrentCell
 ) -> None:
     """Note which part each identifier of the frontier leads into, once the cell is decided."""
     lines, wide = shape_of(window)
@@ -282,10 +285,10 @@ def _here(
     ahead: int,
     below: int,
     spare_id: int,
-) -> Here:
+) -> CurrentCell:
     behind, above, mask = (ahead + 2) & 3, (below + 2) & 3, ground.steps[cell]
     offsets = ground.offsets
-    return Here(
+    return CurrentCell(
         cell,
         index,
         behind,
@@ -306,7 +309,7 @@ def _here(
 def _put_back(
     passages: Passages,
     program: Program,
-    window: Window,
+    window: WalkWindow,
     state: int,
     count: int,
 ) -> None:

@@ -1,4 +1,4 @@
-"""States of the program: apply a choice to a state, file states, drop the most expensive."""
+"""States of the program: a choice applied to a state, equal states, the most expensive dropped."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,9 @@ from fasaco_edge.kernels.windows.memory import (
     NO_PAIR,
     PAIRING,
     SECOND_NEW,
-    Choice,
-    Ends,
-    Here,
+    Choices,
+    CurrentCell,
+    EndRules,
     Program,
     States,
 )
@@ -27,7 +27,7 @@ INDEX_BITS, INDICES = 16, 65535
 
 
 @inlined
-def take_in(base: NDArray[np.int16], first: int, spare: int) -> int:
+def take_incoming(base: NDArray[np.int16], first: int, spare: int) -> int:
     """Rename the ends at two identifiers of the frontier; return their number."""
     found = 0
     for lane in range(2):
@@ -57,10 +57,10 @@ def _name(
 
 
 @inlined
-def name_ends(
+def list_pairs(
     program: Program,
-    here: Here,
-    ends: Ends,
+    here: CurrentCell,
+    ends: EndRules,
     kind: int,
     number: int,
     behind: int,
@@ -89,24 +89,24 @@ def name_ends(
         taken[size] = ends.end_id
         size += 1
     for pair in range(size >> 1):
-        how = 0
+        new_ends = 0
         for end in range(2):
             at = program.pairs[code & PAIRING, 2 * pair + end]
             is_new = here.to_ahead if at < first_below else here.to_below
             if is_new and first_new <= at < last_new:
-                how |= FIRST_NEW << end
+                new_ends |= FIRST_NEW << end
             choice.ends[kind, number, 2 * pair + end] = taken[at]
-        choice.how[kind, number, pair] = how
+        choice.new_ends[kind, number, pair] = new_ends
     if size >> 1 < MOST_PAIRS:
-        choice.how[kind, number, size >> 1] = NO_PAIR
+        choice.new_ends[kind, number, size >> 1] = NO_PAIR
     choice.named[kind] = number + 1
 
 
 @inlined
-def apply(
+def apply_choice(
     states: States,
-    choice: Choice,
-    ends: Ends,
+    choice: Choices,
+    ends: EndRules,
     kind: int,
     number: int,
     was_closed: int,
@@ -114,23 +114,23 @@ def apply(
 ) -> int:
     """Write the state after a choice into ``scratch``; return how many rings are closed, or -1."""
     mates = states.scratch
-    if was_closed and choice.how[kind, number, 0] != NO_PAIR and not ends.ring_price:
+    if was_closed and choice.new_ends[kind, number, 0] != NO_PAIR and not ends.ring_price:
         return -1
     closed = was_closed
     for word in range(words):
         states.scratch_words[word] = states.base_words[word]
     for pair in range(MOST_PAIRS):
-        how = choice.how[kind, number, pair]
-        if how == NO_PAIR:
+        new_ends = choice.new_ends[kind, number, pair]
+        if new_ends == NO_PAIR:
             break
         one, other = choice.ends[kind, number, 2 * pair], choice.ends[kind, number, 2 * pair + 1]
-        if how == FIRST_NEW | SECOND_NEW:
+        if new_ends == FIRST_NEW | SECOND_NEW:
             mates[one], mates[other] = other, one
-        elif how == FIRST_NEW:
+        elif new_ends == FIRST_NEW:
             mate = mates[other]
             mates[one], mates[mate] = mate, one
             mates[other] = NO_END
-        elif how == SECOND_NEW:
+        elif new_ends == SECOND_NEW:
             mate = mates[one]
             mates[other], mates[mate] = mate, other
             mates[one] = NO_END

@@ -1,7 +1,8 @@
-"""Input of a planner of the user's own, and checks of the walk that it returns."""
+"""Planner of the user's own: its input, checks of the walk that it returns, and its interface."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -12,11 +13,13 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import IllegalWalk
 from fasaco_edge.planners.own.loading import RAISED, UserCode, failure, too_long
 from fasaco_edge.planners.own.time_limit import TookTooLongError, no_longer_than
+from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.planners.planner import Observer, StoppingCriterion
+from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.text import shown
 
 if TYPE_CHECKING:
     from fasaco_edge.grid.lattice import Cell
-    from fasaco_edge.planners.problem import CoverageProblem
 
 # Offsets (row, col) to the neighbours: east, north, west, south.
 MOVES = ((0, 1), (1, 0), (0, -1), (-1, 0))
@@ -73,6 +76,38 @@ def posed(problem: CoverageProblem, seed: int) -> GridProblem:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class OwnPlanner:
+    """A user's code as a planner.
+
+    Attributes:
+        code: the code.
+        seed: passed to it.
+        most_s: time that it may take [s]; None for no limit.
+    """
+
+    code: UserCode
+    seed: int = 0
+    most_s: float | None = None
+
+    def plan(
+        self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
+    ) -> CoveragePath:
+        """Return the code's walk; only ``most_s`` ends it, and ``observe`` is not called.
+
+        Raises:
+            PlannerFailed: the code raised, or took longer.
+            IllegalWalk: the result is not a walk, or does not solve the problem.
+        """
+        given, began = posed(problem, self.seed), time.perf_counter()
+        cells = walked(self.code, given, self.most_s)
+        taken_s = time.perf_counter() - began
+        window = problem.lattice.window
+        cells = cells + np.array((window.row0, window.col0), np.int32)
+        cost_s = problem.cost.of_walk(cells)
+        return CoveragePath(cells, self.code.name, self.seed, cost_s=cost_s, first_walk_s=taken_s)
+
+
 def walked(code: UserCode, problem: GridProblem, most_s: float | None = None) -> NDArray[np.int32]:
     """Return the walk of a planner of the user's own, int32 (n, 2).
 
@@ -113,11 +148,7 @@ def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
 
 
 def _checked(problem: GridProblem, walk: list[Cell | str], name: str) -> NDArray[np.int32]:
-    """Return a walk, int32 (n, 2).
-
-    Raises:
-        IllegalWalk: it is not a walk, or does not solve the problem; the message names the step.
-    """
+    """Return a walk, int32 (n, 2); raise IllegalWalk, which names the step, if it is none."""
 
     def no(why: str) -> IllegalWalk:
         return IllegalWalk(f"planner {name}: {why}")

@@ -43,7 +43,7 @@ from fasaco_edge.planners.planner import (
     never,
 )
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround, graph_of, scratch_for
-from fasaco_edge.planners.walk_before import HELD_CELLS, can_repair, completed
+from fasaco_edge.planners.walk_before import HELD_CELLS, completed
 
 # Limit on the ants of a group, which walk at the same time. Larger groups keep more threads busy,
 # smaller groups respond to ``stop`` sooner. A group covers CELLS_PER_GROUP, in about 10 ms.
@@ -180,7 +180,7 @@ def groups_of(config: ColonyConfig, cells: int) -> Iterator[Group]:
 
 def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
     """Return the number of ants; with a previous walk it is proportional to the new cells."""
-    if problem.trail is None or problem.before is None or not can_repair(problem):
+    if problem.trail is None or problem.before is None or not problem.can_repair:
         return config.ants
     window = problem.lattice.window
     new = problem.to_cover.copy()
@@ -192,7 +192,7 @@ def ants_for(config: ColonyConfig, problem: CoverageProblem) -> int:
 
 def _walk_before(problem: CoverageProblem) -> NDArray[np.int32] | None:
     """Return the previous walk, completed, flat cells int32 (n,); None for none."""
-    if problem.trail is None or problem.before is None or not can_repair(problem):
+    if problem.trail is None or problem.before is None or not problem.can_repair:
         return None
     framed = FramedGround.of(problem)
     return framed.unframed(completed(problem, framed, problem.before, HELD_CELLS))

@@ -23,8 +23,7 @@ from fasaco_edge.planners.planner import (
 )
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.search.repair import repaired
-from fasaco_edge.planners.search.search import Search
-from fasaco_edge.planners.walk_before import can_repair
+from fasaco_edge.planners.search.search import ColonySearch
 
 # Optimality gap in steps above which a search follows a repair.
 POOR_GAP = 0.25
@@ -76,7 +75,7 @@ class NearOptimal:
     def _plan(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
     ) -> CoveragePath:
-        if not can_repair(problem):
+        if not problem.can_repair:
             return self._search(problem, stop, observe)
         path = repaired(problem, self.name, self.config, stop)
         if problem.only_better or not is_poor(problem, path):
@@ -89,7 +88,7 @@ class NearOptimal:
     def _search(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer
     ) -> CoveragePath:
-        search = Search(self.name, self.config, problem, observe, has_ants=self.has_ants)
+        search = ColonySearch(self.name, self.config, problem, observe, has_ants=self.has_ants)
         for _ in search.run():
             if stop(search.progress()):
                 break

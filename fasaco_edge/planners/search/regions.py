@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.kernels.local_search.regions import (
-    Box,
+    RegionBox,
     neighbourhood,
 )
 from fasaco_edge.kernels.local_search.walk_array import (
@@ -40,11 +40,11 @@ def is_one_region(rows: int, cols: int, cells: int) -> bool:
     return cells <= ONE_REGION and rows * cols <= LATTICE_OF_ONE
 
 
-def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[Box]:
+def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[RegionBox]:
     """Yield the regions of pass ``number`` over a ground with this many cells to cover."""
     if is_one_region(framed.rows, framed.cols, cells):
         labels = np.zeros(framed.ground.bound, np.int32)
-        yield Box(labels, 0, FRAME, FRAME, framed.rows, framed.cols)
+        yield RegionBox(labels, 0, FRAME, FRAME, framed.rows, framed.cols)
         return
     row_shift, col_shift = (half * EDGE // 2 for half in SHIFTS[number % len(SHIFTS)])
     across = framed.width // EDGE + 2
@@ -55,7 +55,7 @@ def regions_of(framed: FramedGround, cells: int, number: int) -> Iterator[Box]:
         for col in np.unique(cols[FRAME : FRAME + framed.cols]).tolist():
             first_row, last_row = _span(row, row_shift, framed.rows)
             first_col, last_col = _span(col, col_shift, framed.cols)
-            yield Box(
+            yield RegionBox(
                 labels,
                 row * across + col,
                 first_row,
@@ -92,7 +92,7 @@ class Neighbourhood:
         is_first: whether the robot and the cells just ahead of it are in it.
     """
 
-    box: Box
+    box: RegionBox
     changed: NDArray[np.int32]
     is_first: bool
 
@@ -144,7 +144,7 @@ def _around(
     size = neighbourhood(framed.ground, begin, radius, labels, 1, found)
     rows, cols = np.divmod(found[:size], framed.width)
     row, col = int(rows.min()), int(cols.min())
-    box = Box(labels, 1, row, col, int(rows.max()) - row + 1, int(cols.max()) - col + 1)
+    box = RegionBox(labels, 1, row, col, int(rows.max()) - row + 1, int(cols.max()) - col + 1)
     inside = changed[labels[changed] == 1]
     rows, cols = np.divmod(inside, framed.width)
     local = (rows - row + FRAME) * (box.cols + 2 * FRAME) + cols - col + FRAME

@@ -52,7 +52,7 @@ def repaired(
     """Return a complete walk that keeps the valid parts of ``problem.before``.
 
     Args:
-        problem: with a walk ``before``, see ``can_repair``.
+        problem: with a walk ``before``, see ``CoverageProblem.can_repair``.
         name: of the planner.
         config: seed, and constants of the ants.
         stop: stopping criterion.

@@ -17,7 +17,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
-from fasaco_edge.kernels.windows.order import LINES, PLACES
+from fasaco_edge.kernels.windows.window import LINES, PLACES
 from fasaco_edge.planners.bound import GLANCE, THOROUGH, LowerBound
 from fasaco_edge.planners.cost import MICROSECONDS, SearchWork
 from fasaco_edge.planners.paper.baselines import first_walks
@@ -30,7 +30,7 @@ from fasaco_edge.planners.search.effort import effort_for
 from fasaco_edge.planners.search.search_trail import SearchTrail
 from fasaco_edge.planners.search.walk_region import stream_of
 from fasaco_edge.planners.search.windows import WindowSearch, is_dear, pays_whole, suits
-from fasaco_edge.planners.walk_before import HELD_CELLS, completed, has_walk
+from fasaco_edge.planners.walk_before import HELD_CELLS, completed
 
 # Proposals between two pauses: about a millisecond.
 PROPOSALS_AT_ONCE = 30_000
@@ -60,7 +60,7 @@ CORNERS = (0, LINES, PLACES, LINES | PLACES)
 LOCAL_SEARCH = 1 << 32
 
 
-class Search:
+class ColonySearch:
     """A running search: a generator of pauses; it can be abandoned at each."""
 
     def __init__(
@@ -170,7 +170,7 @@ class Search:
     def _offer_walk_before(self) -> None:
         """Start from the previous walk, if it costs no more than the first."""
         problem, before = self._problem, self._problem.before
-        if before is None or not has_walk(problem):
+        if before is None or not len(before):
             return
         walk = completed(problem, self._framed, before, HELD_CELLS)
         cost_us = problem.cost_us(walk, self._framed)

@@ -17,9 +17,9 @@ from fasaco_edge.kernels.ants.fold import (
     MOST_TUNNELS,
     NOTHING,
     AntRules,
-    Colony,
+    DiscColony,
 )
-from fasaco_edge.kernels.local_search.regions import Box
+from fasaco_edge.kernels.local_search.regions import RegionBox
 from fasaco_edge.kernels.local_search.walk_array import FRAME
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot, legal, mean_into
@@ -43,11 +43,11 @@ class SearchTrail:
         self._window: Window | None = None
         self._tau = NO_TRAIL.tau
 
-    def cut(self, box: Box, out: NDArray[np.float64]) -> None:
+    def cut(self, box: RegionBox, out: NDArray[np.float64]) -> None:
         """Copy a region's part into ``out``, float64 (n, 4), one row for each framed cell."""
         _inner(box, out)[:] = self._on(self._window_of(box))
 
-    def paste(self, box: Box, trail: NDArray[np.float64]) -> None:
+    def paste(self, box: RegionBox, trail: NDArray[np.float64]) -> None:
         """Copy a region's part back."""
         window = self._window_of(box)
         whole = Window.around(self._window, window) or window
@@ -75,13 +75,13 @@ class SearchTrail:
             tau[common.slices_in(window)] = self._tau[common.slices_in(self._window)]
         return tau
 
-    def _window_of(self, box: Box) -> Window:
+    def _window_of(self, box: RegionBox) -> Window:
         whole = self._problem.lattice.window
         row, col = whole.row0 + box.row - FRAME, whole.col0 + box.col - FRAME
         return Window(row, col, row + box.rows, col + box.cols)
 
 
-def _inner(box: Box, trail: NDArray[np.float64]) -> NDArray[np.float64]:
+def _inner(box: RegionBox, trail: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the trail of a region without its frame, a view (rows, cols, 4)."""
     rows, cols = box.rows + 2 * FRAME, box.cols + 2 * FRAME
     return trail[: rows * cols].reshape(rows, cols, 4)[FRAME:-FRAME, FRAME:-FRAME]
@@ -110,13 +110,13 @@ def powers_of_turns(cost: CoverageCost, beta: float) -> NDArray[np.float64]:
     return np.asarray(eta**beta)
 
 
-def colony_for(size: int, rules: AntRules) -> Colony:
+def colony_for(size: int, rules: AntRules) -> DiscColony:
     """Return memory for the ants on a ground of this many framed cells."""
 
     def cells(*shape: int) -> NDArray[np.int32]:
         return np.zeros(shape, np.int32)
 
-    return Colony(
+    return DiscColony(
         trail=np.full((size, 4), rules.tau0),
         is_open=np.zeros(size, np.uint8),
         labels=cells(size),

@@ -16,9 +16,9 @@ from fasaco_edge.kernels.local_search.perturbation import (
     DRAWN,
     PERTURBATIONS,
     PROPOSALS,
-    Memory,
+    LocalSearch,
     PerturbationRules,
-    Search,
+    SearchMemory,
     perturb,
     recall,
     remember,
@@ -26,8 +26,8 @@ from fasaco_edge.kernels.local_search.perturbation import (
 from fasaco_edge.kernels.local_search.proposals import improve
 from fasaco_edge.kernels.local_search.regions import (
     AFTER,
-    Box,
     Jumps,
+    RegionBox,
     cut_ground,
     cut_walk,
     put_back,
@@ -76,7 +76,7 @@ class WalkRegion:
             counts=np.zeros(3, np.int64),
         )
         tally = _tally(size, jumps, capacity)
-        self._memory = Memory(
+        self._memory = SearchMemory(
             saved=np.empty(capacity, np.int32),
             best=np.empty(capacity, np.int32),
             best_counts=np.zeros(3, np.int64),
@@ -86,14 +86,14 @@ class WalkRegion:
             work=np.zeros(2, np.int64),
         )
         colony = colony_for(both, trail.rules)
-        self._search = Search(ground, walk, Prices(1, 0, False), tally, self._memory, colony)
+        self._search = LocalSearch(ground, walk, Prices(1, 0, False), tally, self._memory, colony)
         self._trail = trail
         self._jumps = Jumps(tally.jump_ends, np.empty((jumps, 2), np.int32), np.zeros(2, np.int64))
         self._loaded_us = self._loaded_length = 0
         # The whole ground and walk, and the box of the loaded region.
-        self._whole: tuple[Ground, NDArray[np.int32], Box] | None = None
+        self._whole: tuple[Ground, NDArray[np.int32], RegionBox] | None = None
 
-    def load(self, framed: FramedGround, cells: NDArray[np.int32], box: Box) -> bool:
+    def load(self, framed: FramedGround, cells: NDArray[np.int32], box: RegionBox) -> bool:
         """Cut a region out; return False if the walk does not enter it, or exceeds the memory.
 
         Args:

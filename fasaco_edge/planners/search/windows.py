@@ -20,19 +20,20 @@ from fasaco_edge.kernels.windows.memory import (
     MOST_PAIRS,
     NO_END,
     PAIRINGS,
-    Aim,
-    Cells,
-    Choice,
+    Choices,
     Parts,
     Program,
     States,
-    Terms,
-    Window,
+    WalkPrices,
+    WindowCells,
 )
 from fasaco_edge.kernels.windows.passages import BEGIN, NONE, SLOTS, Passages, passages_of, walk_of
 from fasaco_edge.kernels.windows.program import advance_window, begin_window, end_window
-from fasaco_edge.kernels.windows.rings import ANY_PRICE, Seams
-from fasaco_edge.kernels.windows.search import BEST, COST, SOLVED, solve_windows
+from fasaco_edge.kernels.windows.search import ANY_PRICE, BEST, COST, SOLVED, Seams, solve_windows
+from fasaco_edge.kernels.windows.window import (
+    WalkWindow,
+    WindowSizes,
+)
 from fasaco_edge.planners.bound import LowerBound
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
@@ -90,7 +91,7 @@ class WindowSearch:
         steps[reached] = framed.ground.steps[reached]
         self._ground = framed.ground._replace(steps=steps)
         dear = is_dear(problem.cost)
-        self._aim = Aim(
+        self._aim = WindowSizes(
             cells=reached,
             rows=framed.rows + 2 * FRAME,
             cols=framed.width,
@@ -137,7 +138,12 @@ class WindowSearch:
         self._solve(self._aim, NO_SEAMS, windows, expansions, random)
 
     def _solve(
-        self, aim: Aim, seams: Seams, windows: int, expansions: int, random: NDArray[np.uint64]
+        self,
+        aim: WindowSizes,
+        seams: Seams,
+        windows: int,
+        expansions: int,
+        random: NDArray[np.uint64],
     ) -> int:
         return solve_windows(
             *(self._ground, self._passages, self._best, self._terms, self._program, aim, seams),
@@ -148,7 +154,7 @@ class WindowSearch:
         """Solve the whole ground as one window, with this beam; pause after each line.
 
         Then join the rings of the solution; keep the result if it is better. ``mirrored`` is the
-        first corner, as in ``kernels.windows.order``.
+        first corner, as in ``kernels.windows.window``.
         """
         framed, ground, passages, terms = (
             self._framed,
@@ -156,7 +162,7 @@ class WindowSearch:
             self._passages,
             self._terms,
         )
-        window = Window(FRAME, FRAME, framed.rows, framed.cols, framed.width, mirrored)
+        window = WalkWindow(FRAME, FRAME, framed.rows, framed.cols, framed.width, mirrored)
         program = _program(self._size, beam, self._aim.cells.size)
         price = RING_TURNS * terms.turn
         begin_window(ground, passages, terms, window, program, 0, ANY_PRICE, price, random)
@@ -230,7 +236,7 @@ def thinned(walk: NDArray[np.int32]) -> NDArray[np.int32]:
 
 def _terms(
     problem: CoverageProblem, framed: FramedGround, bound: LowerBound
-) -> tuple[Terms, NDArray[np.int32]]:
+) -> tuple[WalkPrices, NDArray[np.int32]]:
     """Return the terms, and the reachable cells, framed, in row order."""
     flat, priced, is_wanted = bound.side_prices()
     cells = framed.framed(flat)
@@ -248,7 +254,7 @@ def _terms(
     begin_price = -(step // 2 + int(sides[flat == problem.flat_start].min()))
     end_price = -(step // 2 + int(sides[ends].min()))
     is_free = problem.end is None
-    return Terms(step, turn, prices, begin_price, end_price, is_free, row, col, room), cells
+    return WalkPrices(step, turn, prices, begin_price, end_price, is_free, row, col, room), cells
 
 
 def _program(size: int, beam: int, cells: int) -> Program:
@@ -256,12 +262,12 @@ def _program(size: int, beam: int, cells: int) -> Program:
     states, slots = 4 * beam, 1 << (16 * beam - 1).bit_length()
     mates = np.full((2, states, MOST_IDS), NO_END, np.int16)
     scratch, base = (np.full(MOST_IDS, NO_END, np.int16) for _ in range(2))
-    choice = Choice(
+    choice = Choices(
         listed=np.zeros(KINDS, np.int32),
         keys=np.zeros((KINDS, MOST_CHOICES), np.int64),
         named=np.zeros(KINDS, np.int32),
         ends=np.zeros((KINDS, MOST_CHOICES, 2 * MOST_PAIRS), np.int16),
-        how=np.zeros((KINDS, MOST_CHOICES, MOST_PAIRS), np.uint8),
+        new_ends=np.zeros((KINDS, MOST_CHOICES, MOST_PAIRS), np.uint8),
     )
     parts = Parts(
         label=np.zeros(size, np.int32),
@@ -290,7 +296,7 @@ def _program(size: int, beam: int, cells: int) -> Program:
         base_words=base.view(np.int64),
         clock=np.zeros(2, np.int64),
     )
-    of_window = Cells(
+    of_window = WindowCells(
         listed=np.zeros(cells, np.int32),
         inside=np.zeros(size, np.uint8),
         ident=np.full((size, SLOTS), NO_END, np.int16),
@@ -306,7 +312,7 @@ def _program(size: int, beam: int, cells: int) -> Program:
         reduced=np.zeros((cells, 6, 6), np.int64),
         left=np.zeros(cells + 1, np.int64),
         taken=np.zeros(12, np.int16),
-        kinds=np.zeros(12, np.int64),
+        sides=np.zeros(12, np.int64),
         at=np.zeros(11, np.int64),
         parts=parts,
     )

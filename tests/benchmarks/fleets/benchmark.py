@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say, positive
+from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report, Say, positive
 from fasaco_edge.fleet.mission.kind import layer_of
 from fasaco_edge.fleet.mission.travel import apart
 from fasaco_edge.grid.lattice import CoverageLattice, Footprint
@@ -192,8 +192,8 @@ def _report(args: argparse.Namespace, runs: Sequence[FleetFigures]) -> Report:
             (str(robots), str(len(some)), *figures, f"{stood_s:.0f}", str(touches), *slower)
         )
         if robots in TIME_GOALS:
-            goals.append(Goal(f"{robots} robots: time", round(time, 4), TIME_GOALS[robots]))
-        goals.append(Goal(f"{robots} robots: swept again", round(again, 4), AGAIN_GOAL))
+            goals.append(MeasuredGoal(f"{robots} robots: time", round(time, 4), TIME_GOALS[robots]))
+        goals.append(MeasuredGoal(f"{robots} robots: swept again", round(again, 4), AGAIN_GOAL))
     return Report(
         title=f"fleets in unknown buildings against one robot, {args.line}",
         header=HEADER,

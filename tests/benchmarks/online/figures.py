@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fasaco_edge.bench.benchmark import Goal
-from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.bench.benchmark import MeasuredGoal
+from fasaco_edge.bench.spread import percentile
 from tests.benchmarks.online.judge import MILESTONES, MissionRun
 from tests.benchmarks.online.mission import Elapsed
 
@@ -167,10 +167,10 @@ INGEST_MS = 10.0
 KEPT, WAITING = 0.88, 0.001
 
 
-def goals(summary: Summary, *, with_turns: bool) -> Iterator[Goal]:
+def goals(summary: Summary, *, with_turns: bool) -> Iterator[MeasuredGoal]:
     """Yield the goals that missions in buildings have something to say on."""
     covered = summary.covered_all
-    yield Goal(
+    yield MeasuredGoal(
         "all reachable cells covered (1 = always)",
         None if covered is None else float(covered),
         1.0,
@@ -193,9 +193,9 @@ def goals(summary: Summary, *, with_turns: bool) -> Iterator[Goal]:
         ("next 5 m kept at new paths, share", summary.kept),
         ("maps that leave the next 5 m as they were, share", summary.unchanged),
     ):
-        yield Goal(what, None if share is None else round(share, 4), KEPT, at_least=True)
+        yield MeasuredGoal(what, None if share is None else round(share, 4), KEPT, at_least=True)
     yield _goal("robot waiting, share of time", summary.waiting, WAITING)
 
 
-def _goal(what: str, measured: float | None, limit: float, unit: str = "") -> Goal:
-    return Goal(what, None if measured is None else round(measured, 4), limit, unit)
+def _goal(what: str, measured: float | None, limit: float, unit: str = "") -> MeasuredGoal:
+    return MeasuredGoal(what, None if measured is None else round(measured, 4), limit, unit)

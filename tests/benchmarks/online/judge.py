@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fasaco_edge.drawing.spread import percentile
+from fasaco_edge.bench.spread import percentile
 from fasaco_edge.grid.lattice import Cell
 from tests.benchmarks.judge import check_walk
 from tests.benchmarks.online.mission import Elapsed, OnlineMission

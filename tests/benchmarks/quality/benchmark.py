@@ -19,7 +19,7 @@ from fasaco_edge.bench.benchmark import (
     positive,
     seconds_above_zero,
 )
-from fasaco_edge.drawing.spread import Spread
+from fasaco_edge.bench.spread import Spread
 from fasaco_edge.host.processes import peak_mb
 from tests.benchmarks.harness import SECONDS
 from tests.benchmarks.quality.figures import VARIANTS, GridFigures, by_grid, goals

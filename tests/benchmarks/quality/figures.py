@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
-from fasaco_edge.bench.benchmark import Goal
-from fasaco_edge.drawing.spread import Spread
+from fasaco_edge.bench.benchmark import MeasuredGoal
+from fasaco_edge.bench.spread import Spread
 from tests.benchmarks.quality.runs import Known, QualityRun, Setting
 from tests.benchmarks.table1.paper import paper_map
 
@@ -178,7 +178,7 @@ MOST_TIME = {0.1: 0.87, 1.0: 0.84}
 NEVER_WORSE_BUDGET_S = 0.1
 
 
-def goals(figures: Sequence[GridFigures], turn_s: float) -> Iterator[Goal]:
+def goals(figures: Sequence[GridFigures], turn_s: float) -> Iterator[MeasuredGoal]:
     """Yield the goals that ``figures`` have something to say on."""
     for budget_s in sorted({grid.budget_s for grid in figures}):
         at = [grid for grid in figures if grid.budget_s == budget_s]
@@ -189,7 +189,7 @@ def goals(figures: Sequence[GridFigures], turn_s: float) -> Iterator[Goal]:
             yield from _mission_goals(turns, budget_s)
 
 
-def _open_goals(at: Sequence[GridFigures], budget_s: float) -> Iterator[Goal]:
+def _open_goals(at: Sequence[GridFigures], budget_s: float) -> Iterator[MeasuredGoal]:
     known = [grid for grid in at if grid.known.best_steps is not None]
     what = f"open walk, {budget_s:g} s: steps to the best known"
     if known and budget_s in MOST_STEPS:
@@ -209,29 +209,29 @@ def _above_optimum(grid: GridFigures) -> float:
     return grid.steps.median - grid.known.optimum
 
 
-def _closed_goals(at: Sequence[GridFigures], budget_s: float) -> Iterator[Goal]:
+def _closed_goals(at: Sequence[GridFigures], budget_s: float) -> Iterator[MeasuredGoal]:
     for grid in at if budget_s == CLOSED_BUDGET_S else ():
         if paper_map(grid.grid, grid.runs[0].cells):
             what = f"closed walk, {budget_s:g} s: n_r_paper, {grid.grid}"
-            yield Goal(what, grid.revisits.median, CLOSED_REVISITS[grid.grid])
+            yield MeasuredGoal(what, grid.revisits.median, CLOSED_REVISITS[grid.grid])
 
 
-def _mission_goals(at: Sequence[GridFigures], budget_s: float) -> Iterator[Goal]:
+def _mission_goals(at: Sequence[GridFigures], budget_s: float) -> Iterator[MeasuredGoal]:
     ratios = {grid.grid: grid.mission_ratio(MISSION_TURN_S).median for grid in at}
     what = f"mission time, {budget_s:g} s: to the best planner's"
     if at and budget_s == NEVER_WORSE_BUDGET_S:
         yield _worst(what, at, lambda grid: ratios[grid.grid], 1.0)
     if at and budget_s in MOST_TIME:
         median = statistics.median(ratios.values())
-        yield Goal(f"{what}, median of {_count(at)}", median, MOST_TIME[budget_s])
+        yield MeasuredGoal(f"{what}, median of {_count(at)}", median, MOST_TIME[budget_s])
 
 
 def _worst(
     what: str, at: Sequence[GridFigures], figure: Callable[[GridFigures], float], limit: float
-) -> Goal:
+) -> MeasuredGoal:
     """Return a goal that every grid has to reach, measured on that which does worst."""
     worst = max(at, key=figure)
-    return Goal(f"{what}, worst of {_count(at)} ({worst.grid})", figure(worst), limit)
+    return MeasuredGoal(f"{what}, worst of {_count(at)} ({worst.grid})", figure(worst), limit)
 
 
 def _count(at: Sequence[GridFigures]) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
+from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report, Say
 from fasaco_edge.drawing.plot import Plot, PlotView
 from fasaco_edge.drawing.tints import number_rooms, paint_rooms
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
@@ -127,10 +127,12 @@ def _report(args: argparse.Namespace, samples: Sequence[Found]) -> Report:
         ),
         figures={"rooms": figures},
         goals=(
-            Goal("worst recall", worst["recall"], GOAL_RECALL, at_least=True),
-            Goal("worst precision", worst["precision"], GOAL_PRECISION, at_least=True),
-            Goal("worst Matthews coefficient", worst["matthews"], GOAL_MATTHEWS, at_least=True),
-            Goal("time for 10^6 pixels", slowest, GOAL_MS, "ms"),
+            MeasuredGoal("worst recall", worst["recall"], GOAL_RECALL, at_least=True),
+            MeasuredGoal("worst precision", worst["precision"], GOAL_PRECISION, at_least=True),
+            MeasuredGoal(
+                "worst Matthews coefficient", worst["matthews"], GOAL_MATTHEWS, at_least=True
+            ),
+            MeasuredGoal("time for 10^6 pixels", slowest, GOAL_MS, "ms"),
         ),
         remarks=("true, found: rooms of at least 1.5 m2 on each floor; time on a processor",),
     )  # fmt: skip

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.random import PCG64
 from numpy.typing import NDArray
 
-from fasaco_edge.bench.benchmark import Benchmark, Goal, Report, Say
+from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report, Say
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, OccupancyGrid
 from fasaco_edge.grid.rooms import ROOM_M2, find_rooms
@@ -175,8 +175,8 @@ def _report(args: argparse.Namespace, samples: Sequence[Kept]) -> Report:
         ),
         figures={"rooms": figures},
         goals=(
-            Goal("numbers given for each true room", round(max(shares), 3), GOAL_IDS),
-            Goal("names that moved to another room", sum(one.moved for one in samples), 0),
+            MeasuredGoal("numbers given for each true room", round(max(shares), 3), GOAL_IDS),
+            MeasuredGoal("names that moved to another room", sum(one.moved for one in samples), 0),
         ),
         remarks=(
             "rooms: of at least 1.5 m2; names lost: true rooms without a room of their name at the "

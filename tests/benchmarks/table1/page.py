@@ -12,7 +12,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from fasaco_edge.bench.benchmark import Goal, Report, ResultTable, machine
+from fasaco_edge.bench.benchmark import MeasuredGoal, Report, ResultTable, machine
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.path import walk_figures
 from fasaco_edge.planners.planner import ColonySnapshot
@@ -207,7 +207,7 @@ def _verdicts(report: Report) -> Iterator[str]:
     yield ""
 
 
-def _bars(goals: Sequence[Goal]) -> Iterator[str]:
+def _bars(goals: Sequence[MeasuredGoal]) -> Iterator[str]:
     if not goals:
         return
     verdicts = {True: "met", False: "missed", None: "not measured"}

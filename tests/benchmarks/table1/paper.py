@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fasaco_edge.drawing.spread import Spread, document
+from fasaco_edge.bench.spread import Spread, document
 
 VARIANTS = (
     *(f"velocity-{velocity}" for velocity in range(1, 9)),

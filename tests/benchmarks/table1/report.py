@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from fasaco_edge.bench.benchmark import Goal, Report, ResultTable
-from fasaco_edge.drawing.spread import Spread, document
+from fasaco_edge.bench.benchmark import MeasuredGoal, Report, ResultTable
+from fasaco_edge.bench.spread import Spread, document
 from tests.benchmarks.table1.paper import (
     CLAIMS,
     Finding,
@@ -244,7 +244,7 @@ def _claim_row(finding: Finding) -> tuple[str, ...]:
     return finding.grid, measured, paper, finding.words
 
 
-def _goals(grid: GridRuns, ants: int) -> Iterator[Goal]:
+def _goals(grid: GridRuns, ants: int) -> Iterator[MeasuredGoal]:
     known = grid.known
     if known is None:
         return
@@ -255,7 +255,7 @@ def _goals(grid: GridRuns, ants: int) -> Iterator[Goal]:
         yield _goal(grid, "revisits", variant, revisits)
 
 
-def _goal(grid: GridRuns, figure: str, variant: str, most: int) -> Goal:
+def _goal(grid: GridRuns, figure: str, variant: str, most: int) -> MeasuredGoal:
     spread = grid.spread(figure, variant)
     what = f"{grid.name}: {figure} of {OTHERS[variant]}"
-    return Goal(what, spread.median if spread else None, float(most))
+    return MeasuredGoal(what, spread.median if spread else None, float(most))

@@ -12,7 +12,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.own.loading import UserCode
-from fasaco_edge.planners.own.planner import OwnPlanner
+from fasaco_edge.planners.own.problem import OwnPlanner
 from fasaco_edge.planners.paper.colony import ColonyConfig
 from fasaco_edge.planners.path import CoveragePath, WalkFigures, walk_figures
 from fasaco_edge.planners.planner import Observer, ignore, never

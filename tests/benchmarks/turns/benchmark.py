@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fasaco_edge.bench.benchmark import (
     Benchmark,
-    Goal,
+    MeasuredGoal,
     Report,
     ResultTable,
     Say,
@@ -147,22 +147,24 @@ def _walk_rows(walks: Sequence[TurnsRun]) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _goals(tours: Sequence[TurnsRun], walks: Sequence[TurnsRun]) -> Iterator[Goal]:
+def _goals(tours: Sequence[TurnsRun], walks: Sequence[TurnsRun]) -> Iterator[MeasuredGoal]:
     for (budget_s,), runs in _by(tours, lambda run: (run.budget_s,)):
         if budget_s in TOUR_GOALS:
             mean = statistics.mean(_ratios(runs))
-            yield Goal(f"tours to best known, {budget_s:g} s", mean, TOUR_GOALS[budget_s])
+            yield MeasuredGoal(f"tours to best known, {budget_s:g} s", mean, TOUR_GOALS[budget_s])
         if budget_s == WORST_AFTER_S:
-            yield Goal(f"worst tour, {budget_s:g} s", max(_ratios(runs)), WORST_TOUR)
+            yield MeasuredGoal(f"worst tour, {budget_s:g} s", max(_ratios(runs)), WORST_TOUR)
     if tours:
         bounds = statistics.mean(_bounds(tours))
-        yield Goal("bound to best known tour", bounds, BOUND_GOAL, at_least=True)
+        yield MeasuredGoal("bound to best known tour", bounds, BOUND_GOAL, at_least=True)
     for key, runs in _by(walks, lambda run: (run.price, run.budget_s)):
         if key in GAP_GOALS:
             gap = statistics.median(run.gap for run in runs)
-            yield Goal(f"certified gap at {key[0]:g} a turn, {key[1]:g} s", gap, GAP_GOALS[key])
+            yield MeasuredGoal(
+                f"certified gap at {key[0]:g} a turn, {key[1]:g} s", gap, GAP_GOALS[key]
+            )
     if walks:
-        yield Goal("worst walk to a simple one", max(_to_simple(walks)), 1.0)
+        yield MeasuredGoal("worst walk to a simple one", max(_to_simple(walks)), 1.0)
 
 
 def _ratios(runs: Sequence[TurnsRun]) -> list[float]:

@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import GridGeometry, Point, Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.areas import find_areas
-from fasaco_edge.kernels.lattice.raycast import Scanner, count_rays, ranges_of
+from fasaco_edge.kernels.lattice.raycast import Scanner
 from fasaco_edge.simulation.mapper import Mapper
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Emission, World
+from tests.campaigns.lab.rays import count_rays, ranges_of
 from tests.support.poses import composed, inverse
 
 # Rays of a scan, as of an LDS-01.

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from fasaco_edge.follow.estimate import STAND, VelocityCommand
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
-from fasaco_edge.kernels.lattice.raycast import Scanner, ranges_of
+from fasaco_edge.kernels.lattice.raycast import Scanner
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
 from tests.campaigns.lab.building import Building
 from tests.campaigns.lab.noisy_mapper import MapperNoise, NoisyMapper, NoisyWorld
+from tests.campaigns.lab.rays import ranges_of
 from tests.campaigns.lab.settings import BEAMS, MOST_RANGE_M, TICK_S, LabSettings, stamp_ns
 
 FRAME = "map"

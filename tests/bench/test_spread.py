@@ -2,8 +2,8 @@
 
 import pytest
 
-from fasaco_edge.bench.benchmark import Goal
-from fasaco_edge.drawing.spread import Spread, document, median, percentile, text
+from fasaco_edge.bench.benchmark import MeasuredGoal
+from fasaco_edge.bench.spread import Spread, document, median, percentile, text
 
 
 def test_percentile_of_two_hundred_leaves_two_above():
@@ -26,6 +26,6 @@ def test_a_spread_is_median_and_range_or_none():
      (4.0, True, False), (5.0, True, True), (6.0, True, True)],
 )  # fmt: skip
 def test_goal_is_met_up_to_and_at_its_limit(measured, at_least, met):
-    goal = Goal("speed", measured, 5.0, "s", at_least=at_least)
+    goal = MeasuredGoal("speed", measured, 5.0, "s", at_least=at_least)
     assert goal.met is met
     assert goal.document()["met"] is met
