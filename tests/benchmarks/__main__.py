@@ -19,8 +19,7 @@ from tests.benchmarks.floor import FLOOR
 from tests.benchmarks.full import FULL
 from tests.benchmarks.online.benchmark import ONLINE
 from tests.benchmarks.peers import PEERS
-from tests.benchmarks.quality.benchmark import QUALITY
-from tests.benchmarks.replan import REPLAN
+from tests.benchmarks.quality import QUALITY
 from tests.benchmarks.rooms.benchmark import ROOMS
 from tests.benchmarks.rooms.identity import ROOM_IDS
 from tests.benchmarks.rooms.one_by_one import BY_ROOM
@@ -28,7 +27,7 @@ from tests.benchmarks.table1.benchmark import TABLE1
 from tests.benchmarks.turns.benchmark import TURNS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET_ONLINE, ONLINE, ROOMS, ROOM_IDS,
+    TABLE1, QUALITY, TURNS, FLOOR, PEERS, FULL, FLEET_ONLINE, ONLINE, ROOMS, ROOM_IDS,
     BY_ROOM,
 )  # fmt: skip
 
