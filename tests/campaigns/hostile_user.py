@@ -6,9 +6,9 @@ Takes minutes.
 
 Home, working folder, TMPDIR, PYTHONPATH and more lead into a trap (``tests.campaigns.trap``); the
 mode mask is 0. Each of fasaco-edge's commands runs there as it is installed, with a daemon and a
-recorder that keep their files in the trap; then install.sh, its rollback and uninstall.sh on a
-robot with a real systemd (without --short; a dry run beside this with it). Nothing of the trap may
-be loaded, or opened at all; no file of root's is written through a link, or open to everybody. Exit
+recorder that keep their files in the trap; then dry runs of install.sh and uninstall.sh. Without
+--short also a demo, and a plan for which all kernels are compiled. Nothing of the trap may be
+loaded, or opened at all; no file of root's is written through a link, or open to everybody. Exit
 code 1 on any violation.
 """
 
@@ -33,9 +33,8 @@ from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.kernels.manifest import chosen_folder
 from fasaco_edge.planners.compiling import compile_missing
 from fasaco_edge.planners.stages import STAGES
-from tests.campaigns.trap import NOBODY, Trap
-from tests.deploy import installed, lab, releases
-from tests.deploy.installing import Robot, bare_robot
+from tests.campaigns.trap import Trap
+from tests.deploy import installed, releases
 from tests.support.processes import free_endpoint
 from tests.support.waiting import until
 
@@ -255,100 +254,6 @@ def _try_make(campaign: Campaign) -> None:
         campaign.violations.append(f"make demo: {done.stdout}{done.stderr}")
 
 
-def try_scripts(campaign: Campaign) -> None:
-    """Install, upgrade, roll back and uninstall on a robot whose root is lured."""
-    folders = {
-        version: releases.write_release(campaign.folder / f"release-{version}", version)
-        for version in ("1.0", "1.1")
-    }
-    place, shown = campaign.folder / "lab", "/srv/trap"
-    place.mkdir()
-    with bare_robot(place, folders) as robot:
-        installed.warm(robot)
-        # In the lab's own folder: what is bound into it is read-only.
-        trap = Trap(Path(f"{robot.root}{shown}"), kernel_folder())
-        inside = {
-            name: value.replace(str(robot.root), "") for name, value in trap.environment.items()
-        }
-        _name_marks(trap, robot)
-        luring = replace_trap(campaign, trap)
-        current = "/opt/fasaco-edge/current"
-        for script in (
-            ("/srv/1.0/install.sh",),
-            ("fasaco-edge", "ask", "version"),
-            ("fasaco-edge", "doctor", "--config", "/etc/fasaco-edge/config.yaml"),
-            ("/srv/1.1/install.sh",),
-            (f"{current}/deploy/install.sh", "--rollback"),
-            ("/srv/1.0/install.sh", "--dry-run"),
-            ("/srv/1.0/uninstall.sh", "--dry-run"),
-        ):
-            _in_trap(luring, robot, inside, script)
-        luring.violations += [
-            f"installed, open to everybody: {path}" for path in _open_inside(robot)
-        ]
-        _in_trap(luring, robot, inside, (f"{current}/deploy/uninstall.sh", "--purge"))
-        left = robot.run("ls", "/opt").stdout
-        if "fasaco" in left:
-            luring.violations.append(f"left behind: {left}")
-    campaign.violations += luring.violations
-    campaign.counted += luring.counted
-
-
-def replace_trap(campaign: Campaign, trap: Trap) -> Campaign:
-    """Return a campaign with another trap, and nothing counted."""
-    return Campaign(campaign.folder, trap, campaign.slow, campaign.say)
-
-
-def _name_marks(trap: Trap, robot: Robot) -> None:
-    """Let what lies in the trap write to the mark as it is called inside."""
-    outside, inside = str(robot.root), ""
-    for folder, folders, files in os.walk(trap.place):
-        for path in (Path(folder, name) for name in (*folders, *files)):
-            if path.is_symlink():
-                target = os.readlink(path).replace(outside, inside)
-                path.unlink()
-                path.symlink_to(target)
-                os.chown(path, NOBODY, NOBODY, follow_symlinks=False)
-            elif path.is_file():
-                content = path.read_bytes()
-                # A pickle knows how long its strings are.
-                if not content.startswith(b"\x80"):
-                    path.write_bytes(content.replace(outside.encode(), b""))
-
-
-def _in_trap(
-    campaign: Campaign, robot: Robot, environment: dict[str, str], words: tuple[str, ...]
-) -> None:
-    told = [f"{name}={value}" for name, value in environment.items() if name != "PATH"]
-    alone = ("env", "-i", "--chdir=/srv/trap/work", f"PATH={lab.ENVIRONMENT['PATH']}", *told)
-    with campaign.judged(" ".join(words)):
-        done = robot.run(
-            *alone,
-            "SETTLE_S=1",
-            "sh",
-            "-c",
-            'umask 0; exec "$@"',
-            "sh",
-            *words,
-            check=False,
-            timeout_s=200.0,
-        )
-    if done.returncode and "doctor" not in words:
-        campaign.violations.append(f"{words}: {done.returncode} {done.stdout}{done.stderr}")
-
-
-def _open_inside(robot: Robot) -> list[str]:
-    places = (
-        "/opt",
-        "/etc/fasaco-edge",
-        "/etc/systemd/system",
-        "/usr/local/bin",
-        "/var/lib/private",
-    )
-    words = ("find", *places, "-xdev", "-perm", "-o+w", "!", "-type", "l", "-uid", "0")
-    return robot.run(*words, check=False).stdout.split()
-
-
 def _bytes_in(folder: Path) -> int:
     files = [path for path in folder.glob("*.rrd") if not path.is_symlink()]
     return sum(path.stat().st_size for path in files)
@@ -363,7 +268,7 @@ def kernel_folder() -> Path:
 
 
 def run_campaign(folder: Path, say: Callable[[str], None], *, short: bool) -> Campaign:
-    """Lure every command; ``short``: without the demo, a cold compiler and an installation."""
+    """Lure every command; ``short``: without the demo and a cold compiler."""
     place = folder / "trap"
     own = folder / "own"
     own.mkdir(mode=0o700)
@@ -371,12 +276,6 @@ def run_campaign(folder: Path, say: Callable[[str], None], *, short: bool) -> Ca
     try_alone(campaign)
     try_together(campaign)
     try_scripts_dry(campaign)
-    if not short:
-        reason = lab.why_not() or installed.why_not()
-        if reason:
-            say(f"no installation was tried: {reason}")
-        else:
-            try_scripts(campaign)
     return campaign
 
 

@@ -10,7 +10,6 @@ from fasaco_edge.errors import MalformedMessage
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.messages.poses import encode_pose_stamped
-from tests.campaigns import coverage_fuzz_wire as coverage_fuzz
 from tests.campaigns.fuzz_wire import run_campaign
 from tests.wire.decoders import DECODERS
 from tests.wire.encoders import ENCODERS
@@ -77,11 +76,3 @@ def test_another_value_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     always = encode_pose_stamped(StampedPose(Pose2D(0.0, 0.0)))
     monkeypatch.setitem(ENCODERS, POSE, lambda message: always)
     assert failures_of(POSE).keys() == {"AssertionError in check_same"}
-
-
-def test_coverage_guided_fuzzing_runs() -> None:
-    pytest.importorskip("atheris", reason="atheris is not installed")
-    outcome = coverage_fuzz.fuzz(POSE, 2, 0)
-    assert not outcome.failure
-    assert outcome.executed > 1000
-    assert min(outcome.seeds, outcome.corpus, outcome.edges) > 0

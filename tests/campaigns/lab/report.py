@@ -80,7 +80,7 @@ def in_words(found: Judged) -> str:
                     f"{of.stops_per_m:.2f} stops a metre"),
         ("paths", f"{of.paths_per_min:.1f} a minute, {of.changes_per_min:.1f} change the next 2 m; "
                   f"{of.plans} plans"),
-        ("standing", f"at most {of.longest_stand_s:.0f} s with work left; {of.nudges} helps"),
+        ("standing", f"at most {of.longest_stand_s:.0f} s with work left"),
         ("missed", ", ".join(f"{m2} m2 at {x}, {y}" for m2, x, y in found.missed) or "nothing"),
         ("took", f"{found.wall_s:.0f} s by the clock; digest {of.digest}"),
     ]  # fmt: skip
