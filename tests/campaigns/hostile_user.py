@@ -1,6 +1,6 @@
 """Every command as root, in folders that another user has prepared as traps.
 
-    PYTHONPATH=deploy python -m tests.campaigns.hostile_user [--short] [--json FILE]
+    PYTHONPATH=deploy python -m tests.campaigns.hostile_user [--short]
 
 Takes minutes.
 
@@ -15,7 +15,6 @@ code 1 on any violation.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import shutil
 import signal
@@ -285,7 +284,6 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--short", action="store_true", help="what the tests run")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
     args = parser.parse_args()
     if reason := why_not():
         print(reason)
@@ -300,9 +298,6 @@ def main() -> int:
     for what, count in campaign.counted.items():
         print(f"{count:7}  {what}")
     print(f"{len(campaign.violations):7}  violations", *campaign.violations, sep="\n         ")
-    if args.json:
-        told = dict(campaign.counted) | {"violations": campaign.violations}
-        args.json.write_text(json.dumps(told, indent=2))
     return 1 if campaign.violations else 0
 
 

@@ -34,9 +34,6 @@ EXAMPLE = f"{PREFIX}/current/deploy/fasaco-edge.yaml"
 MAY_END_WITH_1 = "fasaco-edge doctor"
 PROTOCOL = Path(__file__).parents[2] / "protocol" / "security.md"
 CACHE = "/var/cache/private/fasaco-edge"
-# What pip would find wrong with what is installed, and the largest of it.
-PACKAGES = f"{PREFIX}/current/lib/python3.*/site-packages"
-LARGEST = f"du --max-depth=1 -m {PACKAGES} | sort -rn | head -14; du -sm /var/cache/private/fasaco*"
 
 
 def main() -> int:
@@ -136,19 +133,6 @@ def purge(robot: Robot) -> None:
     robot.run("sh", "-c", f"rm -r {HOME}/* {HOME}/.[!.]* 2>/dev/null || true")
 
 
-def sizes(robot: Robot) -> None:
-    """Print what is installed, and let pip look at it."""
-    print(robot.run("sh", "-c", LARGEST).stdout)
-    pip = f"PYTHONPATH=$(echo {HOME}/*-py3*/wheels/pip-*.whl) {PREFIX}/current/bin/python -m pip"
-    print(robot.run("sh", "-c", f"{pip} check").stdout)
-    python = f"{PREFIX}/current/bin/python"
-    print(
-        robot.run(
-            "sh", "-c", f"HOME=/tmp {python} -c 'import rerun; print(rerun.__version__)'"
-        ).stdout
-    )
-
-
 def harm(robot: Robot) -> None:
     """Append a byte to one kernel; the service reports it and compiles it again."""
     change = f"file=$(find {CACHE} -name '*.nbc' | head -n 1) && printf x >>$file && echo $file"
@@ -166,7 +150,7 @@ def nothing(robot: Robot) -> None:
     """Prepare nothing."""
 
 
-PREPARE = {"Configure": sizes, "Secure": certificates, "Upgrade": upgrade, "Uninstall": harm}
+PREPARE = {"Secure": certificates, "Upgrade": upgrade, "Uninstall": harm}
 
 
 def covered(robot: Robot) -> float:

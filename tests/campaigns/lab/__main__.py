@@ -117,7 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         option = "--" + re.sub("_(m|s|m_s)$", "", name).replace("_", "-")
         told = f"{what} (default: {default:g})"
         add(option, dest=name, type=type(default), default=default, metavar="N", help=told)
-    add("--out", type=Path, metavar="DIR", help="write picture, trace, paths and figures there")
+    add("--out", type=Path, metavar="DIR", help="write picture, map and figures there")
     add("--json", action="store_true", help="print figures as JSON")
     return parser
 
