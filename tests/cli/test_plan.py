@@ -523,9 +523,3 @@ def test_the_summary_fits_on_one_screen(words, names, tmp_path):
     assert "None" not in ended.out
     assert re.search(r"^swept +9\d\.\d % of 49.4 m2, ", ended.out, re.MULTILINE)
     assert re.search(r"^line +.*, \d+ min \d\d s", ended.out, re.MULTILINE)
-
-
-def test_without_a_picture_its_option_is_named(grid_file):
-    ended = fasaco_edge("plan", grid_file, "--ants", 8)
-    assert ended.out.endswith("more: --long; a picture: --png FILE\n")
-    assert re.search(r"^line +driven: .*, 1 min 20 s without turns", ended.out, re.MULTILINE)

@@ -143,14 +143,6 @@ def test_without_one_the_note_is_as_older_daemons_read_it():
     assert drive.mission.snapshot().note == before
 
 
-def test_before_there_is_a_map():
-    drive = Drive((0, 0))
-    add(drive, VASE)
-    drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
-    drive.finish()
-    assert drive.visited == ALL - inside(1, 3, 4, 5)
-
-
 def test_paused_and_sent_home_it_stays_so():
     drive = started(*ROOM)
     for _ in range(12):

@@ -84,14 +84,6 @@ def visited(drive, columns):
 WEST_COLUMNS, EAST_COLUMNS = range(9), range(12, 21)
 
 
-def test_an_idle_mission_knows_its_rooms():
-    drive = settled(*BOTH)
-    west, east = room_at(drive, *IN_WEST), room_at(drive, *IN_EAST)
-    assert west.neighbours == (east.id,)
-    assert 5.5 < west.area_m2 < 8.0
-    assert drive.mission.rooms.frame == "map"
-
-
 def test_a_room_is_ordered_by_its_name_and_by_its_number():
     drive = settled(*BOTH)
     name(drive, room_at(drive, *IN_EAST).id, "kitchen")
@@ -319,19 +311,6 @@ def rotated(rows, deg):
     for _ in range(LOOKS):
         drive.tell(here, after=1.01 * PERIOD_S)
     return drive
-
-
-def test_a_room_order_lies_on_a_rotated_lattice_as_on_any():
-    """The walls are at 20 degrees to the map frame, and so are the cells."""
-    drive = rotated(BOTH, 20.0)
-    assert len(drive.mission.rooms.rooms) == 2
-    east = max(drive.mission.rooms.rooms, key=lambda room: room.outline[0][0])
-    start(drive, east.title)
-    zone = drive.mission.order_state.order.zones[0]
-    assert drive.mission.order_state.order.as_given.zones[0].polygon == east.outline
-    xs = [x for x, _ in zone.polygon]
-    assert min(xs) == pytest.approx(11 * 0.25, abs=0.4)
-    assert max(xs) == pytest.approx(21 * 0.25, abs=0.4)
 
 
 def test_documents_are_read_as_they_were_written():

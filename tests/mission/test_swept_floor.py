@@ -254,15 +254,6 @@ def test_exact_poses_are_kept_at_once_and_others_seen_at_once():
     assert np.array_equal(scattered.swept_in(everywhere), seen)
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.5])
-def test_preliminary_floor_is_shown_on_another_raster(yaw):
-    floor = drive(*wobbling(0.03, 60))
-    geometry = GridGeometry(60, 100, 0.025, Pose2D(-0.5, -0.5, yaw))
-    seen = floor.swept_on(geometry)
-    floor.break_track()
-    assert np.array_equal(seen, floor.swept_on(geometry))
-
-
 def test_a_repeated_pose_hides_no_noise():
     """As each map tells the mission to look at the newest pose again."""
     once, twice = SweptFloor(TOOL), SweptFloor(TOOL)
@@ -316,18 +307,6 @@ def test_a_robot_that_stood_still_forgets_no_floor():
     floor = drive(*[(0.1 * n, 0.0) for n in range(20)])
     before = floor.snapshot()
     assert not certain_floor(before, Motion(Pose2D(0, 0), Pose2D(0, 0)))(before.tiles)
-
-
-def test_a_mission_sweeps_the_floor_it_drives_over():
-    drive = Drive((0, 0), MapReceived(building("....", "....")), pose_at(0, 0))
-    drive.plan()
-    drive.finish()
-    floor, snapshot = drive.mission.covered.floor, drive.mission.snapshot()
-    # All but the corners, at a wall, that a round tool leaves.
-    assert floor.swept_m2 == pytest.approx(8 * CELL**2, rel=0.1)
-    assert snapshot.floor.pixels == floor.pixels
-    drive.command("reset")
-    assert floor.swept_m2 > drive.mission.covered.floor.swept_m2 > 0, "where it stands"
 
 
 def test_a_second_pass_forgets_the_floor_of_its_zone():

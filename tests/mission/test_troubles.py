@@ -150,20 +150,6 @@ def test_a_pose_that_jumps_while_a_plan_is_made_gets_another():
     drive.finish()
 
 
-def test_a_stale_map_is_reported_and_the_mission_continues():
-    drive = driving(*ROOM)
-    row, col = drive.cell
-    for tick in range(70):
-        drive.tell(pose_at(row, col + 0.45 * (tick % 2)), after=1.0)
-    assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason == "no map or update for 60 s: going on with the last one"
-    drive.tell(patch(".", at=(0, 0)))
-    assert drive.mission.state is State.COVERING
-    drive.finish()
-    drive.tell(pose_at(*drive.cell), after=100.0)
-    assert drive.mission.state is State.DONE, "a mission that is done needs no map"
-
-
 def test_a_robot_that_does_not_follow_its_path_gets_it_again():
     # A base may refuse a path for good: such a robot was covering, it said, for ever.
     drive = driving(*ROOM, config=CONFIG)
@@ -234,12 +220,6 @@ def test_a_robot_that_does_not_drive_home_is_reported():
     while drive.walk:
         assert drive.go() is not None
     assert drive.mission.state is not State.DEGRADED
-
-
-def test_without_timeouts_no_trouble_is_reported():
-    drive = driving(*ROOM, config=CONFIG)
-    drive.tell(after=1000.0)
-    assert drive.mission.state is State.COVERING
 
 
 @pytest.mark.parametrize(
