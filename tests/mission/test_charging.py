@@ -125,19 +125,6 @@ def test_a_fast_discharge_is_accepted():
     assert gauge.level == pytest.approx(0.76)
 
 
-def test_silent_while_it_charges_it_stays_where_it_is():
-    drive = Battery(0.15)
-    drive.run(State.CHARGING)
-    drive.level = None
-    drive.tell(pose_at(*drive.cell), after=100.0)
-    assert drive.mission.state is State.CHARGING
-    assert drive.mission.reason == "no battery level for 45 s: waits for one"
-    drive.level = 0.95
-    for _ in range(8):
-        drive.go()
-    drive.finish()
-
-
 def test_a_full_battery_is_enough_whatever_its_gauge_says():
     drive = Battery(0.15)
     drive.run(State.CHARGING)
@@ -220,35 +207,6 @@ def test_without_an_order_it_charges_only_below_its_level():
     drive.run(State.CHARGING)
     drive.charge(to=0.95)
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, NO_ORDER)
-
-
-def test_another_order_waits_until_it_is_charged():
-    drive = Battery(0.21)
-    drive.run(State.COVERING)
-    drive.level = 0.2
-    drive.run(State.CHARGING)
-    drive.charge(to=0.5)
-    drive.command("start", {"passes": 2})
-    assert (drive.refused, drive.mission.state, drive.walk) == (None, State.CHARGING, [])
-    drive.go()
-    assert (drive.cell, drive.mission.state) == (AT_DOCK, State.CHARGING)
-    drive.charge(to=0.95)
-    drive.run(State.COVERING)
-    assert drive.mission.order_state.title.endswith("pass 1 of 2")
-    drive.finish()
-
-
-def test_started_again_while_it_charges_it_stays_in_its_dock():
-    drive = Battery(0.15)
-    drive.run(State.CHARGING)
-    note = drive.mission.snapshot().note
-    again = Battery(None, drive.cell, OrderState.from_json(note))
-    assert again.mission.state is State.CHARGING
-    assert again.mission.reason == "waits for the level of the battery"
-    again.level = 0.95
-    for _ in range(8):
-        again.go()
-    again.finish()
 
 
 @pytest.mark.parametrize(

@@ -185,18 +185,6 @@ def test_resume_without_a_change_keeps_the_path():
     drive.finish()
 
 
-def test_a_robot_that_rolls_on_after_pause_resumes_from_there():
-    drive = started(*ROOM)
-    for _ in range(5):
-        drive.go()
-    ahead = drive.walk[:]
-    drive.command("pause")
-    drive.cell = ahead[0]
-    drive.tell(pose_at(*drive.cell))
-    assert drive.command("resume").plan is None
-    assert drive.walk == ahead[1:]
-
-
 def test_resume_repairs_the_path_where_the_map_changed():
     drive = started(*ROOM)
     for _ in range(5):
@@ -335,32 +323,6 @@ def test_order_zone_pass_and_home_outlive_the_daemon(driven):
     assert len(first.driven) + len(again.driven) < 2 * 12 + 30
 
 
-def test_paused_cancelled_and_done_outlive_the_daemon():
-    drive = started(*ROOM)
-    drive.command("pause")
-    again = resumed(drive, drive.cell, *ROOM)
-    assert again.mission.state is State.PAUSED
-    assert again.command("resume").plan is not None
-    again.command("cancel")
-    assert resumed(again, drive.cell, *ROOM).mission.state is State.IDLE
-    done = idle("..")
-    done.command("start")
-    follow(done)
-    assert resumed(done, (0, 1), *ROOM).mission.state is State.DONE
-
-
-def test_an_order_for_another_building_is_dropped():
-    hall = ("##############", *("#............#",) * 10, "##############")
-    pillars = (*("#.##.##.##.#.#", "#............#", "#.##.##.##.#.#") * 4,)
-    drive = idle(*hall, cell=(1, 1))
-    drive.command("start", {"zones": [{"name": "all", "polygon": rectangle(1, 1, 11, 13)}]})
-    follow(drive)
-    drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 1, 3, 4)}]})
-    again = resumed(drive, (1, 1), *pillars)
-    assert again.mission.state is State.IDLE
-    assert "of another building than the map: the order was dropped" in again.mission.reason
-
-
 def test_a_pose_between_cells_counts_for_its_cell():
     """Standing beside home is not being there."""
     drive = idle("....", cell=(0, 0))
@@ -441,15 +403,3 @@ def test_an_unseen_zone_is_searched_for():
     assert cells(0, 7, 3, 9) <= drive.visited
     assert drive.mission.orders.unreached().areas == ()
     assert not drive.visited & {(3, 0), (4, 0), (4, 1)}, "the rest of the house was not asked for"
-
-
-def test_a_zone_without_a_way_to_it_is_given_up_once_all_is_seen():
-    mapper = Mapper(*(line.replace("#..#", "####", 1) for line in HOUSE))
-    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), order_state=OrderState.idle("none"))
-    drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 7, 2, 9)}]})
-    mapper.rows = tuple(line[:6] + "######" for line in HOUSE)
-    explore(drive, mapper)
-    assert [area.reason for area in drive.mission.orders.unreached().areas] in (
-        [],
-        ["unknown to the map"],
-    )

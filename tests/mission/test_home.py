@@ -104,28 +104,6 @@ def test_the_way_home_ends_with_the_heading_of_that_place():
     assert drive.command("home").path.end_yaw is None
 
 
-def test_an_equal_order_on_the_way_home_continues_at_once():
-    drive = covering(20)
-    drive.command("home")
-    drive.go()
-    decision = drive.command("start", discard=False)
-    assert len(decision.path.cells) == 0
-    assert decision.plan.reason == "goes on"
-    drive.finish()
-
-
-def test_cancel_on_the_way_stops_and_still_allows_going_home():
-    drive = covering(20)
-    drive.command("home")
-    decision = drive.command("cancel")
-    assert len(decision.path.cells) == 0
-    assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "cancelled")
-    drive.command("home")
-    arrive(drive)
-    assert (drive.cell, drive.mission.state) == ((0, 0), State.IDLE)
-    assert drive.mission.reason == "at home"
-
-
 def test_paused_on_the_way_home_it_stops_and_resumed_drives_home():
     drive = covering(20)
     drive.command("home")

@@ -89,17 +89,6 @@ def test_a_robot_at_a_keep_out_border_stops_and_is_led_out():
     assert (row, col) not in drive.driven[4:]
 
 
-def test_cells_of_a_removed_keep_out_are_covered():
-    drive = started(*ROOM)
-    add(drive, VASE)
-    for _ in range(10):
-        drive.plan() if drive.request else None
-        drive.go()
-    remove(drive, "vase")
-    drive.finish()
-    assert drive.visited == ALL
-
-
 def test_it_holds_under_every_order_until_it_is_removed():
     drive = Drive(
         (0, 0),

@@ -151,17 +151,6 @@ def same(one, other):
     )
 
 
-def test_a_snapshot_holds_what_the_ledger_holds():
-    ledger, _ = drive((0.5, 0.5), (0.5, 1.5), (0.5, 0.5), (-99.5, 130.5))
-    ledger.frame = "map"
-    snapshot = ledger.snapshot()
-    assert (snapshot.cell_m, snapshot.frame, snapshot.total) == (CELL, "map", 4)
-    assert snapshot.cells == 3
-    assert snapshot.under_tool == {(-100, 130)}
-    for window in (NEARBY, Window(-120, 100, -60, 140)):
-        assert np.array_equal(snapshot.visits(window), ledger.visits(window))
-
-
 def test_a_snapshot_stays_as_it_was():
     ledger, _ = drive((0.5, 0.5))
     first = ledger.snapshot()

@@ -6,8 +6,7 @@ import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import floor_report
 from fasaco_edge.mission.core.events import State
-from tests.mission.offset_base import bare_room, driven
-from tests.mission.test_swept_truth import small_flat
+from tests.mission.offset_base import bare_room, driven, small_flat
 
 # The most that a claim may be above the truth.
 CLAIM = 0.02
@@ -62,6 +61,8 @@ def test_noise_makes_no_more_be_claimed_and_takes_no_more_time():
     outcome = driven(bare_room(), noise_m=0.02)
     assert outcome.mission.state is State.DONE
     assert outcome.claimed <= outcome.swept + CLAIM
+    assert outcome.false < 0.005
+    assert outcome.known > 0.9
     assert outcome.seconds < 160.0
 
 

@@ -80,22 +80,6 @@ def test_no_number_appears_before_a_region_has_lasted():
     assert book.sheet.is_settling
 
 
-GROWN = [
-    (["aa.", "aa."], (0.5, 0.5)),
-    (["aaa", "aaa"], (2.5, 0.5)),
-    (["aaa.", "aaa.", "aaaa"], (3.5, 0.5)),
-]
-
-
-def test_a_room_grows_with_the_map_and_keeps_its_number():
-    book = RoomBook()
-    for rows, _ in GROWN:
-        shown(book, regions(*rows), HOLD_NEW)
-    assert [room.id for room in book.rooms] == [1]
-    assert at(book, 3.5, 0.5) == 1
-    assert book.room(1).area_m2 == pytest.approx(10.0)
-
-
 @pytest.mark.parametrize("name", ["", "kitchen"])
 @pytest.mark.parametrize(
     "flicker",

@@ -339,20 +339,6 @@ def test_a_pose_far_off_the_map_takes_bounded_memory():
     drive.finish()
 
 
-def test_a_robot_at_the_end_with_cells_left_gets_another_path():
-    drive = started(*CORRIDOR)
-    drive.walk = [(0, col) for col in (1, 2, 3)]
-    for _ in range(3):
-        drive.go()
-    # It was carried over the middle of the corridor: that is no driving.
-    drive.cell = (0, 9)
-    for cell in ((0, 7), (0, 9)):
-        drive.tell(pose_at(*cell))
-    drive.tell(pose_at(0, 9), after=PATIENCE_S)
-    drive.finish()
-    assert drive.visited == {(0, col) for col in range(10)}
-
-
 def test_a_map_without_pixels_blocks_the_robot():
     drive = Drive((0, 0), MapReceived(placed(np.zeros((0, 0), np.int8), (0, 0))), pose_at(0, 0))
     assert drive.mission.state is State.BLOCKED

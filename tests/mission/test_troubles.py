@@ -208,20 +208,6 @@ def test_a_standstill_is_not_reported_under_another_order():
     assert drive.mission.state is State.COVERING
 
 
-def test_a_robot_that_does_not_drive_home_is_reported():
-    drive = driving(*ROOM, config=CONFIG)
-    drive.command("home")
-    for _ in range(65):
-        drive.tell(pose_at(*drive.cell), after=1.0)
-    assert (drive.mission.state, drive.mission.reason) == (
-        "degraded",
-        "the robot stands: it got a path 3 times",
-    )
-    while drive.walk:
-        assert drive.go() is not None
-    assert drive.mission.state is not State.DEGRADED
-
-
 @pytest.mark.parametrize(
     ("place", "said"),
     [
