@@ -173,7 +173,7 @@ def try_together(campaign: Campaign) -> None:
             campaign.started("simulate", "flat", "--speed", "10", *connect),
             campaign.started(*recorder),
         ):
-            until(lambda: _bytes_in(campaign.trap.state) > 100_000)
+            until(lambda: _bytes_in(campaign.trap.state) > 50_000)
             # A busy machine may take more than the seconds that they wait by themselves.
             asking = (*connect, "--timeout", "100")
             campaign.run("ask", "status", "--json", *asking)
@@ -181,7 +181,7 @@ def try_together(campaign: Campaign) -> None:
             campaign.run("rooms", "list", *asking)
             campaign.run("watch", "--once", *asking)
             campaign.run("doctor", "--config", config, ends=(0, 1))
-            until(lambda: _bytes_in(recordings) > 200_000)
+            until(lambda: _bytes_in(recordings) > 50_000)
     # In the home, where it is kept unless an option says otherwise, and what is there is links.
     with campaign.started("run", "--config", config):
         until(lambda: _asks(campaign, connect))

@@ -13,7 +13,6 @@ from PIL import Image
 
 from fasaco_edge.cli import main
 from fasaco_edge.cli.console.arguments import Exit
-from fasaco_edge.cli.planning.results import OF_WALK
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -357,15 +356,6 @@ def test_a_start_may_be_negative(plan, tmp_path):
         assert tuple(figures["start"]) == walk[0] == (-9, -8)
 
 
-def test_the_same_seed_gives_the_same_walk(plan):
-    # Without a budget: where the clock ends a search, a busy computer gives another walk.
-    (_, first), (_, again), (_, other) = (
-        plan("office", "--ants", 30, "--seed", seed, "--planner", "fasaco") for seed in (5, 5, 6)
-    )
-    assert first == again
-    assert first != other
-
-
 @pytest.mark.parametrize("planner", PLANNER_NAMES)
 def test_a_walk_ends_in_the_cell_asked_for(plan, grid_file, planner):
     options = ("--start", "8,0", "--end", "2,6", "--planner", planner, "--ants", 16)
@@ -464,13 +454,6 @@ def test_a_budget_ends_the_search_with_a_whole_walk(plan, grid_file):
     raise AssertionError("no kick in half a minute")
 
 
-def test_one_cell_is_a_walk_without_a_step(plan, tmp_path):
-    np.save(tmp_path / "one.npy", np.ones((1, 1), bool))
-    figures, walk = plan(tmp_path / "one.npy", "--ants", 8)
-    assert walk == [(0, 0)]
-    assert (figures["steps"], figures["cells"], figures["revisits"]) == (0, 1, 0)
-
-
 @pytest.mark.parametrize("name", ["walk.png", "walk", "walk.jpeg"])
 def test_a_picture_is_a_png_whatever_its_name(grid_file, tmp_path, capsys, name):
     picture = tmp_path / name
@@ -488,19 +471,6 @@ def test_the_trail_of_the_colony_is_drawn(plan, tmp_path, words):
     with Image.open(file) as picture:
         colours = picture.convert("P", palette=Image.Palette.ADAPTIVE, colors=64).getcolors()
     assert len(colours) > 20
-
-
-def test_figures_are_printed_as_text(grid_file, capsys):
-    assert main(["plan", str(grid_file), "--ants", "8", "--long"]) == 0
-    told = capsys.readouterr().out
-    assert main(["plan", str(grid_file), "--ants", "8", "--json"]) == 0
-    figures = json.loads(capsys.readouterr().out)
-    for key in KEYS:
-        # But for what is null; why there is no floor is said.
-        is_told = figures[key] is not None or key == "floor"
-        label = f"walk {key}" if key in OF_WALK else key
-        assert (f"│ {label.replace('_', ' ')} " in told) == is_told
-    assert told.splitlines()[1].startswith("│ driven line ")
 
 
 @pytest.mark.parametrize(
