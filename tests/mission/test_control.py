@@ -4,11 +4,9 @@ import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import zone_progress
 from fasaco_edge.errors import OrderError
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.core.events import MapReceived, PoseReceived, State
+from fasaco_edge.mission.core.events import MapReceived, State
 from fasaco_edge.mission.orders.order_state import OrderState
 from tests.mission.world import (
-    CONFIG,
     Drive,
     answer,
     building,
@@ -321,22 +319,6 @@ def test_order_zone_pass_and_home_outlive_the_daemon(driven):
     assert again.cell == (3, 4)
     # Each cell twice in all, but what was covered in the pass is not covered again.
     assert len(first.driven) + len(again.driven) < 2 * 12 + 30
-
-
-def test_a_pose_between_cells_counts_for_its_cell():
-    """Standing beside home is not being there."""
-    drive = idle("....", cell=(0, 0))
-    zone = {"name": "end", "polygon": rectangle(0, 3, 1, 4)}
-    drive.command("start", {"zones": [zone], "return_home": True})
-    drive.plan()
-    for _ in range(5):
-        drive.go()
-    drive.tell(PoseReceived(StampedPose(Pose2D(0.26, 0.12))))
-    assert drive.mission.state is not State.DONE
-    drive.tell(PoseReceived(StampedPose(Pose2D(0.24, 0.12))))
-    drive.tell(after=2.0)
-    assert drive.mission.state is State.DONE
-    assert CONFIG.policy.retries == 0
 
 
 def test_how_far_each_zone_is():

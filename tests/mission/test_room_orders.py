@@ -172,19 +172,6 @@ def test_an_order_waits_for_a_room_after_its_other_zones():
     assert len(visited(drive, EAST_COLUMNS)) == 90
 
 
-def test_a_wait_before_anything_else_stands_and_can_be_cancelled():
-    drive = settled(*BOTH)
-    start(drive, "kitchen", unknown="wait")
-    assert drive.mission.state is State.BLOCKED
-    assert drive.request is None
-    drive.command("pause")
-    assert drive.mission.state is State.PAUSED
-    drive.command("resume")
-    assert drive.mission.state is State.BLOCKED
-    drive.command("cancel")
-    assert drive.mission.state is State.IDLE
-
-
 def test_settings_of_a_room_apply_to_orders_without_them():
     drive = settled(*BOTH)
     number = room_at(drive, *IN_EAST).id

@@ -197,17 +197,6 @@ def test_a_standing_robot_is_reported_though_the_map_flickers():
     assert drive.mission.reason.startswith("the robot stands")
 
 
-def test_a_standstill_is_not_reported_under_another_order():
-    drive = driving(*ROOM, config=CONFIG)
-    for _ in range(65):
-        drive.tell(pose_at(*drive.cell), after=1.0)
-    assert drive.mission.state is State.DEGRADED
-    drive.command("cancel")
-    drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(3, 8, 4, 12)}]})
-    drive.plan()
-    assert drive.mission.state is State.COVERING
-
-
 @pytest.mark.parametrize(
     ("place", "said"),
     [
