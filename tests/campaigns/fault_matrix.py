@@ -1,6 +1,6 @@
 """Each part of a robot fails in each way: the robot stops in time, or drives on where it should.
 
-    python -m tests.campaigns.fault_matrix [--only WORDS] [--stages 2] [--watch 14] [--json]
+    python -m tests.campaigns.fault_matrix [--only WORDS] [--stages 2] [--watch 14]
 
 Takes minutes.
 
@@ -17,13 +17,12 @@ Exit code 1 where one of these is violated.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import multiprocessing
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -171,16 +170,12 @@ def main() -> int:
     parser.add_argument("--only", default="", help="combinations whose words have this in them")
     parser.add_argument("--stages", type=int, default=2, help="at a time")
     parser.add_argument("--watch", type=float, default=14.0, help="time after the fault [s]")
-    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
     jobs = [(cell, args.watch) for cell in cells() if args.only in cell.title]
     with multiprocessing.get_context("spawn").Pool(args.stages) as pool:
         done = pool.map(_run, jobs, chunksize=1)
-    if args.json:
-        print(json.dumps([asdict(cell) for cell in done]))
-    else:
-        print(f"{'fault':44} {'should':10} {'last s':>6} {'next s':>6} {'gap s':>6} both")
-        print("\n".join(map(row, done)))
+    print(f"{'fault':44} {'should':10} {'last s':>6} {'next s':>6} {'gap s':>6} both")
+    print("\n".join(map(row, done)))
     return 1 if any(cell.violations for cell in done) else 0
 
 

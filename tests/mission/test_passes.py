@@ -259,6 +259,15 @@ def test_cells_that_no_map_fits_on_are_given_up():
         assert (layout.deg, layout.cell_m) == (0.0, usual_m)
 
 
+def test_a_map_too_large_for_a_pass_gets_the_usual_cells():
+    layout = LatticeLayout(CONFIG)
+    assert layout.changes_for_pass(Laid(overlap=0.5), room(3.0, 2.4))
+    layout._most_cells = 500
+    assert layout.rotates_back_for([room(4.0, 3.0)])
+    assert layout.cell_m == CONFIG.footprint.cell_m
+    assert not layout.rotates_back_for([room(4.0, 3.0)])
+
+
 def test_a_slow_pass_is_sent_with_its_speed():
     config = replace(CONFIG, speed_m_s=0.25)
     events = MapReceived(building(*HALL)), pose_at(0, 0)

@@ -25,6 +25,7 @@ from tests.mission.world import (
     answer,
     building,
     patch,
+    placed,
     pose_at,
     reachable_cells,
     started,
@@ -336,6 +337,12 @@ def test_a_pose_far_off_the_map_takes_bounded_memory():
     assert drive.mission.state is State.BLOCKED
     drive.tell(pose_at(*drive.cell))
     drive.finish()
+
+
+def test_a_map_without_pixels_blocks_the_robot():
+    drive = Drive((0, 0), MapReceived(placed(np.zeros((0, 0), np.int8), (0, 0))), pose_at(0, 0))
+    assert drive.mission.state is State.BLOCKED
+    assert drive.mission.coverage().fraction == 0.0
 
 
 @pytest.mark.parametrize("cell", [(0, 0), (-7, 3)])

@@ -86,6 +86,11 @@ def test_a_shut_in_robot_that_gives_up_its_cells_is_not_done():
     assert covered.covered == covered.coverable > 140
 
 
+def test_in_the_gap_itself_it_drives_on_out():
+    robot = shut_in(by=1, where=lambda robot: 4.02 < robot.x < 4.08)
+    assert robot.wait(60.0, lambda robot: robot.x < 3.8)
+
+
 def test_a_way_back_that_the_map_closes_is_withdrawn():
     robot = shut_in()
     assert robot.wait(60.0, lambda robot: "shut_in" in troubles(robot) and robot.path)
