@@ -1,4 +1,4 @@
-"""Benchmark of Table I: measurement, figures, judgement and page of results."""
+"""Benchmark of Table I: measurement, figures, and judgement."""
 
 import argparse
 import json
@@ -6,7 +6,6 @@ import re
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from fasaco_edge.bench.spread import Spread
 from fasaco_edge.planners.path import WalkFigures
@@ -39,20 +38,16 @@ def options(*words):
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """Return the options and the runs of a small table, and where its files are."""
+    """Return the options and the runs of a small table."""
     folder = tmp_path_factory.mktemp("table1")
     np.save(folder / "room.npy", np.ones((5, 6), bool))
-    args = options(
-        *SMALL, "--maps", "office", "--grids", str(folder / "room.npy"),
-        "--markdown", str(folder / "RESULTS.md"), "--png", str(folder / "pictures"),
-        "--png-of", "office",
-    )  # fmt: skip
+    args = options(*SMALL, "--maps", "office", "--grids", str(folder / "room.npy"))
     runs = list(TABLE1.measure(args, lambda what: None))
-    return args, runs, folder
+    return args, runs
 
 
 def test_every_variant_runs_with_every_seed(made):
-    args, runs, _ = made
+    args, runs = made
     assert len(runs) == TABLE1.count(args) == 2 * 2 * len(VARIANTS)
     assert {run.grid for run in runs} == {"room", "office"}
     assert {run.seed for run in runs} == {0, 1}
@@ -101,38 +96,14 @@ def test_table_one_reports_its_figures(capsys):
     assert document["goals"] == []
 
 
-def test_page_and_pictures(made):
-    args, runs, folder = made
-    files = TABLE1.write(args, runs)
-    page = (folder / "RESULTS.md").read_text(encoding="utf-8")
-    assert files[-1] == folder / "RESULTS.md"
-    assert str(folder) not in page
-    assert "--grids room.npy" in page
-    assert "Interrupted" not in page
-    links = re.findall(r"!\[[^]]+\]\(([^)]+)\)", page)
-    assert links == ["pictures/office.png", "pictures/office_pheromone.png"]
-    for link in links:
-        with Image.open(folder / link) as picture:
-            assert min(picture.size) > 300
-            assert len(picture.convert("RGB").getcolors(maxcolors=2**20)) > 20
-    for table in re.findall(r"(?:^\|.*\n)+", page, re.MULTILINE):
-        assert len({line.count("|") for line in table.splitlines()}) == 1
-    for claim in CLAIMS:
-        assert f"**{claim.text}.** " in page
-
-
 @pytest.mark.parametrize("count", [0, 1, len(VARIANTS) - 1, len(VARIANTS) + 3])
-def test_interrupted_table_reports_what_there_is(made, tmp_path, count):
-    _, runs, _ = made
-    args = options(*SMALL, "--maps", "office", "--markdown", str(tmp_path / "page.md"))
+def test_interrupted_table_reports_what_there_is(made, count):
+    args, runs = made
     report = TABLE1.report(args, runs[:count])
     json.dumps(report.figures, allow_nan=False)
     for table in report.tables:
         assert {len(row) for row in table.rows} <= {len(table.header)}
     assert sum(row["runs"] for grid in report.figures["grids"] for row in grid["rows"]) == count
-    TABLE1.write(args, runs[:count])
-    missing = 2 * len(VARIANTS) - count
-    assert f"Interrupted: {missing} runs are missing" in (tmp_path / "page.md").read_text()
 
 
 def test_two_grids_of_one_name_are_refused(tmp_path, capsys):
@@ -140,8 +111,6 @@ def test_two_grids_of_one_name_are_refused(tmp_path, capsys):
     words = ["--grids", str(tmp_path / "office.npy"), "--maps", "office", *SMALL]
     assert main(["table1", *words]) != 0
     assert "'office' twice" in capsys.readouterr().err
-    assert main(["table1", "--maps", "office", "--png-of", "flat", *SMALL]) != 0
-    assert "measured grids" in capsys.readouterr().err
 
 
 def run(variant, seed, revisits, cpu_s=1.0, grid="paper_simulated", cells=169):

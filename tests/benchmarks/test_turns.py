@@ -4,9 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from fasaco_edge.drawing import palette
 from tests.benchmarks.__main__ import main
 
 FLOOR = np.ones((6, 8), bool)
@@ -38,17 +36,6 @@ def test_tours_are_compared_with_the_best_known(instances, capsys):
     assert all(0 < each["bound_s"] <= each["best_s"] for each in runs.values())
     # At the end of a row every tour turns back, in the corner of the ring to one side.
     assert {name: each["bound_s"] for name, each in runs.items()} == BOUNDS
-
-
-def test_three_walks_are_drawn_side_by_side(instances, capsys, tmp_path):
-    png = tmp_path / "tours.png"
-    code, _ = run(capsys, "--instances", instances, "--no-maps", "--budgets", 0.01, "--png", png)
-    assert code == 0
-    with Image.open(png) as picture:
-        assert picture.width > 640
-        colours = {colour for _, colour in picture.convert("RGB").getcolors(1 << 20)}
-    assert palette.START in colours
-    assert palette.COVERED in colours
 
 
 def test_walks_over_maps_have_a_certified_gap_at_each_price(capsys, tmp_path):

@@ -1,6 +1,6 @@
 """Daemons and recorders whose clock is wrong, and is set while they run.
 
-    python -m tests.campaigns.clock --boots 12 [--seed 0] [--json FILE]
+    python -m tests.campaigns.clock --boots 12 [--seed 0]
 
 Takes minutes.
 
@@ -310,7 +310,6 @@ def main() -> int:
     parser.add_argument("--boots", type=int, default=12, help="daemons (default: %(default)s)")
     parser.add_argument("--hold", type=float, default=4.0, help="with each clock [s]")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
     args = parser.parse_args()
     warm_kernels()
     with tempfile.TemporaryDirectory() as folder:
@@ -320,9 +319,6 @@ def main() -> int:
     for what, count in campaign.counted.items():
         print(f"{count:7}  {what}")
     print(f"{len(campaign.violations):7}  violations", *campaign.violations, sep="\n         ")
-    if args.json:
-        counted = dict(campaign.counted) | {"violations": campaign.violations}
-        args.json.write_text(json.dumps(counted, indent=2))
     return 1 if campaign.violations else 0
 
 

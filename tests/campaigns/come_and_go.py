@@ -17,7 +17,6 @@ something has grown.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import sys
@@ -352,22 +351,11 @@ def main() -> int:
                         help="what all connect to (default: %(default)s)")  # fmt: skip
     parser.add_argument("--rest", type=float, default=10.0, metavar="S",
                         help="how long each look takes [s] (default: %(default)s)")  # fmt: skip
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all that was seen")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="come-and-go-") as folder:
         campaign = run_campaign(Path(folder), args.mappers, args.daemons, args.rest, args.hub)
     for violation in campaign.violations:
         print(violation)
-    if args.json:
-        args.json.write_text(
-            json.dumps(
-                {
-                    "rows": [asdict(row) for row in campaign.rows],
-                    "violations": campaign.violations,
-                },
-                indent=1,
-            )
-        )
     print("nothing has grown" if not campaign.violations else "FAILED")
     return int(bool(campaign.violations))
 

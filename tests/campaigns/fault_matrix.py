@@ -1,7 +1,6 @@
 """Each part of a robot fails in each way: the robot stops in time, or drives on where it should.
 
-    python -m tests.campaigns.fault_matrix [--only WORDS] [--stages 2] [--watch 14] [--json]
-                                           [--source FOLDER]
+    python -m tests.campaigns.fault_matrix [--only WORDS] [--stages 2] [--watch 14]
 
 Takes minutes.
 
@@ -12,20 +11,18 @@ fails. Where a fault should stop the robot, no command that moves may come later
 it (where all links are slow: than 4.5 s, as both status and command are 1 s late), until a
 successor is in charge: a daemon that plans, a follower that drives. Elsewhere the robot has to
 drive on. Nowhere may two followers drive at once, or the robot leave the hall.
-Exit code 1 where one of these is violated. ``--source`` runs daemons and followers of another
-release.
+Exit code 1 where one of these is violated.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import multiprocessing
 import sys
 import tempfile
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -97,10 +94,10 @@ def cells() -> list[Cell]:
     return single + [Cell((beside, ("planner", "frozen")), STOPS) for beside in BESIDE]
 
 
-def run_cell(cell: Cell, watch_s: float, source: str = "") -> Cell:
+def run_cell(cell: Cell, watch_s: float) -> Cell:
     """Run a combination."""
     with tempfile.TemporaryDirectory(prefix="fault-") as folder:
-        stage = Stage(Path(folder), source)
+        stage = Stage(Path(folder))
         try:
             stage.begin()
             for part, fault in cell.faults[:-1]:
@@ -161,7 +158,7 @@ def row(cell: Cell) -> str:
     )
 
 
-def _run(job: tuple[Cell, float, str]) -> Cell:
+def _run(job: tuple[Cell, float]) -> Cell:
     cell = run_cell(*job)
     show(row(cell))
     return cell
@@ -173,17 +170,12 @@ def main() -> int:
     parser.add_argument("--only", default="", help="combinations whose words have this in them")
     parser.add_argument("--stages", type=int, default=2, help="at a time")
     parser.add_argument("--watch", type=float, default=14.0, help="time after the fault [s]")
-    parser.add_argument("--source", default="", help="folder of another release's package")
-    parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    jobs = [(cell, args.watch, args.source) for cell in cells() if args.only in cell.title]
+    jobs = [(cell, args.watch) for cell in cells() if args.only in cell.title]
     with multiprocessing.get_context("spawn").Pool(args.stages) as pool:
         done = pool.map(_run, jobs, chunksize=1)
-    if args.json:
-        print(json.dumps([asdict(cell) for cell in done]))
-    else:
-        print(f"{'fault':44} {'should':10} {'last s':>6} {'next s':>6} {'gap s':>6} both")
-        print("\n".join(map(row, done)))
+    print(f"{'fault':44} {'should':10} {'last s':>6} {'next s':>6} {'gap s':>6} both")
+    print("\n".join(map(row, done)))
     return 1 if any(cell.violations for cell in done) else 0
 
 

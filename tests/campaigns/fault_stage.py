@@ -121,12 +121,10 @@ class Stage:
 
     Args:
         folder: for configurations, states and logs.
-        source: the package that daemons and followers run, if it is another than this one.
     """
 
-    def __init__(self, folder: Path, source: str = "") -> None:
+    def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._environment = ENVIRONMENT | ({"PYTHONPATH": source} if source else {})
         self._processes: dict[str, subprocess.Popen[bytes] | Forked] = {}
         self._loops: list[threading.Thread] = []
         self._over = threading.Event()
@@ -210,13 +208,12 @@ class Stage:
             words += ["--state", str(self._folder / name)]
         is_ours = part in ("router", "pose")
         file = self._folder / f"{name}.log"
-        if not is_ours and self._environment == ENVIRONMENT:
+        if not is_ours:
             self._processes[part] = Forked(tuple(words), ENVIRONMENT, file, file)
             return
         log = self._exits.enter_context(file.open("ab"))
-        environment = ENVIRONMENT if is_ours else self._environment
         self._processes[part] = subprocess.Popen(
-            [sys.executable, *words], stdin=subprocess.PIPE, stdout=log, stderr=log, env=environment
+            [sys.executable, *words], stdin=subprocess.PIPE, stdout=log, stderr=log, env=ENVIRONMENT
         )
 
     def _config(self, part: str) -> Path:

@@ -1,14 +1,13 @@
-"""Failures of each file call of daemon, recorder and compiler, in turn.
+"""Failures of each file call of daemon and recorder, in turn.
 
     python -m tests.campaigns.io_faults                       # all, hours
     python -m tests.campaigns.io_faults --most 20             # 20 of each kind of call
-    python -m tests.campaigns.io_faults --only compile        # an empty cache of kernels: days
     python -m tests.campaigns.io_faults --only orders --again orders:sync:2:EIO
 
 Takes hours.
 
-The Nth open, read, write, fsync, rename, mmap and so on under the folders of state, recordings,
-configuration and compiled kernels fails, for every N there is, with each error that it may fail
+The Nth open, read, write, fsync, rename, mmap and so on under the folders of state, recordings and
+configuration fails, for every N there is, with each error that it may fail
 with: once, or from then on, also for all kinds of calls at once. What is run is the real command;
 what fails is a call to the C library.
 
@@ -179,10 +178,6 @@ def main() -> int:
     parser.add_argument(
         "--again", metavar="SCENARIO:KIND:N:ERROR", help="run one fault; ERROR+ from then on"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write all outcomes")
-    parser.add_argument(
-        "--resume", action="store_true", help="leave out what is in the file of --json already"
-    )
     args = parser.parse_args()
     if why := why_not():
         print(f"not possible here: {why}", file=sys.stderr)
@@ -192,40 +187,27 @@ def main() -> int:
         outcome, _ = outcome_of(name, Failure.of_text(text))
         print(json.dumps(asdict(outcome), indent=1))
         return int(outcome.came == "wrong")
-    if args.resume and not args.json:
-        parser.error("--resume needs --json FILE")
     # As Ctrl-C, which a shell keeps from what it runs in the background.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    outcomes = _read(args.json) if args.resume else []
+    outcomes: list[Outcome] = []
     try:
         for name in args.only or SCENARIOS:
-            known = {outcome.failure for outcome in outcomes if outcome.scenario == name}
-            for outcome in _all_of(name, args.most, args.seed, known, every=args.every_error):
+            for outcome in _all_of(name, args.most, args.seed, every=args.every_error):
                 outcomes.append(outcome)
-                if args.json:
-                    args.json.write_text(json.dumps(list(map(asdict, outcomes)), indent=1))
     except KeyboardInterrupt:
         print("\ninterrupted", file=sys.stderr)
     _tell(outcomes)
     return int(any(outcome.came == "wrong" for outcome in outcomes))
 
 
-def _read(file: Path) -> list[Outcome]:
-    return [Outcome(**held) for held in json.loads(file.read_text())] if file.exists() else []
-
-
-def _all_of(name: str, most: int, seed: int, known: set[str], *, every: bool) -> Iterator[Outcome]:
-    """Run a scenario without a fault, then with each that is not ``known`` yet."""
+def _all_of(name: str, most: int, seed: int, *, every: bool) -> Iterator[Outcome]:
+    """Run a scenario without a fault, then with each."""
     golden, counts = outcome_of(name, None)
     if golden.came == "wrong":
         print(f"{name}: wrong without any fault: {golden.said}", flush=True)
         yield golden
         return
-    failures = [
-        failure
-        for failure in failures_of(counts, most, seed, every=every)
-        if str(failure) not in known
-    ]
+    failures = failures_of(counts, most, seed, every=every)
     started = time.monotonic()
     for number, failure in enumerate(failures, 1):
         outcome, _ = outcome_of(name, failure)

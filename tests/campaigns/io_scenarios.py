@@ -20,14 +20,12 @@ from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.daemon.ledger.codec import decode_ledger
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import LedgerFileError, UnreadableRecording
-from fasaco_edge.planners.compiling import WARNING
 from fasaco_edge.recording.read.torn import repair_folder
 from fasaco_edge.wire import topics
 from fasaco_edge.wire.keys import Keys
 from tests.campaigns.kill_recorder import driving
 from tests.campaigns.services import START_S, Service, service
 from tests.daemon.test_commands import command
-from tests.support.compilers import compile_into, why_not_whole
 from tests.support.ledgers import CELL_M, Cell, contents, lane, visits_of
 from tests.support.outsider import Outsider
 from tests.support.processes import free_endpoint
@@ -35,7 +33,7 @@ from tests.support.recordings import bus_on_free_port, read_summary
 from tests.support.rooms import begin, drive, lanes
 
 DRIVEN, MESSAGES = 6, 60
-STATE, RECORDINGS, CACHE = "state", "recordings", "cache"
+STATE, RECORDINGS = "state", "recordings"
 
 
 class WrongError(AssertionError):
@@ -209,31 +207,8 @@ def _recordings_read(folder: Path, is_told: bool) -> None:
         raise WrongError(f"nothing recorded, and not a word: {sorted(os.listdir(folder))}")
 
 
-# ---- compiled kernels ----
-
-
-def _warm_up(folder: Path, environment: dict[str, str]) -> tuple[int | None, str]:
-    done = compile_into(folder / CACHE / "kernels", environment)
-    # Its stages and reasons are no faults.
-    lines = [line.partition("\t") for line in done.stdout.splitlines()]
-    warnings = [f"WARNING {text}\n" for word, _, text in lines if word == WARNING]
-    return done.returncode, "".join(warnings) + done.stderr
-
-
-def _is_warm(folder: Path, is_told: bool) -> None:
-    """Check that the kernels are there, or were said not to be and are with the next try."""
-    kernels = folder / CACHE / "kernels"
-    if is_told:
-        again = compile_into(kernels)
-        if again.returncode != 0:
-            raise WrongError(f"the next try ends with {again.returncode}: {again.stderr[-600:]}")
-    if why := why_not_whole(kernels):
-        raise WrongError(f"not ready: {why}")
-
-
 SCENARIOS = {
     "orders": Scenario(_lay_ledgers, _give_orders, _keeps_the_four, (STATE, "etc")),
     "mission": Scenario(_lay_config, _drive, _knows_its_drive, (STATE, RECORDINGS)),
     "recorder": Scenario(lambda _: None, _record, _recordings_read, (RECORDINGS,)),
-    "warmup": Scenario(lambda folder: (folder / CACHE).mkdir(0o700), _warm_up, _is_warm, (CACHE,)),
 }

@@ -14,7 +14,6 @@ it does not take it must refuse with an error that names the number.
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import signal
 import sys
@@ -342,7 +341,6 @@ def main() -> None:
     parser.add_argument("--kinds", type=_numbers(str), default=KINDS, help=", ".join(KINDS))
     parser.add_argument("--seconds", type=float, default=5.0, help="each flood takes")
     parser.add_argument("--limit-mb", type=int, help="by default the unit's MemoryMax= [MiB]")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows there, too")
     args = parser.parse_args()
     limit = args.limit_mb << 20 if args.limit_mb else unit_limit()
     warm_kernels()
@@ -363,8 +361,6 @@ def main() -> None:
     print(
         f"{len(rows)} floods, {broken} broken promises, most {max(r.peak_mb for r in rows):.0f} MB"
     )
-    if args.json:
-        args.json.write_text(json.dumps([asdict(row) for row in rows], indent=1))
     sys.exit(bool(broken))
 
 

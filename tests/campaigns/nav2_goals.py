@@ -8,10 +8,6 @@ It prints a row for each mission, and what became of all; ``--at-once 4`` missio
 and ``--faults`` chooses what goes wrong. A mission is part of a line over a bundled map,
 ``--length`` metres long; daemon, path and status are stood in for, the follower and the look-alike
 are processes that hardly work: several missions at once disturb each other little.
-
-Standing is forced where nobody who sees the robot could have avoided it: a goal that took longer to
-come than the robot took from where the goal could first hold, without leaving out anything of the
-last one, to the end of that. The rest is our own.
 """
 
 from __future__ import annotations
@@ -29,18 +25,10 @@ from typing import Any
 import numpy as np
 
 import fasaco_edge as fe
-from fasaco_edge.cli.follow import NEAR_SHARE
-from fasaco_edge.config.robot import RobotConfig
-from fasaco_edge.follow.nav2 import EARLY_M
-from fasaco_edge.follow.pieces import GAIN_M, TIP_M, PathByLength, end_of_piece
-from fasaco_edge.grid.geometry import Pose2D
 from tests.follow.nav2_missions import Point, Robot, kind_of, nav2_follower, passed
 from tests.support.driven_base import DrivenBase
 
 LIMIT_S = 600.0
-# As `follow` has it by default; a goal that holds earlier than this is not looked for [m].
-NEAR_M = NEAR_SHARE * RobotConfig().tool_width_m
-MOST_EARLY_M = 4
 FAULTS: dict[str, dict[str, float]] = {
     "none": {},
     "delays of a second": {"delay_s": 1.0},
@@ -60,7 +48,6 @@ class Mission:
         complete: whether the end was reached, and all before it passed in order.
         again_m: how much more was driven than the line is long [m].
         standing: share of the time that the robot stood between goals that succeeded.
-        forced: what of it was forced.
         figures: what the look-alike counted.
     """
 
@@ -68,7 +55,6 @@ class Mission:
     complete: bool
     again_m: float
     standing: float
-    forced: float
     figures: dict[str, Any]
 
 
@@ -85,30 +71,6 @@ def line_of(length_m: float, seed: int) -> list[Point]:
         if way >= length_m:
             break
     return points
-
-
-def forced_s(pauses: list[dict[str, Any]], points: list[Point]) -> float:
-    """Return how long the robot was forced to stand between goals [s]."""
-    line, way, forced = PathByLength(Pose2D(x, y) for x, y in points), 0.0, 0.0
-    for pause in pauses:
-        way, _ = line.nearest(pause["end"], way, line.length(math.inf))
-        early_m = max(
-            (
-                0.1 * tenth
-                for tenth in range(10 * MOST_EARLY_M)
-                if _leads_on(line, way, 0.1 * tenth)
-            ),
-            default=0.0,
-        )
-        within = max(early_m, TIP_M + EARLY_M)
-        could_s = min((before for before, far in pause["approach"] if far > within), default=0.0)
-        forced += min(max(pause["delay_s"] - could_s, 0.0), pause["pause_s"])
-    return forced
-
-
-def _leads_on(line: PathByLength, end: float, early_m: float) -> bool:
-    """Return whether a goal that begins so early leads on beyond the end of the last one."""
-    return early_m <= end and end_of_piece(line, end - early_m, NEAR_M) >= end + GAIN_M
 
 
 def run_mission(faults: str, length_m: float, speed_m_s: float, seed: int) -> Mission:
@@ -146,7 +108,6 @@ def run_mission(faults: str, length_m: float, speed_m_s: float, seed: int) -> Mi
         is_there and done["refused"] == [] and passed(trail, line, near=0.25),
         done["driven_m"] - length,
         done["standing_s"] / max(whole_s, 1e-9),
-        forced_s(done.pop("pauses"), line) / max(whole_s, 1e-9),
         {"log": said, **done},
     )
 
@@ -156,8 +117,7 @@ def show(number: int, mission: Mission) -> None:
     figures = {name: value for name, value in mission.figures.items() if name != "log"}
     print(
         f"{number:3} {mission.faults:20} {'complete' if mission.complete else 'NOT COMPLETE':12}"
-        f" again {mission.again_m:6.2f} m  standing {mission.standing:6.2%}, forced"
-        f" {mission.forced:6.2%}  {figures}",
+        f" again {mission.again_m:6.2f} m  standing {mission.standing:6.2%}  {figures}",
         flush=True,
     )
     if not mission.complete:
@@ -190,11 +150,10 @@ def main() -> None:
         those = [mission for mission in missions if mission.faults == faults]
         if those:
             standing = np.array([mission.standing for mission in those])
-            own = standing - [mission.forced for mission in those]
             again = max(mission.again_m for mission in those)
             print(
-                f"{faults:20} standing mean {standing.mean():.2%}, most {standing.max():.2%}; not"
-                f" forced mean {own.mean():.2%}, most {own.max():.2%}; again at most {again:.2f} m"
+                f"{faults:20} standing mean {standing.mean():.2%}, most {standing.max():.2%}; again"
+                f" at most {again:.2f} m"
             )
 
 

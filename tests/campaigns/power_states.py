@@ -32,13 +32,6 @@ class Bytes(enum.Enum):
     """For each file another of these."""
 
 
-class Spread(enum.Enum):
-    """How many of the files are damaged that were not synchronised."""
-
-    ALL = "all"
-    ONE = "one"
-
-
 class Names(enum.Enum):
     """Which names have moved that were not synchronised."""
 
@@ -58,14 +51,12 @@ class Cut:
         bytes: what is left of files.
         names: which names have moved.
         salt: chooses where there is a choice.
-        spread: how many files are damaged.
     """
 
     after: int
     bytes: Bytes = field(compare=False)
     names: Names = field(compare=False)
     salt: int = field(compare=False)
-    spread: Spread = field(default=Spread.ALL, compare=False)
 
     def __str__(self) -> str:
         return f"{self.after} calls, bytes {self.bytes.value}, names {self.names.value}"
@@ -162,8 +153,6 @@ class Disk:
         """Write to the folder ``to`` what a cut at this moment leaves of the root."""
         rng = random.Random(f"{cut.after} {cut.salt}")
         names = self._left(cut.names, rng)
-        dirty = sorted(path for path, node in names.items() if _is_dirty(node))
-        damaged = {rng.choice(dirty)} if dirty and cut.spread is Spread.ONE else set(dirty)
         for path in sorted(names):
             if not all(above in names for above in self._above(path)):
                 continue
@@ -175,7 +164,7 @@ class Disk:
             else:
                 kinds = list(Bytes)[:-1]
                 how = rng.choice(kinds) if cut.bytes is Bytes.MIXED else cut.bytes
-                place.write_bytes(node.left(how if path in damaged else Bytes.WHOLE))
+                place.write_bytes(node.left(how))
 
     @property
     def moves(self) -> int:
@@ -265,9 +254,7 @@ def _settle(file: _File) -> None:
     file.kept, file.is_dirty = bytes(file.now), False
 
 
-def cuts_of(
-    root: Path, calls: Sequence[Call], most: int, seed: int, spread: Spread = Spread.ALL
-) -> list[Cut]:
+def cuts_of(root: Path, calls: Sequence[Call], most: int, seed: int) -> list[Cut]:
     """Return cuts after each call, in order: ``most`` of them, with as many calls as can be."""
     rng, disk, rounds = random.Random(seed), Disk(root), list[tuple[float, Cut]]()
     for after in range(len(calls) + 1):
@@ -276,7 +263,7 @@ def cuts_of(
         kinds = list(Bytes) if disk.dirty else [Bytes.WHOLE]
         moves = list(Names) if disk.moves > 1 else [Names.ALL, Names.NONE][: disk.moves + 1]
         cuts = [
-            Cut(after, kind, names, len(rounds) + number, spread)
+            Cut(after, kind, names, len(rounds) + number)
             for number, (kind, names) in enumerate(product(kinds, moves))
         ]
         # The first round has one cut after each call, the second another.

@@ -28,6 +28,7 @@ from fasaco_edge.bench.processes import warm_kernels
 from tests.campaigns.senseless import SILENT, Event, Senseless
 from tests.campaigns.senseless_daemon import LATE_SHARE, Campaign
 from tests.campaigns.senseless_mission import MissionTrial
+from tests.campaigns.services import show
 
 # What is written down of the events before a finding.
 RING = 30_000
@@ -35,7 +36,7 @@ RING = 30_000
 MOST_FINDINGS = 5
 # Number of events of a mission within this process; largest size of its maps [pixels].
 MISSION_EVENTS, MISSION_PIXELS = 10_000, 90_000
-SAY_EVERY_S = 10.0
+SHOW_EVERY = 10_000
 
 
 class Findings:
@@ -67,26 +68,6 @@ class Findings:
         return len(self.texts) >= MOST_FINDINGS
 
 
-class Progress:
-    """Reports now and then how far it is."""
-
-    def __init__(self, events: int) -> None:
-        self.done = 0
-        self._events = events
-        self._started = self._said = time.monotonic()
-
-    def count(self, event: Event, more: Any = "") -> None:
-        """Count an event that was said."""
-        self.done += event["do"] not in SILENT
-        now = time.monotonic()
-        if now - self._said >= SAY_EVERY_S:
-            self._said = now
-            rate = self.done / (now - self._started)
-            left = (self._events - self.done) / rate
-            text = f"{self.done:,} of {self._events:,} events, {rate:,.0f}/s, {left / 60:.0f} min"
-            print(f"{text} to go {more}", file=sys.stderr, flush=True)
-
-
 def counted(events: Iterable[Event], most: int) -> Iterable[Event]:
     """Yield events until so many of them were messages."""
     for event in events:
@@ -100,7 +81,7 @@ def fuzz_daemon(
     folder: Path, events: Iterable[Event], most: int, seed: int, findings: Findings, pace_hz: float
 ) -> dict[str, Any]:
     """Say events to daemons; return figures."""
-    progress = Progress(most)
+    done = 0
     with Campaign(folder, pace_hz) as campaign:
         for event in counted(events, most):
             try:
@@ -110,7 +91,9 @@ def fuzz_daemon(
                 if findings.are_enough:
                     break
                 campaign.revive()
-            progress.count(event, f"{campaign.judge.status.get('loop_ms')}")
+            done += event["do"] not in SILENT
+            if done % SHOW_EVERY == 0:
+                show(f"{done:,} of {most:,} events {campaign.judge.status.get('loop_ms')}")
         try:
             campaign.end()
         except Exception as error:
@@ -118,7 +101,7 @@ def fuzz_daemon(
         turns = campaign.loop["turns"]
         recovered = sorted(campaign.recovered_s) or [0.0]
         return {
-            "events": progress.done,
+            "events": done,
             **dict(sorted(campaign.counts.items())),
             **dict(sorted(campaign.judge.counts.items())),
             "honest again after [s], median": round(recovered[len(recovered) // 2], 2),
@@ -132,7 +115,7 @@ def fuzz_daemon(
 
 def fuzz_missions(most: int, seed: int, findings: Findings) -> dict[str, Any]:
     """Say events to missions within this process; return figures."""
-    progress, counts = Progress(most), Counter[str]()
+    done, counts = 0, Counter[str]()
     slowest: list[tuple[float, str]] = []
     for number in range(-(-most // MISSION_EVENTS)):
         stream = Senseless(seed + number, MISSION_PIXELS, check_every=1_000, restart_every=1_500)
@@ -140,11 +123,12 @@ def fuzz_missions(most: int, seed: int, findings: Findings) -> dict[str, Any]:
         findings.recent.clear()
         event: Event = {}
         try:
-            for event in counted(stream, min(MISSION_EVENTS, most - progress.done)):
+            for event in counted(stream, min(MISSION_EVENTS, most - done)):
                 trial.perform(event)
                 findings.recent.append(event)
-                progress.count(event)
+                done += event["do"] not in SILENT
             trial.close()
+            show(f"{done:,} of {most:,} events")
         except Exception as error:
             findings.note(error, seed + number, event)
             if findings.are_enough:
@@ -156,7 +140,7 @@ def fuzz_missions(most: int, seed: int, findings: Findings) -> dict[str, Any]:
         counts["largest ledger [tiles]"] = largest
         slowest = sorted([*slowest, *trial.slowest_s], reverse=True)[:5]
     longest = [(round(1e3 * seconds, 1), about) for seconds, about in slowest]
-    return {"events": progress.done, **dict(sorted(counts.items())), "longest turns [ms]": longest}
+    return {"events": done, **dict(sorted(counts.items())), "longest turns [ms]": longest}
 
 
 def replay_mission(events: list[Event], seed: int, findings: Findings) -> dict[str, Any]:
@@ -192,7 +176,6 @@ def main() -> None:
     parser.add_argument("--pace", type=float, default=2_000.0, help="most events a second")
     parser.add_argument("--most-pixels", type=int, default=1_000_000, help="of one map")
     parser.add_argument("--out", type=Path, default=Path.cwd(), help="where findings are written")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
     args = parser.parse_args()
     findings, started = Findings(args.out), time.monotonic()
     warm_kernels()
@@ -213,8 +196,6 @@ def main() -> None:
             findings.texts.append(f"{figures['loop: late share']:.2%} of turns took over 100 ms")
     figures |= {"seconds": round(time.monotonic() - started), "found": findings.texts}
     print(table(figures))
-    if args.json:
-        args.json.write_text(json.dumps(figures, indent=1))
     sys.exit(bool(findings.texts))
 
 

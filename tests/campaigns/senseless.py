@@ -44,7 +44,7 @@ QUERIES = (
 # Times that a stamp can be near: the epoch, today, and both ends of an int32 of seconds.
 EPOCHS = (1, 1_750_000_000 * 10**9, -(2**31) * 10**9, (2**31 - 10**4) * 10**9)
 # Events that are no message: they pass the time, or look whether all is well.
-SILENT = ("wait", "checkpoint", "freeze")
+SILENT = ("wait", "checkpoint")
 
 
 class Senseless:
@@ -53,8 +53,7 @@ class Senseless:
     Args:
         seed: of everything.
         most_pixels: of one map.
-        check_every, restart_every, reload_every, router_every, rival_every: events between two
-            of those.
+        check_every, restart_every, reload_every: events between two of those.
     """
 
     def __init__(
@@ -64,8 +63,6 @@ class Senseless:
         check_every: int = 4_000,
         restart_every: int = 9_000,
         reload_every: int = 3_500,
-        router_every: int = 60_000,
-        rival_every: int = 12_000,
     ) -> None:
         self._rng = random.Random(seed)
         self._most_pixels = most_pixels
@@ -73,8 +70,6 @@ class Senseless:
             "checkpoint": check_every,
             "restart": restart_every,
             "reload": reload_every,
-            "router": router_every,
-            "rival": rival_every,
         }
         self._serial = 0
         self._map: Event = self._honest_map()
@@ -96,7 +91,6 @@ class Senseless:
             (6, self._ask),
             (3, self._keep_silent),
             (1, self._come_and_go),
-            (1, self._freeze),
             (2, self._mask),
             (1, self._flood),
         ]
@@ -119,9 +113,7 @@ class Senseless:
         return {
             "reload": lambda: iter([{"do": "reload", "sections": self._changeable()}]),
             "restart": self._restart,
-            "router": lambda: iter([{"do": "router", "away_s": self._rng.choice([0.0, 0.3, 1.5])}]),
             "checkpoint": lambda: iter([{"do": "checkpoint", "map": self._honest_map()}]),
-            "rival": self._rival,
         }
 
     # Poses.
@@ -392,19 +384,6 @@ class Senseless:
         """Let the mapper be another one, whose latched map stands, or goes with it."""
         yield {"do": "publisher", "stays": self._rng.random() < 0.7}
         yield self._map | {"stamp": self._stamp(), "topic": "map"}
-
-    def _freeze(self) -> Iterator[Event]:
-        yield {"do": "freeze", "s": self._rng.choice([0.2, 0.5, 3.0])}
-
-    def _rival(self) -> Iterator[Event]:
-        """Let another daemon of this name come and go while the robot drives."""
-        yield from self._behave()
-        yield {
-            "do": "rival",
-            "s": self._rng.choice([1.5, 3.0]),
-            "takes_over": self._rng.random() < 0.3,
-            "kill": self._rng.random() < 0.5,
-        }
 
     def _mask(self) -> Iterator[Event]:
         """Draw keep-out zones over the map while the robot drives, and take them away."""

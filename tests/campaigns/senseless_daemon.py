@@ -1,8 +1,8 @@
 """Senseless events into a living daemon behind a router, and what it publishes meanwhile.
 
-Mapper, viewer, router and daemon have a process or a session of their own. What the daemon says is
-judged as it comes: a path against the very map it names, a status against its schema. What the
-daemon does not say is looked at from outside: whether it lives, its log, its memory.
+Mapper, viewer, router and daemon have a process or a session of their own. All that the daemon says
+is decoded, and checked against its schema. What it does not say is looked at from outside: whether
+it lives, its log, its memory. Whether a path is right is judged in ``senseless_mission``.
 """
 
 from __future__ import annotations
@@ -11,9 +11,8 @@ import json
 import re
 import shutil
 import signal
-import tempfile
 import time
-from collections import Counter, OrderedDict, deque
+from collections import Counter, deque
 from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
@@ -24,23 +23,12 @@ import yaml
 import zenoh
 import zenoh.ext
 
-from fasaco_edge.daemon.memory import floor_pixels
-from fasaco_edge.grid.fine_raster import (
-    RobotDiscs,
-    blocked_pixels,
-    fine_geometry,
-    map_to_raster,
-)
-from fasaco_edge.grid.lattice import CoverageLattice, Footprint
-from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.host.processes import own_mb, peak_mb
 from fasaco_edge.wire import schemas
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
 from fasaco_edge.wire.messages.paths import decode_path
 from fasaco_edge.wire.messages.pheromone import decode_pheromone
 from tests.campaigns import raw_messages
-from tests.campaigns.line_judge import why_touching
-from tests.campaigns.path_in_force import PathInForce
 from tests.campaigns.senseless import SILENT, Event, pixels_of
 from tests.support.processes import Daemon, daemon_process, free_endpoint
 from tests.support.router import router_process
@@ -54,16 +42,10 @@ UNIT = Path(__file__).parents[2] / "deploy" / "fasaco-edge.service"
 LATE_SHARE = 0.001
 # So long an answer, a state, a daemon or a router is waited for, on the slowest machine [s].
 PATIENCE_S = 150.0
-# Number of kept maps, which a path may name, and of kept lattices of them.
-MAPS_KEPT, LATTICES_KEPT = 400, 20
-# Larger maps are judged only now and then, so that the judge is not the main load.
-MOST_JUDGED_PIXELS = 100_000
 # How a session looks for a router that has gone [ms].
 SOON = {"period_init_ms": 100, "period_max_ms": 500}
 # An honest mapper says its map again every so many poses.
 MAP_AGAIN_EVERY = 50
-# A session silent for this long is dead to the others [s].
-LEASE_S = 10.0
 # Puts between two looks at what came.
 LOOK_EVERY = 100
 
@@ -92,39 +74,29 @@ class Judge:
         self.walk = np.empty((0, 2))
         self.driven = 0
         self.status: dict[str, Any] = {}
-        self.configs: deque[Event] = deque(maxlen=3)
-        self.in_force = PathInForce()
-        self._heard: deque[tuple[str, bytes, bytes | None, float]] = deque()
-        self._maps: OrderedDict[int, Event] = OrderedDict()
-        self._lattices: OrderedDict[tuple[int, str], CoverageLattice | None] = OrderedDict()
+        self._heard: deque[tuple[str, bytes, bytes | None]] = deque()
 
     def hear(self, name: str, sample: zenoh.Sample) -> None:
         """Note a sample, on a Zenoh thread."""
         beside = sample.attachment
         payload = sample.payload.to_bytes()
         attachment = None if beside is None else beside.to_bytes()
-        self._heard.append((name, payload, attachment, time.monotonic()))
-
-    def expect(self, event: Event) -> None:
-        """Note a map that was sent."""
-        self._maps[event["stamp"]] = event
-        while len(self._maps) > MAPS_KEPT:
-            self._maps.popitem(last=False)
+        self._heard.append((name, payload, attachment))
 
     def forget(self) -> None:
         """Forget what came from a daemon that is gone."""
         self._heard.clear()
-        self.in_force = PathInForce()
 
     def look(self) -> None:
         """Look at all that came since the last time."""
         while self._heard:
-            name, payload, beside, at = self._heard.popleft()
+            name, payload, beside = self._heard.popleft()
             self.counts[f"heard: {name}"] += 1
             if name == "status":
-                self._see_status(json.loads(payload), at)
+                self._see_status(json.loads(payload))
             elif name == "path":
-                self.see_path(payload, json.loads(beside or b"{}"))
+                check("path_attachment.json", json.loads(beside or b"{}"))
+                self.walk, self.driven = decode_path(payload).xy, 0
             elif name == "coverage":
                 decode_occupancy_grid(payload)
             elif name == "pheromone":
@@ -132,11 +104,8 @@ class Judge:
             else:
                 check("mission.json", json.loads(payload))
 
-    def _see_status(self, status: dict[str, Any], at: float) -> None:
+    def _see_status(self, status: dict[str, Any]) -> None:
         check("status.json", status)
-        broken = self.in_force.why_broken(status, at)
-        promise(not broken, broken)
-        self.counts["statuses judged by the path"] = self.in_force.judged
         self.status = status
         coverage = status["coverage"]
         if coverage is not None:
@@ -144,75 +113,6 @@ class Judge:
             promise(chain == sorted(chain), f"coverage {coverage}")
             whole = coverage["covered"] + coverage["remaining"] == coverage["coverable"]
             promise(whole, f"coverage {coverage}")
-
-    def see_path(self, payload: bytes, about: dict[str, Any]) -> None:
-        """Judge a path by itself, and on the map that what comes beside it names."""
-        check("path_attachment.json", about)
-        path = decode_path(payload)
-        self.in_force.see_path(len(path.xy), about["revision"])
-        self.walk, self.driven = path.xy, 0
-        lines = [config.get("line", "cells") != "cells" for config in list(self.configs)[-2:]]
-        if any(lines):
-            self._see_line(path.xy, about, is_sure=all(lines))
-            return
-        promise(about["steps"] == max(len(path.xy) - 1, 0), f"{len(path.xy)} poses, {about}")
-        cell_m = self.configs[-1]["robot"]["tool_width_m"]
-        cells = np.floor(path.xy[:, ::-1] / cell_m).astype(np.int64)
-        apart = np.abs(np.diff(cells, axis=0)).sum(axis=1)
-        promise(bool((apart == 1).all()), f"path {about['revision']} is not connected: {about}")
-        shown = self._maps.get(about["map_stamp_ns"])
-        if shown is None or not len(cells):
-            return  # an update was the last to change that map
-        lattices = [self._lattice(shown, config) for config in list(self.configs)[-2:]]
-        if all(lattice is None for lattice in lattices):
-            return
-        known = [lattice for lattice in lattices if lattice is not None]
-        holds = any(_holds(lattice, cells) for lattice in known)
-        promise(holds, f"path {about['revision']} leaves the map it names: {about}, {shown}")
-        self.counts["paths judged on their map"] += 1
-
-    def _see_line(self, xy: np.ndarray[Any, Any], about: dict[str, Any], *, is_sure: bool) -> None:
-        """Judge a line over the floor: the robot touches nothing from its first point on."""
-        promise(bool(np.isfinite(xy).all()), f"path {about['revision']} leads nowhere")
-        shown = self._maps.get(about["map_stamp_ns"])
-        if shown is None or shown["rows"] * shown["cols"] > MOST_JUDGED_PIXELS or not is_sure:
-            return
-        reason = about["reason"]
-        walls = [_wall_on(shown, config, xy, reason) for config in list(self.configs)[-2:]]
-        holds = not all(walls)
-        promise(holds, f"path {about['revision']}: {walls[-1]}: {about}, {shown}")
-        self.counts["lines judged on their map"] += 1
-
-    def _lattice(self, shown: Event, config: Event) -> CoverageLattice | None:
-        """Return the lattice of a map by a configuration; None of one too large to judge."""
-        if shown["rows"] * shown["cols"] > MOST_JUDGED_PIXELS:
-            return None
-        key = (shown["stamp"], json.dumps(config, sort_keys=True))
-        if key not in self._lattices:
-            robot, free = config["robot"], config["map"]["free_at_most"]
-            footprint = Footprint(robot["tool_width_m"], robot["radius_m"], free)
-            grid = decode_occupancy_grid(raw_messages.occupancy_grid(shown, pixels_of(shown)))
-            self._lattices[key] = CoverageLattice.from_map(grid, footprint)
-            while len(self._lattices) > LATTICES_KEPT:
-                self._lattices.popitem(last=False)
-        return self._lattices[key]
-
-
-def _holds(lattice: CoverageLattice, cells: np.ndarray[Any, Any]) -> bool:
-    nothing = np.zeros(lattice.states.shape, bool)
-    return ReachableArea(lattice, nothing).drivable_prefix(cells.astype(np.int32)) == len(cells)
-
-
-def _wall_on(shown: Event, config: Event, xy: np.ndarray[Any, Any], reason: str) -> str:
-    """Return where a line, float64 (n, 2) [m], touches what the map does not show free; or ""."""
-    robot, free = config["robot"], config["map"]["free_at_most"]
-    grid = decode_occupancy_grid(raw_messages.occupancy_grid(shown, pixels_of(shown)))
-    discs = RobotDiscs(robot["radius_m"], robot["tool_width_m"], free)
-    geometry, parts = fine_geometry(grid.geometry, discs, floor_pixels(grid.cells.size))
-    blocked = blocked_pixels(grid, geometry, parts, free, (0, geometry.rows))
-    points = [map_to_raster(geometry, x, y) for x, y in xy.tolist()]
-    radius = robot["radius_m"] / geometry.resolution
-    return why_touching(blocked, points, radius, reason, parts)
 
 
 class Campaign:
@@ -236,7 +136,6 @@ class Campaign:
         self._period_s, self._due = 1.0 / pace_hz, time.monotonic()
         self._router, self._lives, self._sessions = ExitStack(), ExitStack(), ExitStack()
         self._daemon: Daemon
-        self._robot: Event = {}
         self._puts = 0
         self._recent: deque[str] = deque(maxlen=12)
         self._longest_ms = 0.0
@@ -275,8 +174,12 @@ class Campaign:
                 time.sleep(event["s"])
             case "checkpoint":
                 self._check(event["map"])
-            case "restart" | "reload" | "router" | "publisher" | "freeze" | "rival":
-                self._happen(name, event)
+            case "restart":
+                self._restart(event)
+            case "reload":
+                self._reload(event["sections"])
+            case "publisher":
+                self._another_mapper(stays=event["stays"])
             case "mask":
                 self._put_mask(event)
             case "command":
@@ -295,22 +198,6 @@ class Campaign:
         if self._puts % LOOK_EVERY == 0:
             self.look()
         return event
-
-    def _happen(self, name: str, event: Event) -> None:
-        """Do to processes and sessions what an event says."""
-        match name:
-            case "restart":
-                self._restart(event)
-            case "reload":
-                self._reload(event["sections"])
-            case "router":
-                self._restart_router(event["away_s"])
-            case "publisher":
-                self._another_mapper(stays=event["stays"])
-            case "freeze":
-                self._freeze(event["s"])
-            case "rival":
-                self._rival(event)
 
     def look(self) -> None:
         """Look at what came and was answered, and whether the daemon lives."""
@@ -332,7 +219,6 @@ class Campaign:
         match name:
             case "map":
                 payload = raw_messages.occupancy_grid(event, pixels_of(event))
-                self.judge.expect(event)
                 if event["topic"] == "map":
                     self._map.put(payload)
                     return
@@ -441,7 +327,6 @@ class Campaign:
     def _start(self, event: Event) -> None:
         sections = {name: dict(section) for name, section in event["sections"].items()}
         robot = {"tool_width_m": 0.3, "radius_m": 0.18} | sections.pop("robot", {})
-        self._robot = {key: robot[key] for key in ("tool_width_m", "radius_m")}
         mission = {"lost_pose_s": 3.0} | sections.pop("mission", {})
         mission["keep_out_topic"] = bool(event.get("masks"))
         maps = {"free_at_most": 25} | sections.pop("map", {})
@@ -462,8 +347,6 @@ class Campaign:
                 **sections,
             )
         )
-        self._line = sections.get("planner", {}).get("line", "cells")
-        self.judge.configs.append({"robot": self._robot, "map": maps, "line": self._line})
         self.judge.walk = np.empty((0, 2))
         self._longest_ms = 0.0
         self._wait("the daemon is there", lambda: self._asked_status() is not None)
@@ -504,51 +387,12 @@ class Campaign:
         self._another_mapper(stays=False)
         self._start({"mode": "client", "fresh": True, "sections": {}})
 
-    def _freeze(self, seconds: float) -> None:
-        """Stop the daemon's process for a while."""
-        self.look()
-        self._daemon.process.send_signal(signal.SIGSTOP)
-        time.sleep(seconds)
-        self._daemon.process.send_signal(signal.SIGCONT)
-        # The turn that was stopped is late, but not by the daemon.
-        self.loop["late"] -= 1
-
-    def _rival(self, event: Event) -> None:
-        """Let another daemon of this name come, take over from a frozen one if so, and go."""
-        folder = Path(tempfile.mkdtemp(dir=self._folder))
-        bus = {"mode": "client", "listen": [], "connect": [self._endpoint]}
-        settings = {"robot": self._robot, "map": self.judge.configs[-1]["map"]}
-        with daemon_process(folder, bus=bus, **settings, planner={"line": self._line}) as rival:
-            self._wait("the other one is there", lambda: "ready after" in rival.log_text())
-            time.sleep(event["s"])
-            if event["takes_over"]:
-                self._freeze(LEASE_S + 2.0)
-                time.sleep(event["s"])
-            if event["kill"]:
-                rival.kill()
-        self._wait("this one plans again", self._plans)
-
-    def _plans(self) -> bool:
-        status = self._asked_status()
-        return status is not None and status["claim"]["stand"] == "plans"
-
     def _reload(self, sections: Event) -> None:
         file = self._daemon.log.with_suffix(".yaml")
         before = yaml.safe_load(file.read_text())
         after = {**before, **{key: before.get(key, {}) | part for key, part in sections.items()}}
         file.write_text(yaml.safe_dump(after))
-        self.judge.look()
-        # What is driven stays as it was until a restart.
-        config = {"robot": self._robot, "map": after["map"], "line": self._line}
-        self.judge.configs.append(config)
         self._daemon.process.send_signal(signal.SIGHUP)
-
-    def _restart_router(self, away_s: float) -> None:
-        self._router.close()
-        time.sleep(away_s)
-        self._router = ExitStack()
-        self._router.enter_context(router_process(self._endpoint))
-        self._wait("everybody is back", lambda: self._asked_status() is not None)
 
     # What has to hold.
 

@@ -75,7 +75,6 @@ def test_the_rarest_calls_come_first_and_no_kind_is_left_out():
         "recorder:write:4:EIO",
         "recorder:write:9:ENOSPC",
         "recorder:folder:1:EIO",
-        "warmup:rename:2:ENOSPC",
     ],
 )
 def test_an_io_fault_is_reported_and_loses_nothing(fault):

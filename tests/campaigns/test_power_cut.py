@@ -97,6 +97,6 @@ def test_a_daemon_starts_after_some_cuts_of_a_mission(tmp_path):
     assert len(history) > 3
     assert contents(None) in history[1:], "the mission began anew by command"
     cuts = cuts_of(mission.root, mission.calls, 2, 0)
-    outcomes = list(power_cut.outcomes_of(power_cut.MISSION, mission, cuts, tmp_path, tmp_path))
+    outcomes = list(power_cut.outcomes_of(mission, cuts, tmp_path, tmp_path))
     assert len(outcomes) == 2
     assert not [outcome for outcome in outcomes if outcome.wrong]

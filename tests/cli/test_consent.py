@@ -73,14 +73,6 @@ def test_a_terminal_asks_and_only_yes_changes_anything(robot):
     outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
 
 
-def test_stop_needs_no_consent_and_says_how_to_continue(robot):
-    running, outsider = robot
-    stopped = mission(running, "stop")
-    assert stopped.code == 0
-    assert "`mission start --keep-covered` covers the rest" in stopped.err
-    assert covered(outsider) == 12
-
-
 def test_a_keep_out_in_mid_mission_loses_nothing(robot):
     running, outsider = robot
     added = mission(running, "keep-out", "add", "--name", "vase", VASE)

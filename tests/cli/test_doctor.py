@@ -173,13 +173,6 @@ def test_a_key_that_others_can_read_is_reported(doctor, ca, mode, level):
         assert told["secret files"]["to_do"] == f"chmod 600 {files['private_key']}"
 
 
-@needs_openssl
-def test_roles_without_names_are_a_warning(doctor, ca):
-    told, _ = doctor(**tls(ca.files("robot"), roles={"viewer": ["eye"]}))
-    assert told["roles"]["level"] == "warn"
-    assert told["roles"]["found"].startswith("no name has the role mapper or operator")
-
-
 def test_user_and_password(doctor, tmp_path, anywhere):
     own, dictionary = tmp_path / "own.txt", tmp_path / "all.txt"
     own.write_text("sesame\n")
@@ -209,15 +202,3 @@ def test_a_check_that_cannot_run_is_a_warning_with_a_hint():
 
     (_, (_, found)) = findings(None, (Check("state", look),))
     assert found == Finding(Level.WARN, "there is no home folder", "set one")
-
-
-def test_one_more_check_is_one_more_line():
-    seen = []
-
-    def look(patient):
-        seen.append(patient.config.robot.name)
-        return Finding(Level.WARN, "found", "do")
-
-    told = list(findings(None, (Check("more", look),)))
-    assert [name for name, _ in told] == ["configuration", "more"]
-    assert seen == ["robot"]

@@ -55,11 +55,6 @@ def signed(ring):
     return 0.5 * sum(a[0] * b[1] - b[0] * a[1] for a, b in pairwise(ring))
 
 
-def test_rooms_that_were_written_are_an_order_for_these_rooms():
-    order = read(rooms_collection(ROOMS))
-    assert [(zone.name, zone.room) for zone in order.zones] == [("ring", 1), ("room 2", 2)]
-
-
 def test_an_order_is_read_as_it_was_drawn():
     drawn = [square(name="kitchen", passes=["auto", "cross"]), square(keep_out=True), square()]
     order = read(collection(drawn) | {"return_home": True, "until_min": 40})

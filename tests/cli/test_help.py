@@ -125,13 +125,6 @@ def test_the_version_is_printed(capsys):
     assert capsys.readouterr().out == f"fasaco-edge {__version__}\n"
 
 
-def test_the_maps_are_listed_and_can_be_planned_on(capsys):
-    assert main(["maps"]) == 0
-    told = capsys.readouterr().out
-    for name in ("office", "flat", "basement", "warehouse"):
-        assert name in told
-
-
 @pytest.mark.parametrize(("module", "ends"), [("zenoh", False), ("json", True)])
 def test_after_a_session_of_zenoh_the_interpreter_does_not_end(module, ends):
     """Threads that a session left behind aborted the process then, now and then."""

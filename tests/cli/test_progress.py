@@ -196,13 +196,3 @@ def test_printed_text_appears_above_the_progress(tmp_path):
         assert during[:4] == told
         assert during[4].startswith("at work ━")
         assert len([line for line in during if "at work" in line]) == 1
-
-
-def test_output_redirected_to_a_file_goes_there(tmp_path):
-    script, out = tmp_path / "meanwhile.py", tmp_path / "out"
-    script.write_text(MEANWHILE)
-    command = ("sh", "-c", f'"$0" "$1" > "{out}"', sys.executable, str(script))
-    with Terminal(program=command, columns=120) as shell:
-        assert shell.end() == 0
-        assert out.read_text() == "begun in stdout\nno line end\n"
-        assert "stdout" not in shell.written

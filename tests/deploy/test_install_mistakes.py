@@ -52,69 +52,46 @@ def refused(robot: Robot, *words: str, code: int = 3) -> str:
     return done.stderr
 
 
-def apart(robot: Robot, first: str, *words: str) -> str:
-    """The same after a command that changes the mounts, for this one alone."""
+def apart(first: str, *words: str) -> tuple[str, ...]:
+    """Return an installation after a command that changes the mounts, for this one alone."""
     script = f'{first} && exec "$@"'
-    return refused(robot, "unshare", "--mount", "sh", "-c", script, "sh", INSTALL, *words)
+    return "unshare", "--mount", "sh", "-c", script, "sh", INSTALL, *words
 
 
-def test_words_it_does_not_know(robot):
-    assert "--wheel is not understood" in refused(robot, INSTALL, "--wheel", "/srv", code=2)
-    assert "--wheels needs a value" in refused(robot, INSTALL, "--wheels", code=2)
+NOBODY = ("setpriv", "--reuid=nobody", "--regid=nogroup", "--clear-groups", INSTALL)
+MAJA = "mkdir -p /home/maja && mount --bind /usr /home/maja"
 
 
-def test_another_than_root(robot):
-    words = ("setpriv", "--reuid=nobody", "--regid=nogroup", "--clear-groups", INSTALL)
-    assert "only root may" in refused(robot, *words)
-
-
-def test_an_installation_without_python_is_refused(robot):
-    assert "there is no /usr/bin/python3" in apart(robot, f"{HIDE} $(readlink -f /usr/bin/python3)")
-
-
-def test_a_python_that_a_service_cannot_reach_is_refused(robot):
-    robot.run("mkdir", "-p", "/home/maja")
-    words = "mount --bind /usr /home/maja"
-    told = apart(robot, words, "--python", "/home/maja/bin/python3")
-    assert "/home/maja" in told
-    assert "a service cannot reach" in told
-
-
-def test_an_installation_without_systemd_is_refused(robot):
-    assert "there is no systemd here" in apart(robot, f"{HIDE} /usr/bin/systemctl")
-
-
-def test_a_systemd_that_does_not_run_is_refused(robot):
-    told = apart(robot, "mount -t tmpfs nothing /run/systemd")
-    assert "installed but does not run" in told
-    assert "--no-start" in told
-
-
-def test_an_installation_without_wheels_is_refused(robot):
-    told = refused(robot, INSTALL, "--wheels", "/etc")
-    assert "/etc is no folder of wheels" in told
-    assert "make wheelhouse" in told
-
-
-def test_wheels_for_another_computer_are_refused(robot):
-    told = refused(robot, f"/srv/{ELSEWHERE}/install.sh")
-    assert "these wheels are for riscv64" in told
-    assert "Python 3.99" in refused(robot, f"/srv/{NEWER}/install.sh")
-
-
-def test_a_wheel_that_was_damaged_on_the_way(robot):
-    told = refused(robot, f"/srv/{DAMAGED}/install.sh", code=1)
-    assert "HASHES" in told
-    assert "copy the release folder again" in told
-
-
-def test_a_disk_without_room(robot):
-    told = apart(robot, "mount -t tmpfs -o size=16m small /opt")
-    assert " has 17 MB free, this version needs " in told
-
-
-def test_no_version_to_go_back_to(robot):
-    assert "there is no version before" in refused(robot, INSTALL, "--rollback")
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        ((INSTALL, "--wheel", "/srv"), 2, ["--wheel is not understood"]),
+        ((INSTALL, "--wheels"), 2, ["--wheels needs a value"]),
+        (NOBODY, 3, ["only root may"]),
+        (apart(f"{HIDE} $(readlink -f /usr/bin/python3)"), 3, ["there is no /usr/bin/python3"]),
+        (
+            apart(MAJA, "--python", "/home/maja/bin/python3"),
+            3,
+            ["/home/maja", "a service cannot reach"],
+        ),
+        (apart(f"{HIDE} /usr/bin/systemctl"), 3, ["there is no systemd here"]),
+        (
+            apart("mount -t tmpfs nothing /run/systemd"),
+            3,
+            ["installed but does not run", "--no-start"],
+        ),
+        ((INSTALL, "--wheels", "/etc"), 3, ["/etc is no folder of wheels", "make wheelhouse"]),
+        ((f"/srv/{ELSEWHERE}/install.sh",), 3, ["these wheels are for riscv64"]),
+        ((f"/srv/{NEWER}/install.sh",), 3, ["Python 3.99"]),
+        ((f"/srv/{DAMAGED}/install.sh",), 1, ["HASHES", "copy the release folder again"]),
+        (apart("mount -t tmpfs -o size=16m small /opt"), 3, ["17 MB free, this version needs "]),
+        ((INSTALL, "--rollback"), 3, ["there is no version before"]),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else "",
+)
+def test_a_mistake_is_refused_with_a_hint(robot, words, code, said):
+    told = refused(robot, *words, code=code)
+    assert [part for part in said if part not in told] == []
 
 
 def test_two_at_once(robot):

@@ -8,7 +8,7 @@ from fasaco_edge.mission.events import MapReceived, State
 from tests.mission.line_robot import LineRobot
 from tests.mission.test_other_building import FLOOR, HERE, NEW, OLD, stand, swept
 from tests.mission.test_reached_cells import START, two_rooms
-from tests.mission.world import Drive, building, patch
+from tests.mission.world import Drive, building
 
 BLANK = {letter: MapReceived(building(*(letter * 14,) * 12)) for letter in "#?"}
 WAITS = "waits for a map or a pose that puts it on free ground"
@@ -31,15 +31,6 @@ def test_order_and_ledger_survive_a_map_without_floor(letter, seconds):
     assert covered <= drive.visited
     drive.finish()
     assert drive.mission.coverage().remaining == 0
-
-
-def test_a_map_without_floor_that_comes_in_parts_is_survived_too():
-    drive = swept(*FLOOR, ticks=60)
-    covered = drive.visited
-    assert stand(drive, 10.0, patch(*("#" * 14,) * 12)) == []
-    assert drive.mission.reason.endswith(WAITS)
-    assert stand(drive, 8.0, patch(*FLOOR)) == []
-    assert covered <= drive.visited
 
 
 @NOTHING

@@ -125,58 +125,6 @@ def test_a_fast_discharge_is_accepted():
     assert gauge.level == pytest.approx(0.76)
 
 
-def test_a_silent_battery_is_reported_and_does_not_stop_the_way():
-    drive = Battery(0.8)
-    drive.run(State.COVERING)
-    drive.level = None
-    drive.tell(pose_at(*drive.cell), after=61.0)
-    assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason == "no battery level for 45 s: when to charge is not known"
-    drive.finish()
-
-
-def test_a_battery_that_never_reports_is_a_trouble():
-    drive = Battery(None)
-    drive.plan()
-    drive.tell(pose_at(0, 0), after=61.0)
-    assert drive.mission.state is State.DEGRADED
-
-
-def test_a_charge_that_jumps_to_and_fro_is_a_trouble():
-    drive = Battery(0.3)
-    drive.run(State.COVERING)
-    assert drive.mission.charging.gauge.level is None
-    for second in range(70):
-        drive.level = 0.9 if second % 2 else 0.1
-        drive.tell(pose_at(*drive.cell))
-    assert drive.mission.charging.gauge.level is None
-    assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason.startswith("no battery level for 45 s, it jumps to and fro")
-    # Once it holds it counts.
-    drive.level = 0.1
-    drive.run(State.CHARGING)
-
-
-def test_silent_while_it_charges_it_stays_where_it_is():
-    drive = Battery(0.15)
-    drive.run(State.CHARGING)
-    drive.level = None
-    drive.tell(pose_at(*drive.cell), after=100.0)
-    assert drive.mission.state is State.CHARGING
-    assert drive.mission.reason == "no battery level for 45 s: waits for one"
-    drive.level = 0.95
-    for _ in range(8):
-        drive.go()
-    drive.finish()
-
-
-def test_an_unknown_charge_keeps_the_last_level():
-    drive = Battery(0.8)
-    for _ in range(100):
-        drive.tell(pose_at(0, 0), BatteryReceived(None), after=1.0)
-    assert drive.mission.charging.gauge.level == 0.8
-
-
 def test_a_full_battery_is_enough_whatever_its_gauge_says():
     drive = Battery(0.15)
     drive.run(State.CHARGING)
@@ -259,64 +207,6 @@ def test_without_an_order_it_charges_only_below_its_level():
     drive.run(State.CHARGING)
     drive.charge(to=0.95)
     assert (drive.mission.state, drive.mission.reason) == (State.IDLE, NO_ORDER)
-
-
-def test_cancelled_on_the_way_it_stays_where_it_stands():
-    drive = Battery(0.15)
-    drive.run(State.RETURNING)
-    decision = drive.command("cancel")
-    assert len(decision.path.cells) == 0
-    for _ in range(20):
-        drive.go()
-    assert (drive.mission.state, drive.walk) == (State.IDLE, [])
-    drive.command("home")
-    drive.run(State.IDLE)
-    assert drive.cell == AT_DOCK
-
-
-def test_a_resumed_robot_continues_to_charge():
-    drive = Battery(0.15)
-    drive.run(State.CHARGING)
-    drive.command("pause")
-    assert drive.mission.state is State.PAUSED
-    drive.command("resume")
-    drive.run(State.CHARGING)
-    drive.command("pause")
-    drive.level, drive.power = 0.95, "charging"
-    for _ in range(8):
-        drive.go()
-    assert drive.mission.state is State.PAUSED
-    drive.command("resume")
-    drive.finish()
-
-
-def test_another_order_waits_until_it_is_charged():
-    drive = Battery(0.21)
-    drive.run(State.COVERING)
-    drive.level = 0.2
-    drive.run(State.CHARGING)
-    drive.charge(to=0.5)
-    drive.command("start", {"passes": 2})
-    assert (drive.refused, drive.mission.state, drive.walk) == (None, State.CHARGING, [])
-    drive.go()
-    assert (drive.cell, drive.mission.state) == (AT_DOCK, State.CHARGING)
-    drive.charge(to=0.95)
-    drive.run(State.COVERING)
-    assert drive.mission.order_state.title.endswith("pass 1 of 2")
-    drive.finish()
-
-
-def test_started_again_while_it_charges_it_stays_in_its_dock():
-    drive = Battery(0.15)
-    drive.run(State.CHARGING)
-    note = drive.mission.snapshot().note
-    again = Battery(None, drive.cell, OrderState.from_json(note))
-    assert again.mission.state is State.CHARGING
-    assert again.mission.reason == "waits for the level of the battery"
-    again.level = 0.95
-    for _ in range(8):
-        again.go()
-    again.finish()
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,10 @@
 import pytest
 
 from fasaco_edge.daemon.loop.mission_reports import zone_progress
-from fasaco_edge.errors import CommandError, OrderError
-from fasaco_edge.grid.geometry import Pose2D, StampedPose
-from fasaco_edge.mission.events import MapReceived, PoseReceived, State
+from fasaco_edge.errors import OrderError
+from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
-    CONFIG,
     Drive,
     answer,
     building,
@@ -141,42 +139,6 @@ def test_cells_behind_a_keep_out_are_not_blamed_on_obstacles():
     assert found == {("in a keep-out zone", 2), ("closed off by a keep-out zone", 6)}
 
 
-def test_a_keep_out_zone_across_the_path_cuts_it_off_at_once():
-    drive = started("..........")
-    drive.go()
-    decision = drive.command("start", {"keep_out": [rectangle(0, 6, 1, 7)]})
-    assert decision.path.cells.tolist()[-1] == [0, 5]
-    follow(drive)
-    assert drive.driven[-1] == (0, 5)
-
-
-def test_a_robot_in_a_keep_out_zone_waits_to_be_let_out():
-    drive = idle(*ROOM, cell=(2, 2))
-    drive.command("start", {"keep_out": [rectangle(1, 1, 4, 4)]})
-    assert drive.mission.state is State.BLOCKED
-    assert drive.mission.reason.startswith("robot is in a keep-out zone: waits to be driven out")
-    drive.cell = (0, 0)
-    drive.tell(pose_at(0, 0))
-    follow(drive)
-    drive.command("start", {"keep_out": [rectangle(0, 0, 6, 8)]})
-    assert drive.mission.state is State.BLOCKED
-    drive.command("cancel")
-    assert drive.mission.state is State.IDLE
-    drive.command("start")
-    follow(drive)
-
-
-def test_home_is_where_the_mission_began():
-    drive = idle(*ROOM, cell=(3, 3))
-    drive.command("start", TWO_ZONES | {"return_home": True})
-    states = follow(drive)
-    assert drive.cell == (3, 3)
-    assert states[-1] is State.DONE
-    assert drive.mission.order_state.home == (3, 3)
-    assert cells(0, 6, 6, 8) | cells(0, 0, 6, 2) <= drive.visited
-    assert drive.mission.reason == "every reachable cell of the zones is covered"
-
-
 def test_a_walk_home_is_part_of_the_last_plan():
     drive = idle("....", "....", cell=(0, 0))
     drive.command("start", {"return_home": True})
@@ -184,40 +146,6 @@ def test_a_walk_home_is_part_of_the_last_plan():
     follow(drive)
     # A closed walk over two rows visits each cell once.
     assert len(drive.driven) == 9
-
-
-def test_a_way_home_that_is_closed_is_waited_for():
-    drive = idle("..........", cell=(0, 0))
-    zone = {"name": "end", "polygon": rectangle(0, 8, 1, 10)}
-    drive.command("start", {"zones": [zone], "return_home": True})
-    drive.plan()
-    while drive.cell != (0, 9):
-        drive.go()
-    drive.tell(patch("#", at=(0, 4)))
-    for _ in range(10):
-        drive.go()
-        if drive.request is not None:
-            drive.plan()
-    assert drive.mission.state is State.BLOCKED
-    assert drive.mission.reason == "no way home: waits for a map that shows one"
-    drive.tell(patch(".", at=(0, 4)))
-    assert State.RETURNING in follow(drive)
-    assert drive.cell == (0, 0)
-
-
-def test_a_robot_carried_off_on_its_way_home_finds_another():
-    drive = idle(*ROOM, cell=(0, 0))
-    zone = {"name": "far", "polygon": rectangle(5, 7, 6, 8)}
-    drive.command("start", {"zones": [zone], "return_home": True})
-    drive.plan()
-    while (5, 7) not in drive.visited:
-        drive.go()
-    drive.go()
-    drive.cell = (0, 7)
-    drive.tell(pose_at(0, 7), after=2.0)
-    drive.tell(pose_at(0, 7), after=2.0)
-    follow(drive)
-    assert drive.cell == (0, 0)
 
 
 def test_paused_it_stands_and_still_counts_what_it_passes_over():
@@ -255,18 +183,6 @@ def test_resume_without_a_change_keeps_the_path():
     drive.finish()
 
 
-def test_a_robot_that_rolls_on_after_pause_resumes_from_there():
-    drive = started(*ROOM)
-    for _ in range(5):
-        drive.go()
-    ahead = drive.walk[:]
-    drive.command("pause")
-    drive.cell = ahead[0]
-    drive.tell(pose_at(*drive.cell))
-    assert drive.command("resume").plan is None
-    assert drive.walk == ahead[1:]
-
-
 def test_resume_repairs_the_path_where_the_map_changed():
     drive = started(*ROOM)
     for _ in range(5):
@@ -297,15 +213,6 @@ def test_another_order_after_a_pause_is_planned_from_nothing():
     drive.command("cancel")
     plan = drive.command("start").plan
     assert plan.problem.before is None or not len(plan.problem.before)
-
-
-def test_paused_while_planning_the_plan_comes_too_late():
-    drive = Drive((0, 0), MapReceived(building(*ROOM)), pose_at(0, 0))
-    drive.command("pause")
-    assert drive.plan().path is None
-    assert drive.mission.state is State.PAUSED
-    drive.command("resume")
-    drive.finish()
 
 
 def test_a_plan_for_the_order_before_is_not_driven():
@@ -369,15 +276,6 @@ def test_a_zone_beyond_the_map_is_refused_and_changes_nothing():
     drive.finish()
 
 
-def test_a_command_that_makes_no_sense_is_refused():
-    drive = idle(*ROOM)
-    for name in ("pause", "resume"):
-        drive.command(name)
-        assert isinstance(drive.refused, CommandError)
-    drive.command("cancel")
-    assert drive.refused is None
-
-
 def test_a_started_mission_stays_done_when_the_map_changes():
     drive = idle(*ROOM[:2])
     drive.command("start")
@@ -421,59 +319,6 @@ def test_order_zone_pass_and_home_outlive_the_daemon(driven):
     assert again.cell == (3, 4)
     # Each cell twice in all, but what was covered in the pass is not covered again.
     assert len(first.driven) + len(again.driven) < 2 * 12 + 30
-
-
-def test_paused_cancelled_and_done_outlive_the_daemon():
-    drive = started(*ROOM)
-    drive.command("pause")
-    again = resumed(drive, drive.cell, *ROOM)
-    assert again.mission.state is State.PAUSED
-    assert again.command("resume").plan is not None
-    again.command("cancel")
-    assert resumed(again, drive.cell, *ROOM).mission.state is State.IDLE
-    done = idle("..")
-    done.command("start")
-    follow(done)
-    assert resumed(done, (0, 1), *ROOM).mission.state is State.DONE
-
-
-def test_an_order_for_another_building_is_dropped():
-    hall = ("##############", *("#............#",) * 10, "##############")
-    pillars = (*("#.##.##.##.#.#", "#............#", "#.##.##.##.#.#") * 4,)
-    drive = idle(*hall, cell=(1, 1))
-    drive.command("start", {"zones": [{"name": "all", "polygon": rectangle(1, 1, 11, 13)}]})
-    follow(drive)
-    drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 1, 3, 4)}]})
-    again = resumed(drive, (1, 1), *pillars)
-    assert again.mission.state is State.IDLE
-    assert "of another building than the map: the order was dropped" in again.mission.reason
-
-
-def test_a_pose_between_cells_counts_for_its_cell():
-    """Standing beside home is not being there."""
-    drive = idle("....", cell=(0, 0))
-    zone = {"name": "end", "polygon": rectangle(0, 3, 1, 4)}
-    drive.command("start", {"zones": [zone], "return_home": True})
-    drive.plan()
-    for _ in range(5):
-        drive.go()
-    drive.tell(PoseReceived(StampedPose(Pose2D(0.26, 0.12))))
-    assert drive.mission.state is not State.DONE
-    drive.tell(PoseReceived(StampedPose(Pose2D(0.24, 0.12))))
-    drive.tell(after=2.0)
-    assert drive.mission.state is State.DONE
-    assert CONFIG.policy.retries == 0
-
-
-def test_keep_out_zones_outlive_the_daemon():
-    drive = idle(*ROOM)
-    drive.command("start", {"keep_out": [rectangle(1, 3, 4, 5)]})
-    for _ in range(3):
-        drive.plan() if drive.request else None
-        drive.go()
-    again = resumed(drive, drive.cell, *ROOM)
-    follow(again)
-    assert not set(again.driven) & cells(1, 3, 4, 5)
 
 
 def test_how_far_each_zone_is():
@@ -540,15 +385,3 @@ def test_an_unseen_zone_is_searched_for():
     assert cells(0, 7, 3, 9) <= drive.visited
     assert drive.mission.orders.uncovered.found().areas == ()
     assert not drive.visited & {(3, 0), (4, 0), (4, 1)}, "the rest of the house was not asked for"
-
-
-def test_a_zone_without_a_way_to_it_is_given_up_once_all_is_seen():
-    mapper = Mapper(*(line.replace("#..#", "####", 1) for line in HOUSE))
-    drive = Drive((0, 0), mapper.event((0, 0)), pose_at(0, 0), order_state=OrderState.idle("none"))
-    drive.command("start", {"zones": [{"name": "a", "polygon": rectangle(1, 7, 2, 9)}]})
-    mapper.rows = tuple(line[:6] + "######" for line in HOUSE)
-    explore(drive, mapper)
-    assert [area.reason for area in drive.mission.orders.uncovered.found().areas] in (
-        [],
-        ["unknown to the map"],
-    )

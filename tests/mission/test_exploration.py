@@ -144,15 +144,6 @@ def test_walls_that_come_and_go_never_lead_to_an_illegal_step(seed, pace):
     assert drive.visited == set(np.ndindex(6, 7))
 
 
-def test_an_unreachable_zone_is_named_at_the_end():
-    drive = Drive((0, 0), order_state=OrderState.idle("no order yet"))
-    drive.tell(MapReceived(building("....#....")), pose_at(0, 0))
-    drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(0, 6, 1, 8)}]})
-    drive.finish()
-    ending = "every reachable cell of the zones is covered; not reached: 'z' (0.1 m2)"
-    assert drive.mission.reason == ending
-
-
 @pytest.mark.parametrize(
     ("wall", "col0", "col1", "area"),
     [

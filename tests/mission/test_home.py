@@ -8,7 +8,6 @@ from msgspec import structs
 
 from fasaco_edge.mission.config import Dock, Place
 from fasaco_edge.mission.events import MapReceived, State
-from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CELL,
@@ -17,12 +16,10 @@ from tests.mission.world import (
     building,
     patch,
     pose_at,
-    rectangle,
     with_policy,
 )
 
 ROOM = ("........",) * 6
-FAR = rectangle(4, 5, 6, 8)
 HOME = Place(x_m=0.5 * CELL, y_m=5.5 * CELL, yaw_deg=90.0)
 # Its robot stands in the dock at (5, 6), and before it at (5, 4).
 DOCK = Dock(x_m=6.5 * CELL, y_m=5.5 * CELL, approach_m=2 * CELL)
@@ -107,48 +104,6 @@ def test_the_way_home_ends_with_the_heading_of_that_place():
     assert drive.command("home").path.end_yaw is None
 
 
-def test_resumed_on_the_way_it_drives_on_home():
-    drive = covering(20)
-    drive.command("home")
-    drive.go()
-    assert drive.command("resume").path is None
-    arrive(drive)
-    assert (drive.cell, drive.mission.reason) == ((0, 0), "at home, paused by command")
-
-
-def test_an_equal_order_on_the_way_home_continues_at_once():
-    drive = covering(20)
-    drive.command("home")
-    drive.go()
-    decision = drive.command("start", discard=False)
-    assert len(decision.path.cells) == 0
-    assert decision.plan.reason == "goes on"
-    drive.finish()
-
-
-def test_a_second_command_home_changes_nothing():
-    drive = covering()
-    revision = drive.command("home").path.revision
-    assert drive.command("home").path is None
-    arrive(drive)
-    drive.command("home")
-    arrive(drive)
-    assert drive.mission.state is State.PAUSED
-    assert drive.mission.route.revision <= revision + 3
-
-
-def test_cancel_on_the_way_stops_and_still_allows_going_home():
-    drive = covering(20)
-    drive.command("home")
-    decision = drive.command("cancel")
-    assert len(decision.path.cells) == 0
-    assert (drive.mission.state, drive.mission.reason) == (State.IDLE, "cancelled")
-    drive.command("home")
-    arrive(drive)
-    assert (drive.cell, drive.mission.state) == ((0, 0), State.IDLE)
-    assert drive.mission.reason == "at home"
-
-
 def test_paused_on_the_way_home_it_stops_and_resumed_drives_home():
     drive = covering(20)
     drive.command("home")
@@ -166,48 +121,6 @@ def test_paused_on_the_way_home_it_stops_and_resumed_drives_home():
     drive.finish()
 
 
-def test_a_paused_way_home_continues_after_a_restart():
-    drive = covering(20)
-    drive.command("home")
-    drive.go()
-    drive.command("pause")
-    again = robot(drive.cell, OrderState.from_json(drive.mission.snapshot().note))
-    assert again.mission.state is State.PAUSED
-    again.command("resume")
-    arrive(again)
-    assert (again.cell, again.mission.reason) == ((0, 0), "at home, paused by command")
-
-
-def test_paused_on_the_way_home_of_an_order_it_drives_home():
-    drive = robot((3, 3), OrderState.idle("no order yet"), home=HOME)
-    at_home = KeepOut("home", tuple(map(tuple, rectangle(4, 0, 6, 2))))
-    drive.command("keep_out_add", keep_out=at_home)
-    drive.command("start", {"zones": [{"name": "far", "polygon": FAR}], "return_home": True})
-    for _ in range(30):
-        drive.plan() if drive.request else None
-        drive.go()
-    assert drive.mission.reason == "no way home: waits for a map that shows one"
-    drive.command("keep_out_remove", keep_out=at_home)
-    drive.go()
-    assert drive.mission.state is State.RETURNING
-    assert len(drive.command("pause").path.cells) == 0
-    drive.command("resume")
-    assert drive.mission.state is State.RETURNING
-    drive.finish()
-    assert drive.cell == (5, 0)
-
-
-def test_home_stays_where_the_first_order_began():
-    drive = covering(20)
-    assert drive.cell != (0, 0)
-    drive.command("cancel")
-    drive.command("start", {"keep_covered": True})
-    drive.plan()
-    drive.command("home")
-    arrive(drive)
-    assert drive.cell == (0, 0)
-
-
 def test_after_a_reset_home_is_where_the_next_order_begins():
     drive = covering(20)
     began = drive.cell
@@ -219,17 +132,6 @@ def test_after_a_reset_home_is_where_the_next_order_begins():
     drive.command("home")
     arrive(drive)
     assert drive.cell == began != (0, 0)
-
-
-def test_without_an_order_resume_continues_the_drive_home():
-    drive = robot((0, 7), OrderState.idle("no order yet"), home=HOME)
-    drive.command("home")
-    drive.go()
-    drive.command("pause")
-    assert drive.mission.state is State.PAUSED
-    drive.command("resume")
-    arrive(drive)
-    assert (drive.cell, drive.mission.reason) == ((5, 0), "at home")
 
 
 def test_without_a_home_the_command_is_refused():

@@ -89,17 +89,6 @@ def test_a_robot_at_a_keep_out_border_stops_and_is_led_out():
     assert (row, col) not in drive.driven[4:]
 
 
-def test_cells_of_a_removed_keep_out_are_covered():
-    drive = started(*ROOM)
-    add(drive, VASE)
-    for _ in range(10):
-        drive.plan() if drive.request else None
-        drive.go()
-    remove(drive, "vase")
-    drive.finish()
-    assert drive.visited == ALL
-
-
 def test_it_holds_under_every_order_until_it_is_removed():
     drive = Drive(
         (0, 0),
@@ -141,14 +130,6 @@ def test_without_one_the_note_is_as_older_daemons_read_it():
     assert drive.mission.snapshot().note != before
     remove(drive, "vase")
     assert drive.mission.snapshot().note == before
-
-
-def test_before_there_is_a_map():
-    drive = Drive((0, 0))
-    add(drive, VASE)
-    drive.tell(MapReceived(building(*ROOM)), pose_at(0, 0))
-    drive.finish()
-    assert drive.visited == ALL - inside(1, 3, 4, 5)
 
 
 def test_paused_and_sent_home_it_stays_so():

@@ -202,22 +202,6 @@ def test_cells_align_with_the_walls_once_and_keep_swept_floor():
     assert figures.illegal_share == 0.0
 
 
-def test_other_cells_keep_what_was_covered_before_a_restart():
-    grid = askew_building()
-    robot = Robot(Mission(AUTO), at=rotated_point(*START, DEG))
-    near = MapReceived(seen_around(grid, robot.at, 1.2))
-    robot.tell(near)
-    robot.drive(20)
-    kept = robot.mission.snapshot()
-    again = Robot(Mission(AUTO), at=robot.at)
-    again.mission.restore(kept, OrderState.from_json(kept.note))
-    again.tell(near)
-    again.tell(MapReceived(grid))
-    again.drive(15)
-    assert again.mission.rotation.deg == pytest.approx(DEG, abs=1.0)
-    assert again.mission.ledger.snapshot().cells > again.mission.covered.before.cells > 5
-
-
 def test_a_map_too_small_for_askew_cells_has_them_along_its_axes():
     """A lattice askew over a map spans more cells than one along its axes."""
     grid = turned(room(5.0, 4.0), DEG)

@@ -368,16 +368,6 @@ def test_unreachable_floor_follows_map_growth_and_zone_orders():
     assert floor_report(robot.mission).out_of_reach == floor_report(last.mission).out_of_reach
 
 
-def test_the_same_events_give_the_same_line():
-    trails = []
-    for _ in range(2):
-        robot = Robot(Mission(CONFIG))
-        robot.tell(MapReceived(room(2.4, 1.8)))
-        robot.finish()
-        trails.append(robot.trail)
-    assert trails[0] == trails[1]
-
-
 @pytest.mark.parametrize("chunk", [64, 1])
 def test_maps_that_grow_and_change_on_the_way(chunk, monkeypatch):
     """In small chunks of pixels the floor's raster moves with most of them."""
@@ -461,20 +451,6 @@ def test_a_new_obstacle_is_driven_round_at_once():
         robot.tell()
     assert_clear(robot, blocked, 2.4)
     robot.finish()
-
-
-def test_a_line_keeps_clear_of_a_keep_out_zone():
-    grid = room(3.0, 2.4)
-    zone = [[3.6, 1.8], [4.4, 1.8], [4.4, 2.6], [3.6, 2.6]]
-    order = read_order({"keep_out": [zone]})
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid), CommandReceived(1, "start", order))
-    robot.finish()
-    trail = np.array(robot.trail)
-    off = np.maximum(np.maximum(3.6 - trail[:, 0], trail[:, 0] - 4.4), 0.0)
-    up = np.maximum(np.maximum(1.8 - trail[:, 1], trail[:, 1] - 2.6), 0.0)
-    assert np.hypot(off, up).min() >= RADIUS_M - 1e-3
-    assert judge_floor(grid, trail, ROBOT).figures.swept_share > 0.6
 
 
 def test_a_plan_continues_from_the_cell_nearest_to_the_robot():
@@ -618,33 +594,6 @@ def test_on_its_way_home_it_sweeps_nothing_beside_it():
     robot.finish()
 
 
-def test_a_second_pass_sweeps_again():
-    grid = room(2.0, 1.6)
-    zone = [[1.9, 0.9], [4.1, 0.9], [4.1, 2.7], [1.9, 2.7]]
-    order = read_order({"zones": [{"name": "all", "polygon": zone, "passes": 2}]})
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid), CommandReceived(1, "start", order))
-    robot.finish()
-    once = Robot(Mission(CONFIG))
-    once.tell(MapReceived(grid))
-    once.finish()
-    assert len(robot.trail) > 1.6 * len(once.trail)
-
-
-def test_a_robot_that_was_carried_away_gets_a_line_from_there():
-    grid = room(3.6, 3.0)
-    robot = Robot(Mission(CONFIG))
-    robot.tell(MapReceived(grid))
-    robot.drive(10)
-    robot.at = (5.0, 3.5)
-    for _ in range(8):
-        robot.now += 0.3
-        robot.tell()
-    assert math.dist(robot.line[0], robot.at) < 0.3
-    robot.finish()
-    assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.9
-
-
 @pytest.mark.parametrize(
     "other",
     [lambda grid: shifted(grid, 0.012), lambda grid: part_of(grid, 0, 0, 40, 50)],
@@ -746,20 +695,6 @@ def test_a_changed_line_is_published_when_the_robot_is_near():
             near = ahead.xy()[1:][ahead.lengths()[1:] < 1.0]
             assert np.isin(near, np.array([robot.at, *robot.line])).all()
     assert robot.reasons.count("line polished") < driven_m / 3.0
-
-
-@pytest.mark.parametrize("yaw", [0.0, 0.5])
-def test_a_map_on_another_raster_loses_only_the_polish(yaw):
-    grid = room(3.0, 2.4, yaw)
-    robot = Robot(Mission(CONFIG))
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    robot.at = (2.6 * cos - 1.6 * sin, 2.6 * sin + 1.6 * cos)
-    robot.tell(MapReceived(grid))
-    robot.drive(20)
-    robot.tell(MapReceived(shifted(grid, 0.012)))
-    check_tally(robot.mission)
-    robot.finish()
-    assert judge_floor(grid, np.array(robot.trail), ROBOT).figures.swept_share > 0.95
 
 
 @pytest.mark.parametrize("poses_a_step", [1, 32])

@@ -69,31 +69,42 @@ def test_a_lane_too_narrow_for_the_robot_is_not_driven():
     assert not robot.line
 
 
-def test_a_free_lane_as_wide_as_the_robot_is_driven():
+def lane():
+    """A lane that is as wide as the robot."""
     free = np.zeros((40, 80), np.bool_)
     free[16:24, 4:76] = True
-    figures, _ = finish(grid_of(free), (2.0, 1.0))
-    assert figures.swept_share > 0.9
-    assert figures.illegal_share == 0.0
+    return free
 
 
-def test_a_building_with_no_straight_wall():
+def round_hall():
+    """A building with no straight wall."""
     y, x = np.mgrid[:90, :110]
     angle = np.arctan2(y - 45, x - 55)
     free = np.hypot(y - 45, x - 55) < 32 + 6 * np.sin(3 * angle + 1)
-    free &= np.hypot(y - 50, x - 60) > 8
-    figures, _ = finish(grid_of(free), (1.9, 2.2))
-    assert figures.swept_share > 0.95
-    assert figures.illegal_share == 0.0
+    return free & (np.hypot(y - 50, x - 60) > 8)
 
 
-def test_walls_of_single_pixels_are_not_driven_through():
+def thin_walls():
+    """Walls of single pixels."""
     free = np.zeros((66, 90), np.bool_)
     free[1:-1, 1:-1] = True
     free[1:50, 30] = free[20:-1, 60] = False
     free[40, 70] = False
-    figures, mission = finish(grid_of(free), (0.8, 0.8))
-    assert figures.swept_share > 0.95
+    return free
+
+
+@pytest.mark.parametrize(
+    ("free", "at", "swept"),
+    [
+        (lane(), (2.0, 1.0), 0.9),
+        (round_hall(), (1.9, 2.2), 0.95),
+        (thin_walls(), (0.8, 0.8), 0.95),
+    ],
+    ids=["a free lane as wide as the robot", "no straight wall", "walls of single pixels"],
+)
+def test_an_odd_building_is_swept_and_no_wall_is_touched(free, at, swept):
+    figures, mission = finish(grid_of(free), at)
+    assert figures.swept_share > swept
     assert figures.illegal_share == 0.0
     assert "every reachable cell" in mission.reason
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.errors import CommandError, OrderError
+from fasaco_edge.errors import OrderError
 from fasaco_edge.mission.orders.commands import command_document, read_command, read_recorded
 from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.order import (
@@ -314,41 +314,3 @@ def test_a_cancelled_order_is_kept_until_another_or_another_place():
     assert dropped.commanded(Command("reset")).last is None
     assert dropped.in_other_building("elsewhere").last is None
     assert OrderState.autostart().commanded(Command("cancel")).last is None
-
-
-def test_commands_may_come_twice():
-    running = OrderState(TWO, zone=1)
-    assert running.commanded(Command("start", TWO)) == running
-    paused = running.commanded(Command("pause", TWO))
-    assert paused.paused
-    assert paused.commanded(Command("pause", TWO)) == paused
-    assert (
-        paused.commanded(Command("start", TWO))
-        == paused.commanded(Command("resume", TWO))
-        == running
-    )
-    assert running.commanded(Command("resume", TWO)) == running
-    idle = running.commanded(Command("cancel", TWO))
-    assert idle.order is None
-    assert idle.commanded(Command("cancel", TWO)) == idle
-    # The one that began by itself is the same as one for everything.
-    assert (
-        OrderState.autostart().commanded(Command("start", EVERYTHING_ONCE))
-        == OrderState.autostart()
-    )
-
-
-def test_a_new_order_replaces_the_old_a_finished_one_restarts():
-    running = OrderState(TWO, zone=1)
-    assert running.commanded(Command("start", EVERYTHING_ONCE)) == OrderState(EVERYTHING_ONCE)
-    over = OrderState(TWO, zone=1, stage=Stage.OVER)
-    assert over.commanded(Command("start", TWO)) == OrderState(TWO)
-
-
-@pytest.mark.parametrize("command", ["pause", "resume"])
-@pytest.mark.parametrize(
-    "order_state", [OrderState.idle("cancelled"), OrderState(TWO, stage=Stage.OVER)]
-)
-def test_there_has_to_be_a_mission_to_pause(command, order_state):
-    with pytest.raises(CommandError, match=f"there is no mission to {command}"):
-        order_state.commanded(Command(command))

@@ -117,13 +117,6 @@ def test_an_edge_grows_with_the_map():
     assert len(lap)
 
 
-def test_passes_survive_a_restart():
-    drive = idle(*HALL)
-    drive.command("start", {"passes": ["edge", {"angle_deg": 20.0, "speed_m_s": 0.1}]})
-    state = drive.mission.order_state
-    assert OrderState.from_json(state.to_json()).order == state.order
-
-
 def test_robots_of_a_fleet_have_no_cells_of_their_own():
     drive = Drive(
         (0, 0),

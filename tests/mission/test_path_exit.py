@@ -3,7 +3,7 @@
 import pytest
 
 from fasaco_edge.mission.core.path_exit import PathExit
-from fasaco_edge.mission.events import MapReceived, State
+from fasaco_edge.mission.events import MapReceived
 from tests.mission.world import Drive, building, pose_at
 
 ROOM = ["......"] * 4
@@ -41,15 +41,6 @@ def driving():
 def step(drive, exit_, sent, *events):
     exit_.follow(drive.mission, drive.tell(*events).path)
     exit_.send(sent)
-
-
-def test_a_mission_at_rest_has_published_an_empty_path():
-    drive, exit_, sent = driving()
-    exit_.follow(drive.mission, drive.command("pause").path)
-    exit_.send(sent)
-    assert drive.mission.state is State.PAUSED
-    assert sent.paths[-1].stops
-    assert exit_.newest is sent.paths[-1]
 
 
 def test_a_mission_that_ends_has_its_path_withdrawn_once():

@@ -102,13 +102,6 @@ def test_a_robot_touches_no_keep_out_zone_on_its_way(polygon, radius):
                 assert not is_inside((x, y), polygon)
 
 
-def test_a_polygon_along_cell_borders_touches_just_its_cells():
-    square = ((0.3, 0.3), (1.5, 0.3), (1.5, 1.2), (0.3, 1.2))
-    expected = {(row, col) for row in (1, 2, 3) for col in (1, 2, 3, 4)}
-    assert cells(cells_inside(square, WINDOW, CELL_M)) == expected
-    assert cells(near_polygons((square,), WINDOW, CELL_M, CELL_M / 2)) == expected
-
-
 def test_a_polygon_far_away_or_around_everything():
     far = ((1e5, 1e5), (1e6, 1e5), (1e6, 1e6))
     around = ((-1e6, -1e6), (1e6, -1e6), (1e6, 1e6), (-1e6, 1e6))

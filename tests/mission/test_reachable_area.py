@@ -184,20 +184,6 @@ def test_a_robot_that_stands_elsewhere_has_another_ground():
     assert before.updated(unchanged, (0, 3)).reachable.tolist() == [[False] * 3 + [True] * 2] * 2
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        (AreaChange(3, 0, 5), "map: 3 cells more"),
-        (AreaChange(0, 2, 5), "map: 2 cells fewer"),
-        (AreaChange(3, 2, 0), "map: 3 cells more, 2 cells fewer"),
-        (AreaChange(0, 0, 4), "map: passages changed at 4 cells"),
-    ],
-)
-def test_a_change_says_what_it_is(change, text):
-    assert str(change) == text
-    assert change
-
-
 @examples(100)
 @given(problems(max_side=5), st.lists(st.integers(0, 3), max_size=12), st.integers(0, 12))
 def test_cells_hold_up_to_the_first_illegal_step(given_ground, headings, jump_at):

@@ -120,7 +120,6 @@ TURNED, SHIFTED = (0.0, 0.0, 3.0), (0.1, 0.1, 0.0)
         (60.0, (0.5, 0.3, 8.0)),
         # Rows of cells along its walls were said not to be reached: 2.4 of 15 m2.
         (30.0, SHIFTED),
-        (30.0, (0.14, 0.0, 0.0)),
     ],
 )
 def test_reached_cells_move_with_the_map(after_s, motion):

@@ -80,22 +80,6 @@ def test_no_number_appears_before_a_region_has_lasted():
     assert book.sheet.is_settling
 
 
-GROWN = [
-    (["aa.", "aa."], (0.5, 0.5)),
-    (["aaa", "aaa"], (2.5, 0.5)),
-    (["aaa.", "aaa.", "aaaa"], (3.5, 0.5)),
-]
-
-
-def test_a_room_grows_with_the_map_and_keeps_its_number():
-    book = RoomBook()
-    for rows, _ in GROWN:
-        shown(book, regions(*rows), HOLD_NEW)
-    assert [room.id for room in book.rooms] == [1]
-    assert at(book, 3.5, 0.5) == 1
-    assert book.room(1).area_m2 == pytest.approx(10.0)
-
-
 @pytest.mark.parametrize("name", ["", "kitchen"])
 @pytest.mark.parametrize(
     "flicker",
@@ -398,12 +382,3 @@ def test_a_room_whose_squares_are_lost_has_no_outline():
     book.sheet.lay(replace(book.sheet.raster, ids=np.where(ids == closet, 0, ids)))
     shown(book, regions("aaaaaaa", "a...aaa", "a...aaa", "aaaaaaa"), HOLD_CHANGE)
     assert (book.room("closet").outline, book.room("closet").area_m2) == ((), 0.0)
-
-
-def test_a_room_within_another_one_is_no_part_of_it():
-    book = known(regions("aaaaa", "abbba", "abbba", "aaaaa"))
-    ring, inner = at(book, 0.5, 0.5), at(book, 2.5, 2.0)
-    assert book.room(ring).encloses == (inner,)
-    assert book.room(inner).encloses == ()
-    assert book.room(ring).area_m2 == pytest.approx(14.0)
-    assert book.holes(book.room(ring)) == (book.room(inner).outline,)

@@ -8,7 +8,7 @@ import pytest
 from fasaco_edge.fleet.mission.kind import FleetKind
 from fasaco_edge.mission.events import MapReceived, MemberReceived
 from fasaco_edge.mission.orders.room_requests import RoomRequest
-from fasaco_edge.mission.work.sequencer import MAX_IN_VAIN
+from fasaco_edge.mission.work.present_part import MAX_IN_VAIN
 from tests.mission.test_room_orders import (
     BOTH,
     EAST_COLUMNS,

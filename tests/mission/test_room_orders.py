@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from dataclasses import replace
 
 import pytest
@@ -82,14 +81,6 @@ def visited(drive, columns):
 
 
 WEST_COLUMNS, EAST_COLUMNS = range(9), range(12, 21)
-
-
-def test_an_idle_mission_knows_its_rooms():
-    drive = settled(*BOTH)
-    west, east = room_at(drive, *IN_WEST), room_at(drive, *IN_EAST)
-    assert west.neighbours == (east.id,)
-    assert 5.5 < west.area_m2 < 8.0
-    assert drive.mission.rooms.frame == "map"
 
 
 def test_a_room_is_ordered_by_its_name_and_by_its_number():
@@ -179,19 +170,6 @@ def test_an_order_waits_for_a_room_after_its_other_zones():
     name(drive, room_at(drive, *IN_EAST).id, "kitchen")
     drive.finish()
     assert len(visited(drive, EAST_COLUMNS)) == 90
-
-
-def test_a_wait_before_anything_else_stands_and_can_be_cancelled():
-    drive = settled(*BOTH)
-    start(drive, "kitchen", unknown="wait")
-    assert drive.mission.state is State.BLOCKED
-    assert drive.request is None
-    drive.command("pause")
-    assert drive.mission.state is State.PAUSED
-    drive.command("resume")
-    assert drive.mission.state is State.BLOCKED
-    drive.command("cancel")
-    assert drive.mission.state is State.IDLE
 
 
 def test_settings_of_a_room_apply_to_orders_without_them():
@@ -298,17 +276,6 @@ def test_a_ring_of_corridors_does_not_contain_the_room_within(deg):
     assert not asked[lattice.local((1, 1))]
 
 
-def test_an_area_that_was_not_reached_is_without_the_room_within():
-    closed = (*RING[:12], RING[7], RING[7], *RING[14:])
-    drive = Drive((9, 9), MapReceived(building(*closed)), pose_at(9, 9), order_state=WAITS)
-    settle(drive)
-    (ring,) = (room for room in drive.mission.rooms.rooms if room.encloses)
-    start(drive, ring.title)
-    drive.finish()
-    said = re.search(r"not reached: 'room \d' \(([\d.]+) m2\)", drive.mission.reason)
-    assert float(said[1]) == pytest.approx(ring.area_m2, abs=1.0)
-
-
 def rotated(rows, deg):
     """A robot on a map that is rotated, and its lattice with it, once the rooms are known."""
     grid, config = building(*rows), replace(CONFIG, lattice_deg=deg)
@@ -319,19 +286,6 @@ def rotated(rows, deg):
     for _ in range(LOOKS):
         drive.tell(here, after=1.01 * PERIOD_S)
     return drive
-
-
-def test_a_room_order_lies_on_a_rotated_lattice_as_on_any():
-    """The walls are at 20 degrees to the map frame, and so are the cells."""
-    drive = rotated(BOTH, 20.0)
-    assert len(drive.mission.rooms.rooms) == 2
-    east = max(drive.mission.rooms.rooms, key=lambda room: room.outline[0][0])
-    start(drive, east.title)
-    zone = drive.mission.order_state.order.zones[0]
-    assert drive.mission.order_state.order.as_given.zones[0].polygon == east.outline
-    xs = [x for x, _ in zone.polygon]
-    assert min(xs) == pytest.approx(11 * 0.25, abs=0.4)
-    assert max(xs) == pytest.approx(21 * 0.25, abs=0.4)
 
 
 def test_documents_are_read_as_they_were_written():

@@ -54,15 +54,6 @@ def test_a_mission_waits_for_map_then_pose_then_requests_a_plan():
     assert not decision.plan.problem.to_cover[1, 2]
 
 
-def test_a_pose_may_come_before_the_map():
-    drive = Drive((0, 0), pose_at(0, 0))
-    assert drive.mission.state is State.WAITING_FOR_MAP
-    assert drive.tell(MapReceived(building(*ROOM))).plan.problem.start == (0, 0)
-    drive.plan()
-    drive.finish()
-    assert drive.visited == reachable_cells(building(*ROOM), (0, 0))
-
-
 def test_a_plan_that_comes_back_is_published():
     drive = Drive((1, 2), MapReceived(building(*ROOM)), pose_at(1, 2))
     request = drive.request
@@ -145,17 +136,6 @@ def test_a_wall_across_the_path_cuts_it_at_the_last_legal_cell():
     assert drive.visited == {(0, col) for col in range(6)}
 
 
-def test_a_wall_and_its_removal_leave_everything_covered():
-    drive = started(*CORRIDOR)
-    drive.go(patch("#", at=(0, 6)))
-    drive.finish()
-    decision = drive.tell(patch(".", at=(0, 6)))
-    assert decision.plan.reason == "map: 4 cells more"
-    assert drive.mission.state is State.PLANNING
-    drive.finish()
-    assert drive.visited == {(0, col) for col in range(10)}
-
-
 def test_a_closed_passage_between_reachable_cells_is_a_change():
     """A thin wall that closes a lane but no cell: the path must not lead through it."""
     drive = Drive((0, 0), config=MissionConfig(Footprint(0.25, robot_radius_m=0.0625)))
@@ -198,35 +178,6 @@ def test_a_robot_inside_a_wall_stops_and_says_why_and_recovers():
     assert len(free) == 32
 
 
-def test_a_wall_around_the_robot_blocks_it_until_its_removal():
-    drive = started(*ROOM)
-    assert drive.tell(MapReceived(building(*["######"] * 4))).path.cells.shape == (0, 2)
-    assert drive.mission.state is State.BLOCKED
-    assert drive.tell(MapReceived(building(*ROOM)), after=PATIENCE_S).plan is not None
-    drive.finish()
-
-
-def test_a_robot_that_stops_short_is_resent_a_few_times():
-    drive = started("...")
-    drive.go()
-    x, y = (drive.cell[1] + 1) * 0.25 + 0.01, 0.01  # in the last cell's corner
-    short = PoseReceived(StampedPose(Pose2D(x, y)))
-    plans = 0
-    for _ in range(100):
-        plans += drive.tell(short, after=PATIENCE_S).plan is not None
-        if drive.request is not None:
-            request, drive.request = drive.request, None
-            drive.tell(answer(request))
-    assert plans <= 4
-    assert drive.mission.state is State.DONE
-    ending = "66 % of 0.2 m2 covered; 0.1 m2 not reached: left over after 4 tries (0.1 m2)"
-    assert drive.mission.reason == ending
-    (area,) = drive.mission.orders.uncovered.found().areas
-    assert (area.cells, area.cell, area.reason) == (1, (0, 2), "left over after 4 tries")
-    drive.tell(pose_at(0, 2))
-    assert drive.mission.orders.uncovered.found().areas == ()
-
-
 def test_a_map_that_jumps_far_away_takes_no_memory_in_between():
     """As when a mapper adopts UTM coordinates."""
     drive = started(*ROOM)
@@ -248,29 +199,6 @@ def test_a_plan_that_comes_while_blocked_is_not_published():
     assert drive.mission.state is State.BLOCKED
     drive.tell(MapReceived(building(*ROOM)))
     drive.finish()
-
-
-def test_a_robot_carried_away_gets_a_new_path():
-    drive = started(*["............"] * 8)
-    drive.go()
-    drive.cell = (7, 11)
-    assert drive.tell(pose_at(7, 11)).plan is None, "a flickering pose is no reason yet"
-    decision = drive.tell(pose_at(7, 11), after=PATIENCE_S + 0.01)
-    assert decision.plan.reason == "the pose jumped 3.05 m"
-    assert decision.plan.problem.start == (7, 11)
-    drive.finish()
-    assert drive.visited == set(np.ndindex(8, 12))
-
-
-def test_a_robot_carried_away_while_planning_gets_no_old_path():
-    rooms = ("...#...", "...#...", "...#...")
-    drive = Drive((0, 0), MapReceived(building(*rooms)), pose_at(0, 0))
-    drive.cell = (0, 6)
-    drive.tell(pose_at(0, 6))
-    update = drive.plan().path
-    assert update is None
-    drive.finish()
-    assert {(row, col) for row in range(3) for col in (4, 5, 6)} <= drive.visited
 
 
 def test_a_plan_that_a_map_change_made_illegal_is_refused():
@@ -309,12 +237,6 @@ def test_a_plan_leaves_out_what_was_driven_while_it_was_made():
     assert drive.tell(stale).path is None
     assert drive.mission.route.revision == revision
     assert drive.mission.route.path.ahead.tolist() == [[0, col] for col in range(4, 9)]
-
-
-def test_an_unrequested_plan_changes_nothing():
-    drive = started(*CORRIDOR)
-    path = CoveragePath(np.array([[0, 0], [0, 1]], np.int32), "fasaco", 0)
-    assert drive.tell(PlanReady(99, path, 0.1)) == Decision()
 
 
 def test_an_answer_to_another_question_leaves_the_question_open():
@@ -392,12 +314,6 @@ def test_a_pose_or_map_in_another_frame_is_a_fault():
     drive.finish()
 
 
-def test_a_pose_in_another_frame_from_before_the_map_is_not_used():
-    drive = Drive((0, 0), pose_at(0, 0, frame="odom"), MapReceived(building(*ROOM)))
-    assert drive.mission.state is State.WAITING_FOR_POSE
-    assert drive.request is None
-
-
 def test_a_map_too_large_is_a_fault_and_the_old_one_stays():
     drive = started(*ROOM)
     huge = OccupancyGrid(GridGeometry(2, 2, 1e4, Pose2D(0, 0)), np.zeros((2, 2), np.int8))
@@ -421,43 +337,6 @@ def test_a_pose_far_off_the_map_takes_bounded_memory():
     assert drive.mission.state is State.BLOCKED
     drive.tell(pose_at(*drive.cell))
     drive.finish()
-
-
-def test_a_robot_at_the_end_with_cells_left_gets_another_path():
-    drive = started(*CORRIDOR)
-    drive.walk = [(0, col) for col in (1, 2, 3)]
-    for _ in range(3):
-        drive.go()
-    # It was carried over the middle of the corridor: that is no driving.
-    drive.cell = (0, 9)
-    for cell in ((0, 7), (0, 9)):
-        drive.tell(pose_at(*cell))
-    drive.tell(pose_at(0, 9), after=PATIENCE_S)
-    drive.finish()
-    assert drive.visited == {(0, col) for col in range(10)}
-
-
-def test_a_robot_that_stops_short_of_its_last_cell_is_resent():
-    drive = started(*CORRIDOR)
-    for _ in range(8):
-        drive.go()
-    short = pose_at(0.49, 8.51)  # in cell (0, 9), its tool not over the centre
-    assert drive.tell(short) == Decision()
-    assert (0, 9) not in drive.visited
-    decision = drive.tell(short, after=PATIENCE_S + 10.0)
-    assert decision.plan.reason == "cells left over"
-    assert decision.plan.problem.cells == 1
-    drive.finish()
-
-
-def test_a_done_mission_is_done_once():
-    drive = started(*ROOM)
-    drive.finish()
-    updates = len(drive.updates)
-    assert drive.tell(patch("#", at=(3, 0))) == Decision()
-    assert drive.tell(patch(".", at=(3, 0))) == Decision(), "covered before, covered still"
-    assert drive.mission.state is State.DONE
-    assert len(drive.updates) == updates
 
 
 def test_a_map_without_pixels_blocks_the_robot():

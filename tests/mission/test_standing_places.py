@@ -106,15 +106,6 @@ def test_a_reset_takes_the_places_for_those_of_the_map_in_use():
     assert drive.mission.home == (4, 8)
 
 
-def test_after_a_reset_the_next_map_and_pose_own_the_places():
-    drive = Drive(HERE, *floor("map_1"), config=WITH_ALL)
-    drive.command("reset")
-    drive.command("start")
-    assert "places_elsewhere" not in codes(stand(drive, "map_2", 3))
-    assert drive.mission.grid.frame == "map_2"
-    assert drive.mission.state is not State.BLOCKED
-
-
 def test_zones_and_home_of_another_floor_are_not_used_there():
     drive, faults = on_another_floor(WITHOUT_KEEP_OUT)
     assert codes(faults) == ["ledger_mismatch", "places_elsewhere"]
@@ -155,14 +146,6 @@ def test_places_in_another_buildings_frame_are_not_used():
     again.command("start")
     stand(again, "map", 2, OTHER)
     assert again.mission.state is not State.BLOCKED
-
-
-def test_places_are_unused_after_a_restart_in_another_building():
-    first = Drive(HERE, *floor("map"), config=WITH_ALL)
-    first.finish()
-    again = restarted(first, WITH_ALL)
-    assert codes(stand(again, "map", 3, OTHER)) == ["ledger_mismatch", "places_elsewhere"]
-    assert again.mission.state is State.BLOCKED
 
 
 def test_a_mask_of_the_previous_building_is_not_used():

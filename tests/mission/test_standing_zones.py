@@ -12,8 +12,8 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.map.inputs import PATIENCE_S
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask, mask_polygons
-from fasaco_edge.mission.orders.order import StandingZone, order_document, read_order
-from fasaco_edge.mission.orders.zones import cells_inside, with_kept_out
+from fasaco_edge.mission.orders.order import StandingZone, read_order
+from fasaco_edge.mission.orders.zones import with_kept_out
 from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
     CELL,
@@ -72,13 +72,6 @@ def test_a_name_that_is_not_there_is_refused_with_those_that_are():
     without = drive_with()
     without.command("start", {"zones": [{"name": "kitchen"}]})
     assert "it has none" in str(without.refused)
-
-
-def test_a_zone_by_name_is_written_as_it_was_read():
-    order = read_order({"zones": [{"name": "kitchen", "passes": 2}]})
-    document = order_document(order)
-    assert document["zones"] == [{"name": "kitchen", "passes": 2}]
-    assert read_order(document) == order
 
 
 def test_configured_keep_out_zones_apply_to_each_order():
@@ -205,24 +198,3 @@ def test_a_mask_that_takes_long_to_read_is_refused(tmp_path):
     (tmp_path / "mask.png").write_bytes(b"P5 1100 1000 100\n" + bytes(1_100_000))
     with pytest.raises(BadConfiguration, match="slow to read; the limit is 1000000 pixels"):
         inline_mask(file, 65, 44_000_000)
-
-
-def test_cells_in_small_polygons_equal_those_of_the_whole_window():
-    random = np.random.default_rng(3)
-    for _ in range(50):
-        x, y = random.uniform(-1, 3, 2)
-        polygon = ((x, y), (x + 0.7, y + 0.1), (x + 0.3, y + 0.8))
-        drive = drive_with()
-        whole = drive.mission.lattice.window
-        inside = cells_inside(polygon, whole, CELL)
-        for row, col in np.ndindex(*inside.shape):
-            at = (col + whole.col0 + 0.5) * CELL, (row + whole.row0 + 0.5) * CELL
-            assert inside[row, col] == _is_inside(at, polygon)
-
-
-def _is_inside(at, polygon):
-    """Left of all edges of a convex polygon that goes round counter-clockwise."""
-    edges = zip(polygon, polygon[1:] + polygon[:1], strict=True)
-    return all(
-        (bx - ax) * (at[1] - ay) - (by - ay) * (at[0] - ax) > 0 for (ax, ay), (bx, by) in edges
-    )

@@ -138,13 +138,6 @@ def test_a_centre_between_two_pixels_always_lies_on_the_same_one():
             )
 
 
-def test_far_from_0_it_is_the_same():
-    near = drive((0.1, 0.0), (0.4, 0.2)).swept_in(AROUND)
-    x, y = 9_000_000.0, -1_000_000.0
-    window = AROUND.moved(round(y / PIXEL_M), round(x / PIXEL_M))
-    assert np.array_equal(drive((x + 0.1, y), (x + 0.4, y + 0.2)).swept_in(window), near)
-
-
 def test_floor_inside_is_forgotten_except_under_the_tool():
     floor = drive((0.0, 0.0), (0.4, 0.0), (0.8, 0.0))
     here = drive((0.8, 0.0)).swept_in(AROUND)
@@ -254,15 +247,6 @@ def test_exact_poses_are_kept_at_once_and_others_seen_at_once():
     assert np.array_equal(scattered.swept_in(everywhere), seen)
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.5])
-def test_preliminary_floor_is_shown_on_another_raster(yaw):
-    floor = drive(*wobbling(0.03, 60))
-    geometry = GridGeometry(60, 100, 0.025, Pose2D(-0.5, -0.5, yaw))
-    seen = floor.swept_on(geometry)
-    floor.break_track()
-    assert np.array_equal(seen, floor.swept_on(geometry))
-
-
 def test_a_repeated_pose_hides_no_noise():
     """As each map tells the mission to look at the newest pose again."""
     once, twice = SweptFloor(TOOL), SweptFloor(TOOL)
@@ -318,18 +302,6 @@ def test_a_robot_that_stood_still_forgets_no_floor():
     assert not certain_floor(before, Motion(Pose2D(0, 0), Pose2D(0, 0)))(before.tiles)
 
 
-def test_a_mission_sweeps_the_floor_it_drives_over():
-    drive = Drive((0, 0), MapReceived(building("....", "....")), pose_at(0, 0))
-    drive.plan()
-    drive.finish()
-    floor, snapshot = drive.mission.covered.floor, drive.mission.snapshot()
-    # All but the corners, at a wall, that a round tool leaves.
-    assert floor.swept_m2 == pytest.approx(8 * CELL**2, rel=0.1)
-    assert snapshot.floor.pixels == floor.pixels
-    drive.command("reset")
-    assert floor.swept_m2 > drive.mission.covered.floor.swept_m2 > 0, "where it stands"
-
-
 def test_a_second_pass_forgets_the_floor_of_its_zone():
     drive = Drive((0, 0), MapReceived(building("........")), pose_at(0, 0))
     drive.plan()
@@ -342,24 +314,6 @@ def test_a_second_pass_forgets_the_floor_of_its_zone():
     swept = drive.mission.covered.floor.swept_in(Window(0, mid - 10, 10, mid + 10))
     assert not swept[:, :10].any()
     assert swept[:, 10:].any()
-
-
-def test_floor_before_a_restart_counts_until_a_map_contradicts():
-    rooms = ["#" * 30, *("#" + "." * 28 + "#" for _ in range(8)), "#" * 30]
-    before = Drive((1, 1), MapReceived(building(*rooms)), pose_at(1, 1))
-    for col in range(2, 26):
-        before.tell(pose_at(1, col))
-    kept = before.mission.snapshot()
-
-    def resumed(*rows):
-        drive = Drive((1, 1))
-        drive.mission.restore(kept)
-        drive.tell(MapReceived(building(*rows)), pose_at(1, 1))
-        return drive.mission.covered.floor
-
-    assert resumed(*rooms).pixels >= kept.floor.pixels
-    other = ["#" * 30, *("#." + "#." * 14 for _ in range(8)), "#" * 30]
-    assert resumed(*other).swept_m2 < CELL**2
 
 
 @pytest.mark.parametrize("sigma_m", [0.0, 0.03])

@@ -14,7 +14,7 @@ from fasaco_edge.mission.work.order_state import OrderState, Stage
 from tests.mission.battery import AT_DOCK, Battery
 from tests.mission.line_robot import CONFIG as LINES
 from tests.mission.line_robot import LineRobot
-from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
+from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, with_policy
 
 # A cell takes a second.
 CELL_S = 1.0
@@ -105,15 +105,6 @@ def test_new_floor_does_not_reopen_an_order_out_of_time():
     assert drive.mission.reason.startswith("time is up after 0.5 min: ")
     drive.tell(MapReceived(building(*HALL, *HALL)))
     assert (drive.mission.state, drive.request) == (State.DONE, None)
-
-
-def test_zones_that_have_not_begun_are_named():
-    west, east = rectangle(0, 0, 4, 15), rectangle(0, 15, 4, 30)
-    zones = [{"name": "west", "polygon": west, "passes": 2}, {"name": "east", "polygon": east}]
-    drive = Clocked(order={"zones": zones, "until_min": 0.5})
-    drive.finish()
-    said = "time is up after 0.5 min in zone 'west', pass 1 of 2, before 'east': "
-    assert drive.mission.reason.startswith(said)
 
 
 @pytest.mark.parametrize("covered", [3, 20])

@@ -203,23 +203,6 @@ def test_a_coarse_gauge_may_charge_for_minutes_per_step():
     assert "has not risen for 10 minutes" in drive.mission.troubles[0].text
 
 
-def test_a_contact_that_comes_and_goes_hides_no_falling_level():
-    drive = charging()
-    for second in range(A_MINUTE_S):
-        drive.power = "charging" if second % 3 else "discharging"
-        live(drive, 1, fall=0.0005)
-    assert codes(drive) == ["no_current"]
-
-
-def test_a_current_that_ends_while_it_charges_is_missed():
-    drive = charging()
-    live(drive, 300, rise=0.0005)
-    drive.power = "discharging"
-    live(drive, A_MINUTE_S)
-    assert codes(drive) == ["no_current"]
-    assert drive.mission.troubles[0].since == pytest.approx(drive.now, abs=A_MINUTE_S)
-
-
 @pytest.mark.parametrize("state", OVER)
 def test_a_robot_without_work_stands_in_a_dead_dock(state):
     drive = charging(level=0.15)

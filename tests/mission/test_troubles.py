@@ -150,20 +150,6 @@ def test_a_pose_that_jumps_while_a_plan_is_made_gets_another():
     drive.finish()
 
 
-def test_a_stale_map_is_reported_and_the_mission_continues():
-    drive = driving(*ROOM)
-    row, col = drive.cell
-    for tick in range(70):
-        drive.tell(pose_at(row, col + 0.45 * (tick % 2)), after=1.0)
-    assert drive.mission.state is State.DEGRADED
-    assert drive.mission.reason == "no map or update for 60 s: going on with the last one"
-    drive.tell(patch(".", at=(0, 0)))
-    assert drive.mission.state is State.COVERING
-    drive.finish()
-    drive.tell(pose_at(*drive.cell), after=100.0)
-    assert drive.mission.state is State.DONE, "a mission that is done needs no map"
-
-
 def test_a_robot_that_does_not_follow_its_path_gets_it_again():
     # A base may refuse a path for good: such a robot was covering, it said, for ever.
     drive = driving(*ROOM, config=CONFIG)
@@ -209,37 +195,6 @@ def test_a_standing_robot_is_reported_though_the_map_flickers():
     assert empty > 10
     assert drive.mission.state is State.DEGRADED
     assert drive.mission.reason.startswith("the robot stands")
-
-
-def test_a_standstill_is_not_reported_under_another_order():
-    drive = driving(*ROOM, config=CONFIG)
-    for _ in range(65):
-        drive.tell(pose_at(*drive.cell), after=1.0)
-    assert drive.mission.state is State.DEGRADED
-    drive.command("cancel")
-    drive.command("start", {"zones": [{"name": "z", "polygon": rectangle(3, 8, 4, 12)}]})
-    drive.plan()
-    assert drive.mission.state is State.COVERING
-
-
-def test_a_robot_that_does_not_drive_home_is_reported():
-    drive = driving(*ROOM, config=CONFIG)
-    drive.command("home")
-    for _ in range(65):
-        drive.tell(pose_at(*drive.cell), after=1.0)
-    assert (drive.mission.state, drive.mission.reason) == (
-        "degraded",
-        "the robot stands: it got a path 3 times",
-    )
-    while drive.walk:
-        assert drive.go() is not None
-    assert drive.mission.state is not State.DEGRADED
-
-
-def test_without_timeouts_no_trouble_is_reported():
-    drive = driving(*ROOM, config=CONFIG)
-    drive.tell(after=1000.0)
-    assert drive.mission.state is State.COVERING
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ from tests.support.processes import (
     free_endpoint,
     mapped_files,
 )
-from tests.support.rooms import HALL, begin, drive, lanes, map_bytes, pose_bytes, update_bytes
+from tests.support.rooms import HALL, begin, lanes, map_bytes, pose_bytes, update_bytes
 from tests.support.waiting import until
 
 # Memory of its own at most, without pages of files [MB].
@@ -180,39 +180,6 @@ def test_nonsense_ends_only_that_viewer(page, said):
         other.seen.clear()
         other.send(kind="wants", field=False)
         other.command("pause")
-
-
-VASE = {"name": "vase", "polygon": [[2.0, 2.0], [2.4, 2.0], [2.4, 2.4], [2.0, 2.4]]}
-
-
-def test_a_keep_out_keeps_coverage_and_a_new_order_asks_first(tmp_path):
-    words = ("--allow-commands",)
-    with daemon_process(tmp_path) as daemon, Outsider(daemon.endpoint) as outsider:
-        begin(outsider)
-        drive(outsider, lanes(12))
-        with served(tmp_path, daemon.endpoint, *words) as page, looking(page) as looker:
-            looker.wait("state", lambda state: state.get("state"))  # it has joined the bus
-            assert looker.command("keep_out_add", keep_out=VASE)["ok"]
-            areas = looker.wait("areas", lambda areas: areas["keep_out"])
-            assert areas["keep_out"] == [{**VASE, "is": "operator"}]
-            # The same by another order would forget what is covered: it is asked for.
-            order = {"keep_out": [VASE["polygon"]]}
-            answer = looker.command("start", order)
-            assert (answer["ok"], answer["code"]) == (False, "would_forget")
-            assert answer["text"].startswith("start forgets 11 covered cells (1.0 m2), ")
-            assert outsider.ask_status()["coverage"]["covered"] == 12
-            assert looker.command("start", {**order, "keep_covered": True})["ok"]
-            assert outsider.ask_status()["coverage"]["covered"] == 12
-        # After a restart of the page's server it is still shown, and can be removed.
-        with served(tmp_path, daemon.endpoint, *words) as page, looking(page) as looker:
-            areas = looker.wait("areas", lambda areas: areas["keep_out"])
-            assert [area["is"] for area in areas["keep_out"]] == ["operator", "order"]
-            wrong = looker.command("keep_out_remove", keep_out={"name": "lamp"})
-            assert (wrong["ok"], wrong["code"]) == (False, "bad_order")
-            assert looker.command("keep_out_remove", keep_out={"name": "vase"})["ok"]
-            looker.wait("areas", lambda areas: len(areas["keep_out"]) == 1)
-            assert looker.command("start", {"passes": 3}, discard=True)["ok"]
-            outsider.wait_status(lambda status: status["coverage"]["covered"] == 1)
 
 
 def test_a_mission_is_run_from_the_page(tmp_path):

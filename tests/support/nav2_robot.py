@@ -16,7 +16,6 @@ import random
 import sys
 import threading
 import time
-from collections import deque
 from typing import Any
 
 from tests.support.nav2_server import (
@@ -50,12 +49,6 @@ class Nav2Robot:
         # Pauses between goals, except after an abort, a restart or the last goal.
         self.standing_s = self.driving_s = self._idle_s = 0.0
         self._counts_idle = False
-        # For each pause between goals: end of the driven path; distances from this end, each with
-        # the time before the pause; duration; time from the request of the next goal to the pause;
-        # delay of this request.
-        self.pauses: list[dict[str, Any]] = []
-        self._ended: dict[str, Any] = {}
-        self._approach = deque[tuple[float, float]](maxlen=100)
         self.trail: list[tuple[float, float]] = []
         self.errors: list[int] = []
         self.restarts = 0
@@ -149,14 +142,12 @@ class Nav2Robot:
             self._turn(self._end_yaw, dt)
         else:
             self._drive(dt)
-        self._approach.append((now, math.dist((self.x, self.y), self._path[-1])))
         far = math.dist((self.x, self.y), self._path[-1])
         self._is_there = self._is_there or far <= TOLERANCE_M
         off = abs(math.remainder(self._end_yaw - self.yaw, math.tau))
         if self._is_there and off <= TOLERANCE_RAD:
             server.end(handle, SUCCEEDED)
             self._idle_s, self._counts_idle = 0.0, True
-            self._ended = {"end": self._path[-1], "at": now, "approach": list(self._approach)}
 
     def _begin(self, handle: Handle, now: float) -> None:
         """Check a goal as the controller server does, and begin it."""
@@ -181,21 +172,7 @@ class Nav2Robot:
             self._progress = (self.x, self.y, now)
             if self._counts_idle:
                 self.standing_s += self._idle_s
-                self._note_pause(handle)
-            self._approach.clear()
             self._idle_s, self._counts_idle = 0.0, False
-
-    def _note_pause(self, handle: Handle) -> None:
-        ended_at = self._ended["at"]
-        self.pauses.append(
-            {
-                "end": self._ended["end"],
-                "approach": [(ended_at - at, far) for at, far in self._ended["approach"]],
-                "pause_s": self._idle_s,
-                "asked_s": ended_at - handle.asked_at,
-                "delay_s": handle.delay_s,
-            }
-        )
 
     def _abort(self, handle: Handle, code: int, text: str) -> None:
         self.errors.append(code)
@@ -259,7 +236,7 @@ def main() -> None:
     stop.set()
     thread.join()
     names = ("x", "y", "driven_m", "driving_s", "standing_s", "errors", "restarts", "refused")
-    names += ("counts", "trail", "pauses")
+    names += ("counts", "trail")
     print(json.dumps({name: getattr(robot, name) for name in names}), flush=True)
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from fasaco_edge.bench.benchmark import Say
-from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.planners.compiling import warm_up
 from fasaco_edge.planners.grids import NamedGrid, read_grid
 from fasaco_edge.planners.own.loading import UserCode
@@ -105,18 +104,6 @@ class Run:
     seed: int
     walk: WalkFigures
     cpu_s: float
-
-
-def check_drawn(drawn: Sequence[str], grids: Sequence[str]) -> None:
-    """Make sure that what is to be drawn is measured.
-
-    Raises:
-        BadConfiguration: a grid is not among those measured.
-    """
-    names = [grid_name(grid) for grid in grids]
-    for name in drawn:
-        if name not in names:
-            raise BadConfiguration(f"--png-of must name measured grids, {', '.join(names)}: {name}")
 
 
 def pose(grid: NamedGrid) -> CoverageProblem:

@@ -71,13 +71,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="processor time of a plan [s] (default: 0.02 0.1 1; there are goals for 10, too)",
     )
     parser.add_argument("--seed", type=int, default=0, help="(default: %(default)s)")
-    parser.add_argument(
-        "--png",
-        type=Path,
-        metavar="FILE",
-        help="draw the walks of the last budget on the smallest, a middle and the largest ground, "
-        "side by side",
-    )
 
 
 def _plan_of(args: argparse.Namespace) -> TurnsPlan:
@@ -89,7 +82,6 @@ def _plan_of(args: argparse.Namespace) -> TurnsPlan:
         prices=tuple(args.prices),
         budgets=tuple(args.budgets),
         seed=args.seed,
-        png=args.png,
     )
 
 

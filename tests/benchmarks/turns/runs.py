@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.bench.benchmark import Say
-from fasaco_edge.cli.console.arguments import writing
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
@@ -34,7 +33,6 @@ from fasaco_edge.planners.paper.baselines import spiral_stc, stc, zigzag
 from fasaco_edge.planners.planner import SearchProgress
 from fasaco_edge.planners.problem import CoverageProblem
 from tests.benchmarks.harness import WrongWalkError, grid_name, judged, planner_for
-from tests.benchmarks.pictures import LabelledWalk, draw_walks
 
 # Of the instances, in steps a quarter-turn.
 TOUR_PRICE = 50.0
@@ -58,7 +56,6 @@ class TurnsPlan:
         prices: of a quarter-turn on these, in steps.
         budgets: to plan for [s].
         seed: of all random streams.
-        png: file to draw some of the walks into; None for no picture.
     """
 
     instances: Path | None
@@ -68,7 +65,6 @@ class TurnsPlan:
     prices: tuple[float, ...]
     budgets: tuple[float, ...]
     seed: int
-    png: Path | None = None
 
     @property
     def count(self) -> int:
@@ -123,45 +119,26 @@ class _ProcessorBudget:
 
 
 def measure(plan: TurnsPlan, say: Say) -> Generator[TurnsRun, None, None]:
-    """Yield every run, kernels warm; then draw, if there is to be a picture.
+    """Yield every run, kernels warm.
 
     Raises:
-        FasacoError: a grid or the instances cannot be read, or the picture not be written.
+        FasacoError: a grid or the instances cannot be read.
         WrongWalkError: a walk is not legal, not complete, or cheaper than can be.
     """
     posed = [*_tours(plan), *_walks(plan)]
     say("loading kernels")
     warm_up()
-    # By number of cells, of the first, the middle and the last ground the last walk.
-    order = sorted(range(len(posed)), key=lambda number: posed[number][1].cells)
-    drawn = {order[0], order[len(order) // 2], order[-1]} if plan.png else set()
-    walks: list[LabelledWalk] = []
-    for number, (name, problem, known) in enumerate(posed):
+    for name, problem, known in posed:
         say(f"{name}: warming up")
         planner_for(plan.seed).plan(problem, _ProcessorBudget(WARM_S))
         for budget_s in plan.budgets:
             say(f"{name}: {budget_s:g} s")
-            run, cells = _run(name, problem, known, budget_s, plan.seed)
-            yield run
-        if number in drawn:
-            walks.append(LabelledWalk(name, _caption(run), problem.lattice, cells))
-    if plan.png:
-        title = f"Walks after {plan.budgets[-1]:g} s of planning"
-        picture = draw_walks(walks, title=title, lines=[], columns=len(walks))
-        with writing(plan.png) as file:
-            picture.save(file, "PNG")
-
-
-def _caption(run: TurnsRun) -> str:
-    """Return what a picture says of a run."""
-    to_best = f", {run.cost_s / run.best_s:.3f} of the best known" if run.best_s else ""
-    turn = f"{run.cells} cells, {run.price:g} steps a quarter-turn"
-    return f"{turn}: {run.cost_s:g} s{to_best}, at least {run.bound_s:g} s"
+            yield _run(name, problem, known, budget_s, plan.seed)
 
 
 def _run(
     name: str, problem: CoverageProblem, known: dict[str, Any], budget_s: float, seed: int
-) -> tuple[TurnsRun, NDArray[np.int32]]:
+) -> TurnsRun:
     began = time.perf_counter()
     path = planner_for(seed).plan(problem, _ProcessorBudget(budget_s))
     wall_s = time.perf_counter() - began
@@ -173,7 +150,7 @@ def _run(
         bound_s += price * _least_quarters_at_the_end(problem)
     if best_s is not None and bound_s > best_s + 1e-6:
         raise WrongWalkError(f"{name}: the bound, {bound_s}, is above {best_s}")
-    run = TurnsRun(
+    return TurnsRun(
         ground=name,
         cells=problem.cells,
         is_tour=problem.closed,
@@ -188,7 +165,6 @@ def _run(
         first_walk_s=path.first_walk_s,
         wall_s=wall_s,
     )
-    return run, path.cells
 
 
 def _quarters_at_the_end(cells: NDArray[np.int32]) -> int:

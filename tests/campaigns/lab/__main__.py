@@ -43,7 +43,6 @@ OPTIONS = {
     "seconds": "limit of simulated time [s]; 0 for one by the size of the building",
     "pose_hz": "rate of poses [1/s]",
     "scan_hz": "rate of scans that are offered to the mapper [1/s]",
-    "nudge_s": "a person helps a robot that stood for so long [s]; 0 for never",
     "speed_m_s": "speed of the robot [m/s]",
     "tool_m": "width of its tool [m]",
     "turn_radius_m": "tightest arc of the own base [m]; 0 if it turns on the spot",
@@ -118,7 +117,7 @@ def _parser() -> argparse.ArgumentParser:
         option = "--" + re.sub("_(m|s|m_s)$", "", name).replace("_", "-")
         told = f"{what} (default: {default:g})"
         add(option, dest=name, type=type(default), default=default, metavar="N", help=told)
-    add("--out", type=Path, metavar="DIR", help="write picture, trace, paths and figures there")
+    add("--out", type=Path, metavar="DIR", help="write picture, map and figures there")
     add("--json", action="store_true", help="print figures as JSON")
     return parser
 

@@ -67,7 +67,7 @@ class Figures:
         longest_stand_s: how long it stood at most with work left.
         state, reason: the mission's at the end.
         coverage: covered share of the cells, as the product says.
-        loops, nudges, plans: loops closed by the mapper, a person's helps, and plans made.
+        loops, plans: loops closed by the mapper, and plans made.
         digest: equal only for missions that are equal bit for bit.
     """
 
@@ -99,7 +99,6 @@ class Figures:
     reason: str
     coverage: float
     loops: int
-    nudges: int
     plans: int
     digest: str
 
@@ -178,7 +177,6 @@ def judge(run: LabRun, truth: Truth) -> Figures:
         reason=reply["reason"],
         coverage=coverage,
         loops=trace.loops,
-        nudges=len(trace.nudges),
         plans=run.report.plans,
         digest=trace.digest(),
     )

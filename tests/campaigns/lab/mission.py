@@ -20,7 +20,6 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.path_exit import PublishedPath
 from tests.campaigns.lab.building import Building
 from tests.campaigns.lab.own import FRAME, OwnBase, OwnMapper
-from tests.campaigns.lab.person import Person
 from tests.campaigns.lab.product import Product, ProductReport
 from tests.campaigns.lab.settings import LabSettings, stamp_ns
 
@@ -54,7 +53,6 @@ class Trace:
             [s].
         maps: the maps, each with the number of ticks before it.
         loops: loops that the mapper closed.
-        nudges: when a person helped [s].
     """
 
     rows: list[tuple[float, ...]] = field(default_factory=list)
@@ -62,7 +60,6 @@ class Trace:
     states: list[tuple[float, str, str, str]] = field(default_factory=list)
     maps: list[tuple[int, OccupancyGrid]] = field(default_factory=list)
     loops: int = 0
-    nudges: list[float] = field(default_factory=list)
 
     def columns(self) -> dict[str, NDArray[np.float64]]:
         """Return the columns, each float64 (ticks,)."""
@@ -106,7 +103,6 @@ class _Running:
         self._building, self._settings = building, settings
         self._base, self._mapper = _base_and_mapper(building, settings)
         self._product = Product(settings.config)
-        self._person = Person(building, settings.nudge_s)
         self._trace = Trace()
         self._limit_s = settings.limit_s(building.free_m2)
         self._pose_ticks = settings.ticks(settings.pose_hz)
@@ -140,7 +136,6 @@ class _Running:
             product.hear_map(grid)
             trace.maps.append((len(trace.rows), grid))
         command = product.step(now)
-        command = self._person.helps(base, now) or command
         if command is not None:
             base.command(command)
         trace.paths += [(len(trace.rows), path) for path in product.paths]
@@ -151,7 +146,6 @@ class _Running:
         base, product, trace = self._base, self._product, self._trace
         now, truth, wheels = base.now, base.truth, base.wheels
         is_done = product.state == DONE
-        self._person.note(base, now, has_work=not is_done)
         trace.rows.append(
             (now, truth.x, truth.y, truth.yaw, wheels.speed, wheels.turn_rate, base.grip,
              base.touches, px, py, pyaw, is_done, base.touches_person)
@@ -167,7 +161,6 @@ class _Running:
 
     def ended(self) -> LabRun:
         self._trace.loops = self._mapper.loops
-        self._trace.nudges = self._person.nudges
         return LabRun(self._building, self._settings, self._trace, self._product.report())
 
 

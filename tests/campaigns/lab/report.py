@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import statistics
 from collections import Counter
@@ -13,9 +12,8 @@ from typing import Any
 
 from maps.map_writer import write_map
 from tests.campaigns.lab.judge import Figures, judge, truth_of
-from tests.campaigns.lab.mission import COLUMNS, LabRun
+from tests.campaigns.lab.mission import LabRun
 from tests.campaigns.lab.picture import draw
-from tests.campaigns.lab.settings import TICK_S
 
 MISSED = 8
 
@@ -50,7 +48,7 @@ class Judged:
 
 
 def judged(run: LabRun, wall_s: float, out: Path | None = None) -> Judged:
-    """Judge a mission; with a folder write picture, map, trace, paths and figures there."""
+    """Judge a mission; with a folder write picture, map and figures there."""
     truth = truth_of(run)
     found = Judged(run, judge(run, truth), truth.missed(MISSED), wall_s)
     if out is not None:
@@ -80,7 +78,7 @@ def in_words(found: Judged) -> str:
                     f"{of.stops_per_m:.2f} stops a metre"),
         ("paths", f"{of.paths_per_min:.1f} a minute, {of.changes_per_min:.1f} change the next 2 m; "
                   f"{of.plans} plans"),
-        ("standing", f"at most {of.longest_stand_s:.0f} s with work left; {of.nudges} helps"),
+        ("standing", f"at most {of.longest_stand_s:.0f} s with work left"),
         ("missed", ", ".join(f"{m2} m2 at {x}, {y}" for m2, x, y in found.missed) or "nothing"),
         ("took", f"{found.wall_s:.0f} s by the clock; digest {of.digest}"),
     ]  # fmt: skip
@@ -123,24 +121,7 @@ def _summary(figures: Sequence[Figures]) -> str:
 
 
 def _write(found: Judged, out: Path) -> None:
-    trace, grid = found.run.trace, found.run.report.grid
+    grid = found.run.report.grid
     if grid is not None:
         write_map(grid, out / "map.yaml")
     (out / "figures.json").write_text(json.dumps(found.document(), indent=1), encoding="utf-8")
-    with (out / "trace.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(COLUMNS)
-        writer.writerows([f"{value:.5g}" for value in row] for row in trace.rows)
-    with (out / "states.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(("t", "mission", "reason", "follower"))
-        writer.writerows(trace.states)
-    with (out / "paths.jsonl").open("w", encoding="utf-8") as file:
-        for tick, path in trace.paths:
-            line = {
-                "t": round((tick + 1) * TICK_S, 3),
-                "revision": path.revision,
-                "reason": path.reason,
-                "xy": path.xy.round(3).tolist(),
-            }
-            file.write(json.dumps(line) + "\n")

@@ -40,7 +40,6 @@ class LabSettings:
         clearance_m: what its lines keep beside that where they can [m].
         seconds: limit of simulated time [s]; 0 for as many as the building's floor may take.
         pose_hz, scan_hz: rates of poses, and of scans that are offered to the mapper [1/s].
-        nudge_s: a person helps a robot that stood so long with work left [s]; 0 for never.
         speed_m_s, tool_m: speed of the robot, and width of its tool.
         own: noise of the project's own mapper, see ``own.NOISES``; "" for a simulator and a scan
             matcher of others.
@@ -60,7 +59,6 @@ class LabSettings:
     seconds: float = 0.0
     pose_hz: float = 20.0
     scan_hz: float = 2.5
-    nudge_s: float = 0.0
     speed_m_s: float = 0.35
     tool_m: float = 0.3
     own: str = ""

@@ -1,4 +1,4 @@
-"""The lab's base, mapper and person, in a hall."""
+"""The lab's base and mapper, in a hall."""
 
 import math
 
@@ -88,20 +88,3 @@ def test_the_mapper_corrects_odometry_and_draws_the_hall():
     assert grid is not None
     assert mapper.map_due(base.now) is None
     assert np.count_nonzero(grid.cells == 0) * 0.05**2 == pytest.approx(6.0, rel=0.1)
-
-
-def test_a_person_drives_a_robot_that_stands_away_from_the_wall():
-    from tests.campaigns.lab.person import Person
-
-    building, base = base_in(4.0, 4.0, yaw=math.pi, ideal=True)
-    person = Person(building, 2.0)
-    for _ in range(220):
-        command = person.helps(base, base.now)
-        if command is not None:
-            base.command(command)
-        base.tick()
-        person.note(base, base.now, has_work=True)
-    assert person.nudges == [pytest.approx(2.05, abs=0.06)]
-    assert 0.3 < apart(base.truth, building.start) < 0.45
-    assert base.truth.x > 0.6
-    assert base.truth.y > 0.6

@@ -40,17 +40,6 @@ def mapped(noise, times=1, truth=None):
     return mapper, mapper.snapshot(1), np.array(maps)
 
 
-def test_the_seed_determines_maps_and_poses():
-    (one, grid, _), (again, same, _), (_, other, _) = (
-        mapped(MapperNoise(seed=seed), 4) for seed in (1, 1, 2)
-    )
-    pose = Pose2D(1.0, 1.0, 0.3)
-    assert one.believed(pose) == again.believed(pose) != pose
-    assert grid.geometry == same.geometry
-    assert grid.cells.tobytes() == same.cells.tobytes()
-    assert (grid.geometry, grid.cells.tobytes()) != (other.geometry, other.cells.tobytes())
-
-
 def test_a_mapper_that_only_counts_rays_places_walls_correctly():
     # A ray in ten thousand that goes by nothing: it is a noisy one, but for that.
     noise = replace(NONE, leg_misses=1e-9)

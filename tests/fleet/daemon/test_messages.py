@@ -19,7 +19,7 @@ from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.config import DaemonConfig, FleetConfig
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.daemon.loop.inbox import (
-    Batch,
+    CycleInput,
     Inbox,
     Received,
     make_mailbox,
@@ -280,7 +280,7 @@ def test_fleet_messages_wait_for_the_mission():
         inbox = Inbox(
             bus, config.keys(), make_mailbox(MAX_PIXELS), poses, MAX_PIXELS, fleet=receiver
         )
-        assert inbox.decode(Batch(samples=told[:1]), has_mission=False) == ([], [])
-        events, faults = inbox.decode(Batch(samples=told[1:]))
+        assert inbox.decode(CycleInput(samples=told[:1]), has_mission=False) == ([], [])
+        events, faults = inbox.decode(CycleInput(samples=told[1:]))
     assert events == [FleetReceiver(config).event(told[1].sample)]
     assert faults == []
