@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import NoReturn
 
 from fasaco_edge import __version__
-from fasaco_edge.cli.console.arguments import Command, Exit, add_common
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common
 from fasaco_edge.cli.console.logs import begin_logging, report_error
 from fasaco_edge.cli.console.parser import Parser
 from fasaco_edge.cli.console.streams import clean_streams, open_missing_streams
@@ -133,7 +133,7 @@ def _parser(words: Sequence[str]) -> Parser:
     return parser
 
 
-def _describe(parser: argparse.ArgumentParser, command: Command) -> None:
+def _describe(parser: argparse.ArgumentParser, command: Subcommand) -> None:
     parser.description, parser.epilog = command.description, command.epilog
     parser.set_defaults(command=command.run)
     if not command.is_group:

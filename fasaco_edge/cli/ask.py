@@ -11,8 +11,8 @@ import numpy as np
 from rich.table import Table
 
 from fasaco_edge.cli.console.arguments import (
-    Command,
     Exit,
+    Subcommand,
     add_json,
     add_robot_on_bus,
     robot_on_bus,
@@ -291,7 +291,7 @@ def _trail_figures(reply: QueryReply) -> dict[str, object]:
     }
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Query a running daemon over Zenoh and show the answer.",
     run=run,
     add_options=_add_options,

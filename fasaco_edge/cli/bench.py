@@ -15,7 +15,7 @@ from fasaco_edge.bench.benchmark import Benchmark, Report, Sample, machine
 from fasaco_edge.bench.daemon import DAEMON
 from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.cli.console.arguments import Command, Exit, add_common, add_json
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common, add_json
 from fasaco_edge.cli.console.logs import report_error
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.host.processes import peak_mb
@@ -161,7 +161,7 @@ def _table(title: str) -> Table:
     )
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Compare planners; or measure the daemon's memory, load and delays on this "
     "machine, and whether they meet their goals.",
     run=run,

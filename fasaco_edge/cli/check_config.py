@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from fasaco_edge.cli.console.arguments import Command, Exit, add_json
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out, say
 from fasaco_edge.config.cautions import cautions
@@ -100,7 +100,7 @@ def _print(file: Path, faults: list[BadConfiguration]) -> None:
             say(console, fault.hint, "  -> ", "     ")
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Check a configuration before a daemon starts with it; list every fault with its "
     "line, the value, and what is allowed.",
     run=run,

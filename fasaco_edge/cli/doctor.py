@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rich.text import Text
 
-from fasaco_edge.cli.console.arguments import Command, Exit, add_json
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out, wrapped
 from fasaco_edge.doctor.finding import Finding, Level
@@ -87,7 +87,7 @@ def _print(found: list[tuple[str, Finding]]) -> None:
             console.print(Text(fitted(f"-> {finding.to_do}")), soft_wrap=True)
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Check the bus, the configuration, and the host on which a daemon runs or will "
     "run: what is missing, who has access to what, and what to do about it.",
     run=run,

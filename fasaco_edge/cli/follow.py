@@ -12,7 +12,13 @@ import os
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
-from fasaco_edge.cli.console.arguments import Command, Exit, add_robot_on_bus, robot_on_bus, seconds
+from fasaco_edge.cli.console.arguments import (
+    Exit,
+    Subcommand,
+    add_robot_on_bus,
+    robot_on_bus,
+    seconds,
+)
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.processes import python_program, stop_event
 
@@ -254,7 +260,7 @@ def _nav2(config: DaemonConfig) -> dict[str, object]:
     }
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Drive a robot's base along the path of its daemon: subscribe to path and pose, "
     "publish velocities (geometry_msgs/Twist) 20 times a second, until SIGTERM or SIGINT. For "
     "robots whose base takes velocities, and that have no other program to follow a path.",

@@ -12,8 +12,8 @@ from fasaco_edge.bus import DEFAULT_ENDPOINT
 from fasaco_edge.cli.console.arguments import (
     DEFAULT_CELL_M,
     DEFAULT_RADIUS_M,
-    Command,
     Exit,
+    Subcommand,
     add_json,
     check_outputs,
     seconds,
@@ -283,7 +283,7 @@ def _print(file: Path, text: str, config: DaemonConfig, peers: Finding | None) -
     console.print(f"start it:   fasaco-edge run --config {file}", soft_wrap=True)
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Write a first configuration for a robot: its size, its tool, the source of its "
     "map. Look for the map on the bus, and print what was received.",
     run=run,

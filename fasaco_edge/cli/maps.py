@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from fasaco_edge.cli.console.arguments import Command
+from fasaco_edge.cli.console.arguments import Subcommand
 from fasaco_edge.cli.console.terminal import figures, out
 from fasaco_edge.grid.map_files import builtin_maps
 
@@ -15,7 +15,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="List the maps that come with the package; plan, simulate and demo "
     "take them by name.",
     run=run,

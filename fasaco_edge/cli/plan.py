@@ -10,9 +10,9 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fasaco_edge.cli.console.arguments import Command, Exit, check_outputs
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, check_outputs
 from fasaco_edge.cli.planning.options import EPILOG, add_options
-from fasaco_edge.cli.planning.request import PlanRequest, read_request, require_frame, watching
+from fasaco_edge.cli.planning.request import RequestedPlan, read_request, require_frame, watching
 from fasaco_edge.cli.planning.results import print_plan, write_files
 from fasaco_edge.cli.warmup import compile_kernels
 from fasaco_edge.config.cautions import tool_caution
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     return Exit.INTERRUPTED if asked.asked.is_set() else Exit.OK
 
 
-def _check_together(args: argparse.Namespace, request: PlanRequest) -> None:
+def _check_together(args: argparse.Namespace, request: RequestedPlan) -> None:
     search = request.search
     if args.rooms and args.passes is not None:
         raise BadConfiguration("--rooms is for one pass, not for several")
@@ -89,7 +89,7 @@ def _check_together(args: argparse.Namespace, request: PlanRequest) -> None:
 
 def _plan(
     args: argparse.Namespace,
-    request: PlanRequest,
+    request: RequestedPlan,
     map: Map,
     asked: Interrupt,
     trails: deque[ColonySnapshot],
@@ -119,7 +119,7 @@ def _plan(
         return plan(map, request.robot, planner=own, watch=show, observe=observe, **given)
 
 
-def _warn(request: PlanRequest, planned: Plan | PassPlans) -> None:
+def _warn(request: RequestedPlan, planned: Plan | PassPlans) -> None:
     """Warn if the line sweeps less floor than requested, or has turns that fit on no arc."""
     floor, asked_share = planned.floor, request.search.swept
     if floor is None or floor.swept_share is None:
@@ -140,7 +140,7 @@ def _warn(request: PlanRequest, planned: Plan | PassPlans) -> None:
         )
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Plan a walk over all cells that the robot can reach, and the line that it drives "
     "along this walk; print how good they are. Only files that an option names are written.",
     run=run,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from fasaco_edge.cli.console.arguments import Command, add_robot_on_bus, robot_on_bus
+from fasaco_edge.cli.console.arguments import Subcommand, add_robot_on_bus, robot_on_bus
 from fasaco_edge.cli.console.terminal import err
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.host.documents import converted, inspected
@@ -134,7 +134,7 @@ def read_config(file: Path) -> tuple[DaemonConfig, BusSettings]:
     return config, config.bus.of_client()
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Record map, swept floor, pheromone, path, pose, states and latencies of one "
     "robot, and all messages to its mission, byte for byte; or record all robots of a fleet on one "
     "map. It ends at SIGTERM or SIGINT. Open the result with `rerun FILE.rrd`; run its mission "

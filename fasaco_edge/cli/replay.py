@@ -15,7 +15,7 @@ from rich.table import Table
 
 from fasaco_edge import __version__
 from fasaco_edge.cli.console import terminal
-from fasaco_edge.cli.console.arguments import Command, Exit
+from fasaco_edge.cli.console.arguments import Exit, Subcommand
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.config.loading import load_config
 from fasaco_edge.recording.read.robot_clock import clock
@@ -144,7 +144,7 @@ def _path(update: PathUpdate) -> dict[str, object]:
     }
 
 
-class Summary(msgspec.Struct):
+class ReplaySummary(msgspec.Struct):
     """The result of a replay."""
 
     duration_s: float
@@ -168,13 +168,13 @@ def _summary(
     samples: RecordedSamples,
     steps: Sequence[ReplayStep],
     last_s: float,
-) -> Summary:
+) -> ReplaySummary:
     mission, coverage = replay.mission, replay.mission.coverage()
     is_approximate = isinstance(replay, Replay)
     faults = Counter(
         fault.code for step in steps for fault in (*step.refused, *step.decision.faults)
     )
-    return Summary(
+    return ReplaySummary(
         duration_s=round(last_s, 3),
         state=str(mission.state),
         reason=mission.reason,
@@ -218,7 +218,7 @@ def _table(steps: Sequence[ReplayStep]) -> Table:
     return table
 
 
-def _rows(summary: Summary) -> list[tuple[str, str]]:
+def _rows(summary: ReplaySummary) -> list[tuple[str, str]]:
     faults = ", ".join(f"{count} {code}" for code, count in summary.faults.items())
     rows = [
         ("ended", f"{summary.state}: {summary.reason}"),
@@ -305,7 +305,7 @@ def _words(found: Difference) -> str:
     )
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description=DESCRIPTION,
     run=run,
     add_options=_add_options,

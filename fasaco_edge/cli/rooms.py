@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from fasaco_edge.cli.ask import add_question, ask, show_rooms
-from fasaco_edge.cli.console.arguments import Command, Exit, add_common, pair_of_floats
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common, pair_of_floats
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import out
@@ -153,7 +153,7 @@ def _asked(args: argparse.Namespace) -> dict[str, object]:
     return {"command": f"room_{args.rooms_action}", "room": room}
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Show the rooms of a running daemon, and change their names, borders and settings.",
     run=run,
     add_options=_add_actions,

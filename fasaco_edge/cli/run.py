@@ -6,7 +6,7 @@ import argparse
 from functools import partial
 from pathlib import Path
 
-from fasaco_edge.cli.console.arguments import Command, Exit
+from fasaco_edge.cli.console.arguments import Exit, Subcommand
 
 EPILOG = """\
 Without --config the daemon listens at tcp/127.0.0.1:7447 (or joins the router that already
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     return Exit.OK
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Run the daemon until SIGTERM or SIGINT.",
     run=run,
     add_options=_add_options,

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fasaco_edge.cli.console.arguments import Command, Exit, add_robot_on_bus, robot_on_bus
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_robot_on_bus, robot_on_bus
 from fasaco_edge.errors import BadConfiguration, MissingExtra
 from fasaco_edge.host.addresses import Address, read_address
 from fasaco_edge.text import one_line
@@ -193,7 +193,7 @@ def _say(address: Address, guard: Guard, tokens: Path | None, secured: bool) -> 
     sys.stdout.flush()
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Serve a web page that shows a robot's mission live: map, swept floor, path and "
     "robot, progress and what is left; where allowed, with commands, and zones drawn by hand. Or "
     "serve a recorded mission, with a time line. Several people may look at once. It runs on the "

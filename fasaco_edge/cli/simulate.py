@@ -10,7 +10,7 @@ import numpy as np
 
 from fasaco_edge.cli.console.arguments import (
     DEFAULT_RADIUS_M,
-    Command,
+    Subcommand,
     add_robot_on_bus,
     check_outputs,
     pair_of_floats,
@@ -144,7 +144,7 @@ def _words(world: World, progress: Progress) -> str:
     )
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Simulate a differential-drive robot with a 360-degree scanner in a building that "
     "it does not know. It publishes its pose and the map scanned so far, and follows the newest "
     "path, until SIGTERM or SIGINT. It waits for a daemon or router.",

@@ -6,7 +6,7 @@ import argparse
 import time
 from collections.abc import Collection
 
-from fasaco_edge.cli.console.arguments import Command, Exit, add_json
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_json
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import err, progress
 from fasaco_edge.kernels import folder as kernels
@@ -89,7 +89,7 @@ def compile_kernels(stages: Collection[str] = STAGES) -> float:
     return time.monotonic() - started
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Compile the kernels into the cache, so that the first plan starts at once.",
     run=run,
     add_options=_add_options,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.ask import nobody_answers
 from fasaco_edge.cli.console.arguments import (
-    Command,
     Exit,
+    Subcommand,
     add_robot_on_bus,
     robot_on_bus,
     seconds,
@@ -122,7 +122,7 @@ def _once(args: argparse.Namespace, watched: Watched, no_answer: Callable[[], Fa
         console.file.write(f"{line.rstrip()}\n")
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Show map, coverage, robot and the path ahead live, with state, figures and the "
     "latest events, on the robot or on any other machine. With --fleet show what each robot of a "
     "fleet does.",

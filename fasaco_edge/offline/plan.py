@@ -19,7 +19,7 @@ from fasaco_edge.host.documents import converted
 from fasaco_edge.offline.ground import Line, PlanGround
 from fasaco_edge.offline.maps import Map
 from fasaco_edge.offline.result import Plan
-from fasaco_edge.offline.search import Ending, Planning
+from fasaco_edge.offline.search import Planning, SearchEnd
 from fasaco_edge.offline.settings import (
     ANYWHERE,
     AXES,
@@ -136,7 +136,7 @@ def plan(
         ground = ground.only(problem.to_cover, beyond=covers == "edge")
     bound = None if search.has_local_search else lower_bound_of(problem)
     budget = None if search.most_s is None else TimeBudget(search.most_s)
-    ending = Ending(stop, budget, watch, bound)
+    ending = SearchEnd(stop, budget, watch, bound)
     planning = Planning(problem, ground, search, own, ending, observe)
     wall, cpu = time.perf_counter(), time.process_time()
     path, xy = planning.run(line, robot)

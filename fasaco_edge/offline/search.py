@@ -43,7 +43,7 @@ COMPARED = 3
 SECOND_SEED = 1 << 20
 
 
-class Ending:
+class SearchEnd:
     """Decides when the searches for walks, and for the line along one, end.
 
     Args:
@@ -154,7 +154,7 @@ class Planning:
         ground: PlanGround,
         search: Search,
         own: UserCode | None,
-        ending: Ending,
+        ending: SearchEnd,
         observe: Observer,
     ) -> None:
         self._problem, self._ground, self._search = problem, ground, search

@@ -103,7 +103,7 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
     """Return the methods that are timed: name of the part, class, name of the method."""
     from fasaco_edge.grid.reachable_area import ReachableArea
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
-    from fasaco_edge.mission.line.floor_left import FloorLeft
+    from fasaco_edge.mission.line.floor_left import UnsweptTally
     from fasaco_edge.mission.line.layer import LineLayer
     from fasaco_edge.mission.line.line_ahead import LineAhead
     from fasaco_edge.mission.line.polisher import Polisher
@@ -129,7 +129,7 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
         ("route", Route, "truncate"),
         ("trail", TrailLayer, "finish"),
         ("trail", TrailLayer, "posed"),
-        ("open floor", FloorLeft, "update"),
+        ("open floor", UnsweptTally, "update"),
         ("follow", LineLayer, "receive_map"),
         ("laying", LineAhead, "lay"),
         ("laying", LineAhead, "check"),

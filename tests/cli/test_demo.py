@@ -16,7 +16,7 @@ from PIL import Image
 from fasaco_edge.cli.demo import COMMAND, EPILOG
 from fasaco_edge.cli.demo.mission import DemoMission
 from fasaco_edge.cli.demo.robots import demo_robots
-from fasaco_edge.cli.demo.summary import RobotFigures, Summary
+from fasaco_edge.cli.demo.summary import DemoSummary, RobotFigures
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D
 from fasaco_edge.grid.map_files import read_map
 from fasaco_edge.grid.occupancy import OccupancyGrid
@@ -164,7 +164,7 @@ def test_robots_of_a_fleet_cover_a_building_together(tmp_path, building):
 
 def test_each_figure_is_in_the_help():
     told = set(re.findall(r"\w+", EPILOG))
-    assert {*Summary.__slots__, *RobotFigures.__slots__} <= told
+    assert {*DemoSummary.__slots__, *RobotFigures.__slots__} <= told
 
 
 def test_more_robots_than_places_to_start_from(tmp_path):

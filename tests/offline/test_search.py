@@ -15,7 +15,7 @@ from fasaco_edge.kernels.floor.seconds import chain_s
 from fasaco_edge.kernels.floor.sweeps import sweep_edges
 from fasaco_edge.offline.ground import PlanGround
 from fasaco_edge.offline.plan import _problem
-from fasaco_edge.offline.search import Ending, Planning
+from fasaco_edge.offline.search import Planning, SearchEnd
 from fasaco_edge.offline.settings import ANYWHERE, WALLS
 from fasaco_edge.planners.bound import lower_bound_of
 from fasaco_edge.planners.line import LINES, LineSearch, _sweeps, memory_for_moves
@@ -54,7 +54,7 @@ def planned(grid: OccupancyGrid, seed: int, pauses: Pauses, observe=ignore, line
     """Return the ground, walk and line of a search that ends after some pauses."""
     search = fe.Search(seed=seed, budget_s=1e6)
     ground = PlanGround.of_floor(grid, ROBOT, (0.5, 0.5), WALLS)
-    ending = Ending(None, pauses, lambda _: None, None)
+    ending = SearchEnd(None, pauses, lambda _: None, None)
     problem = _problem(ground, ROBOT, ANYWHERE)
     planning = Planning(problem, ground, search, None, ending, observe)
     return ground, *planning.run(line, ROBOT)
@@ -106,7 +106,7 @@ def test_pheromone_is_shown_while_only_ants_walk():
     problem = _problem(ground, ROBOT, ANYWHERE)
     search = fe.Search(planner="fasaco", ants=64)
     shown = []
-    ending = Ending(None, None, lambda _: shown.append("walk"), lower_bound_of(problem))
+    ending = SearchEnd(None, None, lambda _: shown.append("walk"), lower_bound_of(problem))
     Planning(problem, ground, search, None, ending, lambda _: shown.append("ants")).run(
         "quick", ROBOT
     )

@@ -43,7 +43,7 @@ def add_nothing(parser: argparse.ArgumentParser) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class Subcommand:
     """One command of ``fasaco-edge``.
 
     Attributes:

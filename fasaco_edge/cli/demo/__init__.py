@@ -9,8 +9,8 @@ from pathlib import Path
 from fasaco_edge.cli.console.arguments import (
     DEFAULT_CELL_M,
     DEFAULT_RADIUS_M,
-    Command,
     Exit,
+    Subcommand,
     add_json,
     naming,
 )
@@ -134,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
     return Exit.OK if summary.complete else Exit.ERROR
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Start a daemon, a recorder and a simulated robot, or several of each, as "
     "processes that communicate by Zenoh over loopback; show the mission; exit when every "
     "reachable cell is covered. Write a recording (.rrd), a picture and the figures to the output "

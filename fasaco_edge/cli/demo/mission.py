@@ -39,7 +39,7 @@ AT_WORK = ("planning", "covering", "degraded")
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class MissionEnding:
     """How the mission ended.
 
     Attributes:
@@ -88,7 +88,7 @@ class DemoMission:
     def __exit__(self, *_: object) -> None:
         self._stack.close()
 
-    def watch(self) -> Ending | None:
+    def watch(self) -> MissionEnding | None:
         """Show the mission until its end, and return the ending; None if the user quits.
 
         Raises:
@@ -100,7 +100,7 @@ class DemoMission:
             return None
         worked_at = self._worked_at
         worked_s = worked_at[-1] - worked_at[0] if worked_at else 0.0
-        return Ending(
+        return MissionEnding(
             tuple(self._statuses),
             time.monotonic() - self._started,
             timed_out=self._done_since is None,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.streams import print_json
-from fasaco_edge.cli.demo.mission import Ending
+from fasaco_edge.cli.demo.mission import MissionEnding
 from fasaco_edge.cli.demo.robots import DemoRobot
 from fasaco_edge.client.phrases import age
 from fasaco_edge.drawing.pictures import draw_mission
@@ -61,7 +61,7 @@ class RobotFigures:
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class DemoSummary:
     """The figures of a demo; areas of floor are by the true building and tracks.
 
     Cells are counted by the daemon; with several daemons, by the one with the most cells left.
@@ -87,8 +87,8 @@ class Summary:
 
 
 def summarise(
-    args: argparse.Namespace, out: Path, robots: Sequence[DemoRobot], ending: Ending
-) -> Summary:
+    args: argparse.Namespace, out: Path, robots: Sequence[DemoRobot], ending: MissionEnding
+) -> DemoSummary:
     """Return the figures of a demo; write them and a picture into ``out``."""
     truth = _truth(args, robots)
     reports = [status.coverage for status in ending.statuses if status.coverage is not None]
@@ -102,7 +102,7 @@ def summarise(
         )
         for robot, floor in zip(robots, truth.floors, strict=True)
     )
-    summary = Summary(
+    summary = DemoSummary(
         map=str(args.map),
         complete=cells.covered == cells.coverable and not ending.timed_out,
         reachable_cells=cells.coverable,
@@ -128,7 +128,7 @@ def summarise(
     return summary
 
 
-def print_summary(summary: Summary, *, as_json: bool) -> None:
+def print_summary(summary: DemoSummary, *, as_json: bool) -> None:
     """Print the figures as a table or as JSON."""
     if as_json:
         print_json(asdict(summary))
@@ -145,7 +145,7 @@ def print_summary(summary: Summary, *, as_json: bool) -> None:
         console.print(f"{what:12} {command}", soft_wrap=True)
 
 
-def _openers(summary: Summary) -> Iterator[tuple[str, str]]:
+def _openers(summary: DemoSummary) -> Iterator[tuple[str, str]]:
     """Yield the commands that open the recording, each with its purpose."""
     recordings = summary.fleet_recording or summary.recording
     if not recordings:
@@ -165,7 +165,7 @@ def _openers(summary: Summary) -> Iterator[tuple[str, str]]:
     yield "in Rerun:", f"{terminal.command('rerun')} {files}"
 
 
-def _rows(summary: Summary) -> list[tuple[str, str]]:
+def _rows(summary: DemoSummary) -> list[tuple[str, str]]:
     cells, covered = summary.reachable_cells, summary.covered_cells
     fleet = [
         (robot.name, f"{robot.driven_m} m in {robot.drive_s:.0f} s, {robot.swept_m2:.1f} m2 swept")
@@ -184,12 +184,12 @@ def _rows(summary: Summary) -> list[tuple[str, str]]:
     ]
 
 
-def _swept(summary: Summary) -> str:
+def _swept(summary: DemoSummary) -> str:
     # Daemon and review use the robot's map and poses, so their figures differ by about 1 %.
     return f"{swept_words(summary.swept_m2, summary.reachable_m2)}, by the true building and track"
 
 
-def _time(summary: Summary) -> str:
+def _time(summary: DemoSummary) -> str:
     return f"{summary.wall_s} s, for {age(summary.makespan_s)} of the robot's time"
 
 
@@ -211,7 +211,7 @@ def _trail(robot: DemoRobot) -> NDArray[np.float64]:
     return np.loadtxt(robot.trail, delimiter=",", skiprows=1, ndmin=2)
 
 
-def _draw(args: argparse.Namespace, truth: _Truth, summary: Summary) -> None:
+def _draw(args: argparse.Namespace, truth: _Truth, summary: DemoSummary) -> None:
     lines = [
         f"{summary.covered_cells} of {summary.reachable_cells} reachable cells covered, "
         f"{summary.driven_m} m driven, {summary.paths} paths",

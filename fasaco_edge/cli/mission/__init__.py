@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from fasaco_edge.cli.ask import RefusedError, add_question, ask, show_mission
-from fasaco_edge.cli.console.arguments import Command, Exit, add_common
+from fasaco_edge.cli.console.arguments import Exit, Subcommand, add_common
 from fasaco_edge.cli.console.pass_option import WORDS, add_passes
 from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.cli.console.terminal import agrees, err, may_ask
@@ -259,7 +259,7 @@ def _zone(text: str) -> dict[str, object]:
     return {"name": name, "polygon": polygon(corners)} if colon else {"name": name}
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description="Command the mission of a running daemon over Zenoh, and show its progress.",
     run=run,
     add_options=_add_commands,

@@ -77,7 +77,7 @@ SEARCH_OPTIONS = {
 
 
 @dataclass(frozen=True, slots=True)
-class PlanRequest:
+class RequestedPlan:
     """The plan that the options request.
 
     Attributes:
@@ -95,7 +95,7 @@ class PlanRequest:
     sources: tuple[Path, ...] = ()
 
 
-def read_request(args: argparse.Namespace) -> PlanRequest:
+def read_request(args: argparse.Namespace) -> RequestedPlan:
     """Return the request of the options; missing values come from ``--config``, else defaults.
 
     Raises:
@@ -133,7 +133,7 @@ def read_request(args: argparse.Namespace) -> PlanRequest:
         )
     named = args.config, Path(own.file) if own and own.file else None
     sources = tuple(file for file in named if file is not None)
-    return PlanRequest(msgspec.structs.replace(robot, **changes), search, line, own, sources)
+    return RequestedPlan(msgspec.structs.replace(robot, **changes), search, line, own, sources)
 
 
 def require_frame(map: Map, xy_out: Path | None) -> None:

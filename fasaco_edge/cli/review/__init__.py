@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from fasaco_edge.cli.console import terminal
 from fasaco_edge.cli.console.arguments import (
-    Command,
+    Subcommand,
     check_outputs,
     naming,
     pair_of_floats,
@@ -260,7 +260,7 @@ def _epilog() -> str:
     return "\n".join(lines)
 
 
-COMMAND = Command(
+COMMAND = Subcommand(
     description=DESCRIPTION,
     run=run,
     add_options=_add_options,

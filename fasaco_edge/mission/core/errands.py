@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
-from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.events import Doing, PathUpdate, State
 from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.path.route import NO_CELLS
@@ -24,7 +24,7 @@ PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 class Errands:
     """Begins, drives and ends errands."""
 
-    def __init__(self, parts: Parts) -> None:
+    def __init__(self, parts: MissionParts) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
         self.route, self.charging, self.way_out = parts.route, parts.charging, parts.way_out
         self.standing = parts.standing

@@ -10,7 +10,7 @@ from fasaco_edge.errors import FasacoError, LedgerMismatchError, WrongFrame
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.order_changes import OTHERS_FIRST
-from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.coverage.drive_meter import Driven
 from fasaco_edge.mission.events import (
     Answer,
@@ -35,7 +35,7 @@ from fasaco_edge.mission.events import (
 class EventHandler:
     """Applies events, one after the other, to the parts of a mission."""
 
-    def __init__(self, parts: Parts) -> None:
+    def __init__(self, parts: MissionParts) -> None:
         self.map, self.ledger, self.monitor = parts.map, parts.ledger, parts.monitor
         self.orders, self.route, self.line = parts.orders, parts.route, parts.line
         self.trail, self.company, self.changes = parts.trail, parts.company, parts.changes

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.errands import Errands
 from fasaco_edge.mission.core.order_work import OrderWork
-from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.path_checks import PathChecks
 from fasaco_edge.mission.core.trouble import DRIVING, Troubles
 from fasaco_edge.mission.events import Decision, Doing, PathUpdate, State
@@ -25,7 +25,7 @@ class Executive:
         troubles: current troubles; read-only.
     """
 
-    def __init__(self, parts: Parts, mask_frame: str) -> None:
+    def __init__(self, parts: MissionParts, mask_frame: str) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
         self.route, self.company, self.charging = parts.route, parts.company, parts.charging
         self.time_limit, self.giving_way, self.dock = parts.time_limit, parts.giving_way, parts.dock

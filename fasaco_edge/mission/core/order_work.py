@@ -7,7 +7,7 @@ import numpy as np
 from fasaco_edge.errors import NothingToCover
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.errands import NO_WAY, Errands
-from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.events import Doing, PathUpdate, State
 from fasaco_edge.mission.work.order_state import Stage
 
@@ -15,7 +15,7 @@ from fasaco_edge.mission.work.order_state import Stage
 class OrderWork:
     """Plans the rest of an order, and ends it."""
 
-    def __init__(self, parts: Parts, errands: Errands) -> None:
+    def __init__(self, parts: MissionParts, errands: Errands) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
         self.route, self.line, self.company = parts.route, parts.line, parts.company
         self.errands, self.way_out = errands, parts.way_out

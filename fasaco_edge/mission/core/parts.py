@@ -44,7 +44,7 @@ class Lasting:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Parts:
+class MissionParts:
     """The parts of a mission.
 
     Attributes:
@@ -90,7 +90,7 @@ class Parts:
 
 def laid_parts(
     config: MissionConfig, kind: CompanyKind, lasting: Lasting, lattice_deg: float
-) -> Parts:
+) -> MissionParts:
     """Return new parts on a lattice.
 
     Args:
@@ -114,7 +114,7 @@ def laid_parts(
     line = LineLayer(sweeping, map_state, ledger, orders, route)
     trail = TrailLayer(config, map_state, route)
     motion = MapMotion(ledger, orders, trail, route)
-    return Parts(
+    return MissionParts(
         map=map_state,
         ledger=ledger,
         monitor=InputMonitor(config),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fasaco_edge.grid.lattice import Cell
-from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.standing import PATIENCE_S
 
 # Period of ``check_worth`` and ``check_time`` [s].
@@ -19,7 +19,7 @@ class PathChecks:
     Nothing is checked while a plan is wanted or being made.
     """
 
-    def __init__(self, parts: Parts) -> None:
+    def __init__(self, parts: MissionParts) -> None:
         self._ledger, self._monitor, self._orders = parts.ledger, parts.monitor, parts.orders
         self._route, self._line, self._standing = parts.route, parts.line, parts.standing
         self._orders.ask_for_floor(self._sum_up)

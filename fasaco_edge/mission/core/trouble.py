@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.in_dock import DockCurrent
-from fasaco_edge.mission.core.parts import Parts
+from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.path_checks import FAR_APART
 from fasaco_edge.mission.events import State
 
@@ -65,7 +65,7 @@ class Troubles:
         found: by the last ``update``, in the order of ``RULES``.
     """
 
-    def __init__(self, parts: Parts) -> None:
+    def __init__(self, parts: MissionParts) -> None:
         self.map, self.monitor, self.charging = parts.map, parts.monitor, parts.charging
         self.giving_way, self.standing, self.dock = parts.giving_way, parts.standing, parts.dock
         self.way_out, self.blocked = parts.way_out, parts.blocked

@@ -64,7 +64,7 @@ class FloorToSweep(NamedTuple):
     possible_m2: float | None
 
 
-class FloorLeft:
+class UnsweptTally:
     """Keeps the tally of the line up to date with map, order and ledger; without a floor, does
     nothing: then only cells are counted."""
 

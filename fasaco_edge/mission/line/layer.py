@@ -18,7 +18,7 @@ from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.events import PathUpdate
 from fasaco_edge.mission.line.curver import Curver
-from fasaco_edge.mission.line.floor_left import FloorLeft
+from fasaco_edge.mission.line.floor_left import UnsweptTally
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.place_on_line import Offset
 from fasaco_edge.mission.line.polisher import Polisher
@@ -61,7 +61,7 @@ class LineLayer:
         route: Route,
     ) -> None:
         self._map, self._orders, self._route = map_state, orders, route
-        self.left = FloorLeft(sweeping, map_state, ledger, orders)
+        self.left = UnsweptTally(sweeping, map_state, ledger, orders)
         self.offset = Offset(sweeping.tool_m if sweeping else 0.0)
         self._config = sweeping.line if sweeping else None
         self._polisher = Polisher(sweeping.line) if sweeping else None
