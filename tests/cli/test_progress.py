@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from fasaco_edge.cli.console import terminal
 from tests.support.processes import ENVIRONMENT, fasaco_edge, free_endpoint
 from tests.support.screen import Screen
 from tests.support.terminal import Terminal
@@ -152,6 +153,14 @@ def test_a_file_gets_no_progress(monkeypatch, colour):
     assert ended.code == 0
     assert ended.err == ""
     assert "\x1b" not in COLOURS.sub("", ended.out)
+
+
+def test_long_work_says_so_in_a_file_too(monkeypatch, capsys):
+    monkeypatch.setattr(terminal, "SAY_S", 0.0)
+    with terminal.progress() as bar:
+        task = bar.add_task("looking", total=3)
+        bar.update(task, description="compiling kernels", completed=1)
+    assert capsys.readouterr().err == "compiling kernels (1 of 3)\n"
 
 
 # Run in a terminal: what a log, a warning, a second console and a thread print meanwhile.

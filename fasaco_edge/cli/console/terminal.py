@@ -9,6 +9,7 @@ import signal
 import sys
 import sysconfig
 import textwrap
+import time
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from functools import cache
@@ -23,6 +24,7 @@ from rich.progress import (
     Progress,
     ProgressColumn,
     Task,
+    TaskID,
     TextColumn,
     TimeElapsedColumn,
 )
@@ -41,6 +43,8 @@ USUAL_WIDTH, WIDE_BAR, NARROW_BAR, CLOCK, COUNT = 80, 32, 16, 7, 13
 LEAST_DESCRIPTION = 8
 # Least width of text beside an indent [characters].
 LEAST_ROOM = 24
+# Period of lines in place of a progress bar [s].
+SAY_S = 20.0
 # Space for the ``^C`` that a terminal prints [characters].
 RIGHT_MARGIN = 2
 
@@ -150,11 +154,28 @@ class Description(TextColumn):
         return text
 
 
+class ProgressBar(ProgressLines):
+    """A progress bar; without a terminal that can draw it, a line every ``SAY_S``, so that a log
+    shows that long work goes on."""
+
+    def __init__(self, *columns: ProgressColumn | str) -> None:
+        super().__init__(*columns)
+        self._said_at = time.monotonic()
+
+    def update(self, task_id: TaskID, **changes: Any) -> None:  # noqa: ANN401 - as rich has them
+        """Change a task, as ``Progress.update``."""
+        super().update(task_id, **changes)
+        if self.disable and time.monotonic() - self._said_at >= SAY_S:
+            self._said_at, task = time.monotonic(), self._tasks[task_id]
+            count = f" ({task.completed:.0f} of {task.total:.0f})" if task.total else ""
+            err().print(f"{task.description}{count}", soft_wrap=True)
+
+
 def progress(*, counted: bool = True) -> Progress:
     """Return a progress bar; ``counted``: whether it shows numbers."""
     count = (MofNCompleteColumn(),) if counted else ()
     bar = WIDE_BAR if err().width >= USUAL_WIDTH else NARROW_BAR
-    return ProgressLines(
+    return ProgressBar(
         Description(beside=bar + CLOCK + 2 + (COUNT + 1 if counted else 0)),
         BarColumn(bar_width=bar),
         *count,
