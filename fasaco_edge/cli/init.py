@@ -210,6 +210,8 @@ def _ask(args: argparse.Namespace) -> None:
         raise BadConfiguration(
             f"{', '.join(names)} must be given: there is no terminal for questions"
         )
+    options = {key: getattr(args, option) for key, option in ROBOT.items()}
+    _checked({"robot": {key: value for key, value in options.items() if value is not None}})
     for name in missing:
         setattr(args, name, _asked(name))
 

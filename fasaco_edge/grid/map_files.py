@@ -48,6 +48,8 @@ LOG = logging.getLogger(__name__)
 
 IMAGE_SUFFIXES = (".pgm", ".png", ".bmp", ".jpg", ".jpeg")
 MAP_SUFFIXES = (".yaml", ".yml", ".npy", *IMAGE_SUFFIXES)
+# Number of maps in a folder that an error lists.
+MOST_LISTED = 5
 # Thresholds of ROS 1's map_saver, by which its grey for unknown, 205, is not free.
 FREE_THRESH, OCCUPIED_THRESH = 0.196, 0.65
 
@@ -231,6 +233,11 @@ def find_map(name_or_path: str | Path) -> Path:
     names = [name for name, _ in builtin_maps()]
     if str(name_or_path) in names:
         return _maps() / f"{name_or_path}.yaml"
+    if str(name_or_path) and os.path.isdir(path):
+        inside = [path / name for name in _map_names(path) if name.endswith((".yaml", ".yml"))]
+        listed = ", ".join(map(str, inside[:MOST_LISTED])) + ", ..." * (len(inside) > MOST_LISTED)
+        hint = f"give one of its maps: {listed}" if inside else "no .yaml of a map is in it"
+        raise MapFileError(f"{str(name_or_path)!r} is a folder", hint=hint)
     raise MapFileError(
         f"no map {str(name_or_path)!r}: neither a file nor a built-in map ({', '.join(names)})",
         hint=suggestion(str(name_or_path), names) or _beside(path) or None,
@@ -239,11 +246,16 @@ def find_map(name_or_path: str | Path) -> Path:
 
 def _beside(path: Path) -> str:
     """Return a question for the map file that a missing file's name resembles; "" for none."""
+    near = nearest(path.name, _map_names(path.parent))
+    return "".join(f"did you mean {path.with_name(name)}?" for name in near)
+
+
+def _map_names(folder: Path) -> list[str]:
+    """Return the names of the map files in a folder, sorted; [] if it cannot be read."""
     try:
-        files = sorted(each.name for each in path.parent.iterdir() if each.suffix in MAP_SUFFIXES)
+        return sorted(each.name for each in folder.iterdir() if each.suffix in MAP_SUFFIXES)
     except (OSError, ValueError):
-        return ""
-    return "".join(f"did you mean {path.with_name(name)}?" for name in nearest(path.name, files))
+        return []
 
 
 def builtin_maps() -> list[tuple[str, str]]:

@@ -130,6 +130,14 @@ def test_a_typing_error_is_asked_for_again(tmp_path, typed, capsys):
     assert asked.count("Radius of the disc") == 3
 
 
+def test_an_invalid_option_is_refused_before_a_question(tmp_path, typed, capsys):
+    typed("0.3\n")
+    assert init(tmp_path / "robot.yaml", "--robot-radius", "20") == 78
+    asked = capsys.readouterr().err
+    assert "robot.radius_m: expected float <= 10.0, got 20.0" in " ".join(asked.split())
+    assert "Width of the" not in asked
+
+
 def test_without_an_answer_no_file_is_written(tmp_path, typed, capsys):
     typed("0.25\n")
     file = tmp_path / "robot.yaml"

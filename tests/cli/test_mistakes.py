@@ -51,7 +51,7 @@ def folder(tmp_path, monkeypatch):
     ("words", "code", "said"),
     [
         ("plan nowhere.yaml", 1, "no map 'nowhere.yaml'"),
-        ("plan .", 1, "no map '.'"),
+        ("plan .", 1, "'.' is a folder\n  hint: give one of its maps: map.yaml, text.yaml"),
         ("plan flatt", 1, "hint: did you mean flat?"),
         ("plan ./maps.yaml", 1, "hint: did you mean map.yaml?"),
         ("plan map.yml", 1, "hint: did you mean map.yaml?"),

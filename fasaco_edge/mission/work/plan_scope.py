@@ -162,14 +162,23 @@ class PlanScope:
     @property
     def is_part(self) -> bool:
         """Whether other cells are left than those planned now."""
+        if not self._has_first:
+            return False
         first, left = self._counts()
         return left > first
 
     @property
     def is_first_done(self) -> bool:
         """Whether the cells planned first are covered, and other cells are left."""
+        if not self._has_first:
+            return False
         first, left = self._counts()
         return left > 0 and not first
+
+    @property
+    def _has_first(self) -> bool:
+        """Whether a priority or a room puts some cells first."""
+        return self.worth.least > 0 or self._room.is_chosen
 
     def by_priority(self, ledger: MissionLedger) -> OrderState:
         """Return the order, its remaining zones sorted by priority if time does not allow all.
