@@ -31,10 +31,10 @@ MEASURES = (
     ("ready_s", "exec to liveliness token [s]", 3),
     ("status_s", "exec to first status [s]", 3),
     ("idle_mb", "memory before the first map [MB]", 1),
-    ("idle_own_mb", "without pages of files [MB]", 1),
+    ("idle_own_mb", "of it its own, without files mapped into memory [MB]", 1),
     ("idle_percent", "share of a core before the first map [%]", 2),
     ("warm_mb", "memory after map and plan [MB]", 1),
-    ("warm_own_mb", "without pages of files [MB]", 1),
+    ("warm_own_mb", "of it its own, without files mapped into memory [MB]", 1),
     ("peak_mb", "peak memory [MB]", 1),
 )
 # Goals: measured value, label, limit of its median, unit.

@@ -88,8 +88,8 @@ class TokenList:
     def _take(self, found: list[str], is_whole: bool) -> None:
         with self._lock:
             self._is_asking = False
-            # After an incomplete reply, further tokens may exist: known ones are kept. An
-            # incomplete first reply counts, too, as a frozen peer may never reply.
+            # After an incomplete reply, further tokens may exist: known ones are kept. The first
+            # reply is used even if it is incomplete, as a frozen peer may never complete it.
             there = frozenset(found)
             if not is_whole and len(there | self._there) <= MOST_TOKENS:
                 there |= self._there

@@ -2,8 +2,9 @@
 
 Samples arrive as they are published, and as replies to queries. A reply may overtake published
 samples: it has a higher priority, and samples are delivered by another thread. Samples that a reply
-has overtaken are dropped as older. Where several samples of a publisher count, all wait until the
-replies are complete, and those after a lost sample wait for the next reply, which may have it.
+has overtaken are dropped as older. If more than the newest sample of a publisher is used, samples
+wait until the replies are complete. After a lost sample they wait for the next reply, which may
+contain it.
 
 The cache of each publisher is queried at most once a second, and not while a reply is pending. Up
 to MOST_PUBLISHERS of a key are queried.
@@ -117,7 +118,7 @@ class AskedPublishers:
         Returns their names; ``now`` is monotonic [s].
         """
         came = [name for name in keys if name not in self._publishers]
-        # Publishers reply to a pending query to all, and are not queried again at once.
+        # A pending query reaches new publishers, too, so they are not queried again at once.
         waits_s = ASK_PERIOD_S if self.is_asking else 0.0
         for name in (added := came[: MOST_PUBLISHERS - len(self._publishers)]):
             self._publishers[name] = AskedPublisher(name, keys[name], now + waits_s)
@@ -138,8 +139,9 @@ class SampleOrder:
         self._last_mark = OrderedDict[str, int]()
         # When that sample was published, by the publisher's clock; 0 if unknown.
         self._stamps = OrderedDict[str, int]()
-        # The marks of publishers without a token. They only serve to drop replies received already:
-        # without a token, a reset of the publisher's clock goes unnoticed.
+        # The marks of publishers without a token. Only replies are dropped by these marks: samples
+        # of a publisher that has restarted with an earlier clock would be lost, as only a token
+        # shows the restart.
         self._unconfirmed = OrderedDict[str, int]()
         # Samples that wait for replies.
         self._held: list[tuple[str, int, zenoh.Sample]] = []

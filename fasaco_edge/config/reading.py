@@ -37,7 +37,7 @@ REMOVED = {
 def refused(
     check: Callable[[], object], *, key: str = "", others: Sequence[str] = ()
 ) -> Iterator[BadConfiguration]:
-    """Yield the error that a check raises, at ``key``, or else where it says itself."""
+    """Yield the error that a check raises, with ``key`` as its key unless that is ""."""
     try:
         check()
     except BadConfiguration as error:
@@ -66,7 +66,7 @@ def without_removed(document: object, key: str = "") -> tuple[Any, list[BadConfi
 def renamed(config: Mapping[str, object]) -> dict[str, object]:
     """Return a recorded configuration with this release's name of the planner.
 
-    With ``planner.local_search``, fasaco was what is now colony-search.
+    Earlier releases called colony-search "fasaco", with ``planner.local_search`` true.
     """
     planner = config.get("planner")
     if not isinstance(planner, Mapping) or "local_search" not in planner:

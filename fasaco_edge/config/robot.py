@@ -68,15 +68,15 @@ class RobotConfig(StrictDocument, frozen=True):
     """The robot: its name on the bus, its size [m], and its driving.
 
     ``quarter_turn_s`` is the duration of a turn by 90 degrees on the spot, with braking and
-    starting [s]; with 0, plans minimise steps alone. If ``turn_deg_s`` is given, the robot's limits
-    replace it: the rate of turning [deg/s], the angular acceleration [deg/s2], the acceleration of
-    driving [m/s2], and the largest bend that is steered while driving [deg].
+    starting [s]; with 0, plans minimise steps alone. If ``turn_deg_s`` is given, turns take as long
+    as the robot's limits allow: the rate of turning [deg/s], the angular acceleration [deg/s2], the
+    acceleration of driving [m/s2], and the largest bend that is steered while driving [deg].
     ``overlap`` is the share of the tool's width by which cells overlap if a line is driven
     (``planner.line``); the line then leaves out floor swept already. Passes of an order may set
     another one.
     ``footprint`` replaces ``radius_m`` by the radius of the disc around it.
     ``clearance_m`` is the distance that lines keep from walls and furniture in addition to the
-    radius; they give up half of it, or all, where only that reaches floor worth the time.
+    radius. A line keeps half of it, or none, where it would otherwise miss much floor.
     ``turn_radius_m`` is the radius of the tightest arc; 0 for a robot that turns on the spot. With
     a radius, lines become curves of lanes and of arcs a tenth wider; ``reverses`` is whether the
     robot may drive them backward, too.

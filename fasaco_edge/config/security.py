@@ -30,7 +30,7 @@ ATTRIBUTES = {"tls": "cert_common_names", "user": "usernames"}
 # The protocols over which a session proves its identity.
 CARRIERS = {
     "tls": (("tls",), "only tls/<host>:<port> carries certificates"),
-    "user": (("tcp", "ws", *UNIX), "user and password are shown over tcp, ws or a unix socket"),
+    "user": (("tcp", "ws", *UNIX), "only tcp, ws and unix sockets carry user and password"),
 }
 
 Name = Annotated[str, Meta(min_length=1)]
@@ -184,7 +184,7 @@ class BusConfig(StrictDocument, frozen=True):
     def faults(self) -> Iterator[BadConfiguration]:
         yield from refused(lambda: Keys(base=self.base))
         if not (self.listen or self.connect):
-            text = "must not be empty where bus.connect is"
+            text = "must not be empty if bus.connect is empty"
             yield BadConfiguration(text, key="listen", others=["connect"])
         yield from endpoint_faults("listen", self.listen)
         yield from endpoint_faults("connect", self.connect)

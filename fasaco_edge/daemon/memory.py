@@ -28,8 +28,8 @@ by tile, and tiles are bounded (``grid.lattice``).
 A cell takes these bytes:
 
 * the path: some 80 for each pose, twice while it is sent;
-* the living trail: 16, as much again while a copy is planned on or written, and 8 in the ledger's
-  file; the trail of a plan's ants spans only the regions that they walked on;
+* the living trail: 16, another 16 while a plan or a writer has a copy, and 8 in the ledger's file;
+  (the trail of a plan's ants spans only the regions that they walked on);
 * priorities: 1 if received as a message, and 2 for priorities of rooms;
 * covered cells of the ledger: 4, with the copy being written;
 * swept floor: 18 for a cell of 0.3 m, a bit for each pixel of 2.5 cm, and as much again if it has
@@ -42,8 +42,8 @@ takes 121 MB, 17 MB of them for the map, and 228 MB with pages of libraries, whi
 reclaim (``fasaco-edge bench daemon``). A path of 440,000 cells takes 127 MB more; maps of 25
 million pixels at 20 Hz take 75 MB more, 240 MB if an update of full size follows each, and another
 50 MB with a recorder. The base includes 42 MB of samples other than maps that wait for the loop,
-and the library pages in use. A library just unpacked has up to 16 MB more of these than a copied
-one, as the system maps it in larger blocks.
+and the library pages in use. These are up to 16 MB more for a library that was just unpacked than
+for a copy of it, as the system maps it in larger blocks.
 """
 
 from __future__ import annotations
@@ -62,21 +62,20 @@ MIB = 1 << 20
 BASE_BYTES = 235 * MB
 MAPS = 10
 CELL_BYTES = 370
-# Bytes of a pixel of floor, counted, not measured: 3 for the floor to sweep and the line's passes
-# over it, and 2 more while they move with a growing map; a bit each for blocked pixels and poses,
-# twice if an order has keep-out zones, and once more while a map is taken in; some bits for a block
-# of 64; and a tenth of the sum for the frame around the map.
+# Bytes of a pixel of floor, by its arrays: 3 for the floor to sweep and the line's passes over it,
+# and 2 more while these move with a growing map. Blocked pixels and poses take a bit each; keep-out
+# zones double these bits, and a new map triples them. A tenth more for the frame around the map.
 FLOOR_BYTES = 7
 # Pixels of the frame around any map, which is relatively widest around small maps.
 FRAME_PIXELS = 100_000
-# Bytes of a cell with stand and bends, counted, too: 32, as much again with keep-out zones, and
-# once more while a map is taken in; and 26 for a point of the line.
+# Bytes of a cell with stand and bends, by its arrays: 32, another 32 with keep-out zones, and again
+# 32 while a new map comes in; and 26 for a point of the line.
 STAND_BYTES = 128
 # MemoryMax= relative to MemoryHigh=, above which the system only throttles a service.
 SPARE = 1.1
 
-# Copies of a pixel that reading a keep-out mask may use; memory of the reader; and least memory for
-# reading a mask, in part from the base.
+# Number of copies of a pixel while a keep-out mask is read, memory of the reader of images, and
+# least memory that a mask may use; a part of that is free in BASE_BYTES.
 MASK_COPIES = 2
 PILLOW_BYTES = 6 * MB
 LEAST_MASK_BYTES = 14 * MB

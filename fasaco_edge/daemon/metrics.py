@@ -103,7 +103,7 @@ METRICS = (
         "1 for the state of the mission, 0 for the others",
         lambda status: [({"state": name}, name == status.state) for name in STATES],
     ),
-    Metric("trouble", "1 for what is wrong in that state, 0 for the others", _troubles),
+    Metric("trouble", "1 for each present trouble, 0 for the others", _troubles),
     Metric("uptime_seconds", "since the daemon began", _one(lambda s: s.uptime_s)),
     Metric("covered_ratio", "covered share of cells", _member("coverage", "fraction")),
     Metric("covered_cells", "cells covered", _member("coverage", "covered")),
@@ -136,7 +136,7 @@ METRICS = (
     Metric(
         "cycle_seconds", "cycles of the loop since the start, by quantile", _times, is_summary=True
     ),
-    Metric("errors_total", "refused, not published or failed", _errors),
+    Metric("errors_total", "messages refused or not published, and failures", _errors),
     Metric("ledger_age_seconds", "since progress was written", _member("ledger", "age_s")),
     Metric(
         "ledger_faulty",

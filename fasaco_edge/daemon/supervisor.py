@@ -30,7 +30,8 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 30.0
 SILENT_AFTER_S = 30.0
 # Timeout of its first report, as slow computers load its libraries for half a minute [s].
 START_WITHIN_S = 120.0
-# A recorder that is ending counts as hung if a wait uses less processor time [s].
+# A recorder that is ending counts as hung if it used less processor time than this during a wait
+# for its end [s].
 WORKS_S = 0.01
 
 

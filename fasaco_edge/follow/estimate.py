@@ -85,8 +85,8 @@ class PoseEstimate:
         jump: distance [m] and angle [rad] of the newest pose from the expected one; None if it is
             accepted.
         measured: the newest accepted pose, unfiltered.
-        commanded: motion along x and y [m], and turn [rad], commanded up to that pose, summed along
-            the measured headings.
+        commanded: the sum of all commands up to the time of ``measured``: x, y [m] in the measured
+            headings, and turn [rad].
         delay: time from a command to the arrival of a pose that shows its effect [s].
     """
 

@@ -77,7 +77,7 @@ MOST_POSES = 256
 
 
 class WatchedPublisher(OnePublisher):
-    """The one publisher whose samples of an input count; a conflict with another one is logged."""
+    """The publisher of an input that is listened to; a conflict with another one is logged."""
 
     _logged = ""
 
@@ -93,7 +93,7 @@ class Inputs:
     """Subscribes, and passes the inputs since the last cycle to a follower."""
 
     def __init__(self, settings: FollowSettings, bus: Bus) -> None:
-        # Of the daemon that plans, in the last cycle.
+        # What the planning daemon sent since the last cycle.
         self.news = News()
         self._clock = Clock(settings.pace)
         self._decoder = PoseDecoder(settings.pose_schema, settings.frames)

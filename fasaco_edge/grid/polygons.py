@@ -101,7 +101,7 @@ def _meet(
     of_c, of_d = _side(a, b, c), _side(a, b, d)
     of_a, of_b = _side(c, d, a), _side(c, d, b)
     crossing = (of_c * of_d <= 0) & (of_a * of_b <= 0)
-    # Collinear segments meet if their boxes overlap; the boxes of others that meet always overlap.
+    # Collinear segments meet if their boxes overlap; for all others this test changes nothing.
     overlap = (np.minimum(c, d) <= np.maximum(a, b)) & (np.maximum(c, d) >= np.minimum(a, b))
     meet: NDArray[np.bool_] = crossing & overlap.all(axis=1)
     return meet

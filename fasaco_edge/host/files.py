@@ -164,7 +164,7 @@ def _walk(folder: Path, trusted: frozenset[int]) -> None:
     ahead = list(reversed(folder.parts[1:]))
     status = os.lstat(place)
     while True:
-        # In a sticky folder others cannot replace an entry whose owner the next step accepts.
+        # In a sticky folder others cannot replace an entry; the next step checks its owner.
         sticky = ahead and status.st_mode & stat.S_ISVTX
         _look_at(place, status, trusted, may_write=bool(sticky))
         if not ahead:

@@ -23,8 +23,8 @@ TOUCH_TOLERANCE_PX = 1e-3
 # Number of rows of pixels evaluated at a time.
 SWEPT_ROWS = 30_000
 Points = NDArray[np.float64]
-# Longest chord of an arc [m], factor of tolerance for its bends, and bend up to which even the
-# shortest chords are steered [deg].
+# Curves come as chords. Longest chord of an arc [m]; factor of tolerance for the bends between
+# chords; a bend up to STEERED_DEG [deg] is steered, however short the chords are.
 ARC_STEP_M, ARC_TOLERANCE, STEERED_DEG = 0.06, 1.05, 1.2
 
 

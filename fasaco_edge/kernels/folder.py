@@ -3,9 +3,9 @@
 It is named after a hash of all kernel sources, of what compiles them and of the processor: changed
 kernels never use old code, and any installation of the same sources shares it.
 
-Compiled kernels are code: they are loaded only from a folder that only root and this user could
-have written, and once each file is as it was when it was compiled (``kernels.manifest``). If the
-wanted folder cannot be used, a folder in memory or among the temporary files is used; if that
+Compiled kernels are code. They are loaded only from a folder to which only root and this user can
+write, and only if each file is as it was when it was compiled (``kernels.manifest``). If the wanted
+folder cannot be used, a folder in memory or among the temporary files is used; if that
 cannot be used either, each process compiles its own kernels.
 """
 
@@ -124,7 +124,7 @@ def places() -> Iterator[Path]:
 
 
 def why_not_writable(folder: Path) -> str:
-    """Return why kernels cannot be compiled into ``folder``, there or not; "" if they can."""
+    """Return why kernels cannot be compiled into a folder, existing or not; "" if they can."""
     if why := why_not_trusted(folder):
         return why
     # Not Path.exists, which raises transient errors of the disk.

@@ -11,30 +11,21 @@ Import numba from here alone: a file in the working folder could change its sett
 
 from __future__ import annotations
 
-import atexit
-import errno
-import fcntl
 import functools
 import logging
 import os
-import shutil
 import sys
-import tempfile
 import threading
-import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
-from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.host.processes import ctrl_c_waits
 from fasaco_edge.kernels.folder import (
     KERNELS,
     kernel_module,
-    temporary_folder,
-    unguessable,
     warn_of,
 )
 from fasaco_edge.kernels.manifest import (
@@ -43,6 +34,7 @@ from fasaco_edge.kernels.manifest import (
     chosen_folder,
     read_manifest,
 )
+from fasaco_edge.kernels.scratch import scratch_folder
 
 # numba takes settings from .numba_config.yaml in the working folder, which others may write, unless
 # it finds no reader of YAML when it is imported.
@@ -67,10 +59,6 @@ if TYPE_CHECKING:
 LOG = logging.getLogger(__name__)
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
-
-# Folders of code for one process alone: how their names begin, and an age at which they are
-# locked for certain [s].
-SCRATCH, SURE_S = "fasaco-edge-scratch-", 60.0
 
 
 class _Kept:
@@ -180,38 +168,7 @@ class ScratchLocator(KernelLocator):
 
     def get_cache_path(self) -> str:
         """Return the folder of this process."""
-        return _scratch()
-
-
-@functools.cache
-def _scratch() -> str:
-    base = temporary_folder()
-    if why := why_not_trusted(unguessable(base)):
-        raise PermissionError(errno.EPERM, f"no folder for what is compiled: {why}", str(base))
-    _remove_left(base)
-    folder, maker = tempfile.mkdtemp(prefix=SCRATCH, dir=base), os.getpid()
-    with suppress(OSError):  # a disk without locks
-        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_SH)  # until the process has ended
-
-    def clear() -> None:
-        # A forked process must not remove the folder.
-        if os.getpid() == maker:
-            shutil.rmtree(folder, ignore_errors=True)
-
-    atexit.register(clear)
-    return folder
-
-
-def _remove_left(base: Path) -> None:
-    """Remove the folders that killed processes of this user left: nobody holds their locks."""
-    for left in base.glob(f"{SCRATCH}*"):
-        with suppress(OSError), ExitStack() as held:
-            opened = os.open(left, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-            held.callback(os.close, opened)
-            about = os.fstat(opened)
-            if about.st_uid == os.geteuid() and time.time() - about.st_mtime > SURE_S:
-                fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(left, ignore_errors=True)
+        return scratch_folder()
 
 
 @contextmanager

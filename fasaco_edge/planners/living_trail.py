@@ -3,8 +3,8 @@
 The ants of each plan, and of each attempt in spare time, start from the trail, and leave it changed
 to the next ants. The equations are those of Carr and Wang 2022:
 
-* equation (7), local update: each ant applies it (``kernels.ants``), and each change of the map; a
-  driven step loses half at once;
+* equation (7), local update: applied by each ant (``kernels.ants``) and at each change of the map.
+  A driven step loses half of its pheromone at once;
 * equation (8), global update: ants apply it along what they rebuilt, and each published plan along
   its path; the other steps at the path's cells fade by (7).
 

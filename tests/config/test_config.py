@@ -138,7 +138,7 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("bus: {mode: dealer}", "bus.mode: expected peer, client or router, got 'dealer'"),
         ("bus: {listen: 'tcp/0.0.0.0:1'}", "bus.listen: expected array, got 'tcp/0.0.0.0:1'"),
         ("bus: {listen: [7447]}", "bus.listen[0]: expected str, in quotes, got 7447"),
-        ("bus: {listen: []}", "bus.listen: must not be empty where bus.connect is"),
+        ("bus: {listen: []}", "bus.listen: must not be empty if bus.connect is empty"),
         ("map: {free_at_most: 101}", "map.free_at_most: expected int <= 100, got 101"),
         ("fleet: {name: hall, yaw_deg: 400}", "fleet.yaw_deg: expected float <= 360.0, got 400"),
         (

@@ -120,7 +120,7 @@ def _document_reply(document: Callable[[], object], request: Request) -> QueryRe
 
 
 def _unknown(keys: Keys, request: Request) -> QueryReply | None:
-    """Reply to queries that no other queryable serves, as this one gets every query."""
+    """Return the error for a query with an unknown name; None for known names."""
     if any(matches(request.key, keys.rpc(name)) for name in RPC_NAMES):
         return None
     name = request.key.rpartition("/")[2]

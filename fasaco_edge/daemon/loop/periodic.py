@@ -37,8 +37,8 @@ COVERAGE_PERIOD_S = 0.5
 # Least period of the swept floor [s], and limit on its squares; a large floor gets larger squares.
 FLOOR_PERIOD_S = 2.0
 MOST_SQUARES = 1_000_000
-# Least period of the unswept floor, as pixels of its raster per second: 8 million pixels take the
-# loop 25 ms.
+# Largest rate of the unswept floor [pixels/s]: 8 million pixels take the loop 25 ms, and are sent
+# every 8 s.
 PIXELS_PER_S = 1_000_000
 # Period at which an unchanged message is repeated [s], as a publisher does not notice further
 # listeners.
@@ -119,7 +119,7 @@ class FloorPublisher:
 
 
 class UnsweptPublisher:
-    """Publishes why floor is unswept if that has subscribers: on change, as the swept floor."""
+    """Publishes why floor is unswept, on each change, while there are subscribers."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._outbox, self._due = outbox, Due()
@@ -230,7 +230,7 @@ OF_MISSION: dict[str, Callable[[Outbox], PeriodicMessage]] = {
     "unswept": UnsweptPublisher,
     "pheromone": TrailPublisher,
 }
-"""The publishers of a mission's messages, by the name that failures have in the log."""
+"""The publishers of a mission's messages, by the name that the log gives their failures."""
 
 
 class RoomsPublisher:

@@ -154,7 +154,7 @@ class DivisionNumbers:
                 found.append(Robot(part.robot, part.seed, part.step_s))
                 continue
             row, col = lattice.cell_at(member.newest.x, member.newest.y)
-            # The cell is sent as the seed of the robot's part: a message holds no larger index.
+            # The cell is sent as seed of the robot's part; a message cannot hold larger indices.
             if max(abs(row), abs(col)) <= MOST_INDEX:
                 found.append(Robot(part.robot, (row, col), member.newest.step_s))
         return found

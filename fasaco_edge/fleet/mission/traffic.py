@@ -141,8 +141,8 @@ NEARER_M farther than the other, or about as far and the second | waits |
         if is_in_its_way and (is_held or len(line) == 1) and not is_its_turn:
             return Obstruction(other, is_on_path=True)
         if message.waits_for or len(theirs) == 1 or near.stands_s > STANDS_S:
-            # A path around the other robot keeps CLEARANCE_M only at the centres of cells, and from
-            # the place where that robot was last seen to move.
+            # A path around the other robot keeps CLEARANCE_M at the centres of cells alone, to the
+            # place where that robot stood when the path was planned: less is accepted here.
             passes_m = clear_m - CLEARANCE_M if near.is_avoided else clear_m
             if not _comes_to(apart_m, passes_m):
                 continue

@@ -1,8 +1,9 @@
-"""Fold of a walk at a disc: what ants find there, and how their sequence becomes a walk again.
+"""Fold of a walk: the part within a disc is taken out, so that ants can rebuild it.
 
-The cells of a disc are opened. Each stretch of the walk outside of it is a tunnel, which is entered
-at either end and left at the other; so lanes may be joined that are far apart in the walk. The
-first stretch stays first, and the last one last.
+The walk enters and leaves the disc several times. Each stretch of it outside of the disc becomes a
+tunnel: an ant enters at one end, at no cost, and continues at the other. So ants can join lanes
+that are far apart in the walk. The first stretch stays first, and the last one last. What an ant
+returns, cells and tunnels in sequence, is unfolded into a walk again.
 """
 
 from typing import NamedTuple
@@ -23,7 +24,7 @@ from fasaco_edge.kernels.local_search.walk_array import (
 
 # Limits: cells of a disc, tunnels, and items of a sequence, which are cells and tunnels.
 MOST_CELLS, MOST_TUNNELS, MOST_ITEMS = 300, 64, 2048
-# Cells that a search for the way out of a dead end settles.
+# Limit on the cells visited by the search for a way out of a dead end.
 FARTHEST = 300
 # No heading, as before the first move.
 AHEAD = 4
@@ -119,7 +120,7 @@ class Disc(NamedTuple):
 
 @inlined
 def wide(number: int) -> int:
-    """Return a number of an array as a 64-bit integer: the fields of an ant have one type."""
+    """Return a number of an array as a 64-bit integer, as the kernels of an ant expect it."""
     return int(np.int64(number))
 
 

@@ -1,9 +1,9 @@
 """Curves: the cheapest way along a line for a robot that cannot turn on the spot.
 
-A graph over places on the line: along a straight the robot drives to the next place, and from a
-place it drives a word to one further ahead, on another straight. What the line sweeps between the
-two and the word does not is floor that is left, and has its price. The places lie in the line's
-order, so the cheapest way is found place by place.
+The line is sampled at places, which are the nodes of a graph. An edge leads to the next place along
+a straight, or by a word (arcs and straights, see ``words``) to a place further ahead on another
+straight. A word leaves out floor that the line would sweep; the price of that floor is added. As
+places are in the line's order, the cheapest way to each is found one after the other.
 
 Points are x (column), y (row) of a raster [pixels].
 """
@@ -18,12 +18,12 @@ from fasaco_edge.kernels.floor.bits import is_marked
 from fasaco_edge.kernels.floor.words import PIECES, find_words
 from fasaco_edge.kernels.jit import inlined, kernel, lean_inner_kernel, lean_kernel
 
-# Points on a word are this far apart where it is checked [pixels]; their number at most.
+# Distance of the points at which a word is checked for obstacles [pixels]; limit on their number.
 CHECK_PX = 2.0
 MOST_POINTS = 2048
 # Words from one place to another that are checked, the quickest first.
 TRIED = 8
-# A way is cheaper only if it is by this [s]: rounding on another computer makes no other curve.
+# Least gain that counts as cheaper [s], so that rounding on another computer changes no curve.
 LEAST_GAIN_S = 1e-6
 NONE = BLOCKED = -1
 
@@ -35,8 +35,8 @@ class LinePlaces(NamedTuple):
         poses: float64 (n, 3): x, y, yaw along the line.
         way: float64 (n,): way along the line [pixels].
         leg: int64 (n,): number of the straight; below 0 for a pose at which the robot starts.
-        worth_s: float64 (n,): price of the floor that the line sweeps from a place to the next one
-            alone [s].
+        worth_s: float64 (n,): price of the floor that only the piece of the line from this place to
+            the next one sweeps [s].
         window: float64 (n,): way along the line that a word to a place may replace [pixels].
     """
 
@@ -75,7 +75,9 @@ class Base(NamedTuple):
 
 
 class Ways(NamedTuple):
-    """The cheapest way to each state: twice the number of a place, and 1 more if driven backward.
+    """The cheapest way to each state.
+
+    A state is a place and a direction of driving; its index is 2 * place, plus 1 if backward.
 
     Attributes:
         cost_s: float64 (2 n,) [s]; infinite where none is known.
@@ -109,7 +111,8 @@ def _is_place(places: NDArray[np.uint64], x: float, y: float) -> bool:
 def _word_s(
     sides: NDArray[np.int8], lengths: NDArray[np.float64], first: float, last: float, base: Base
 ) -> float:
-    """Return the cost of a word [s], between directions 1 or -1 of driving before and after."""
+    """Return the cost of a word [s]; ``first``, ``last``: the directions of driving before and
+    after it, 1 or -1, as each change of direction costs."""
     seconds, sign = 0.0, first
     for piece in range(PIECES):
         length = lengths[piece]
@@ -136,9 +139,9 @@ def _trace(
     clear: NDArray[np.uint64],
     points: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Store points on a word; return their number, and how many are not clear.
+    """Store points on a word; return their number, and how many lack clearance.
 
-    ``BLOCKED`` if one is no place, or if there are too many.
+    The number is ``BLOCKED`` if the robot does not fit at one of them, or if there are too many.
     """
     x, y, yaw = pose[0], pose[1], pose[2] + turned
     count = near = 0
@@ -172,9 +175,9 @@ def _left_s(
     count: int,
     most: float,
 ) -> float:
-    """Return the price of floor that the line sweeps between two places, but not the points [s].
+    """Return the price of floor that the line sweeps between two places and a word does not [s].
 
-    At least ``most`` if it is more: the rest is not counted.
+    ``points`` are on the word. Counting stops once the price is at least ``most``.
     """
     left = 0.0
     for number in range(first, last):
@@ -316,17 +319,17 @@ def count_swept(
     half: float,
     apart: float,
 ) -> NDArray[np.int64]:
-    """Return the floor that a line loses without each of its points [half pixels], int64 (n,).
+    """Return how much floor is lost without each point of a line [half pixels], int64 (n,).
 
-    A pixel that is swept only there counts twice, for the point in the middle; one that is swept
-    again later counts once for the first point and once for the last.
+    A pixel that the line sweeps once counts two halves, for the point in the middle of that sweep.
+    A pixel that it sweeps again later counts one half for the first point and one for the last.
 
     Args:
         points: float64 (n, 2): x, y.
         way: float64 (n,): way along the line [pixels].
         reachable: bool (rows, cols): pixels that count.
         half: half of the tool's width [pixels].
-        apart: a pixel is swept again if that is more than this further along the line [pixels].
+        apart: way along the line between two sweeps of a pixel, above which they are two [pixels].
     """
     rows, cols = reachable.shape
     first = np.full((rows, cols), NONE, np.int32)

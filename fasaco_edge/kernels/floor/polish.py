@@ -35,8 +35,8 @@ SHIFTS = (1.0, -1.0, 2.0, -2.0, 4.0, -4.0, 7.0, -7.0)
 HALF_ROOT = 0.7071067811865476
 # Points move along both axes, both diagonals, and their two edges.
 DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (HALF_ROOT, HALF_ROOT), (HALF_ROOT, -HALF_ROOT))
-# Attempts at a point: from 0 on the next one or two points are left out; from MOVES on the next one
-# moves; at MEETING it moves to a crossing of lines; then the edge after it shifts.
+# Numbers of the attempts at a point: 0 and 1 leave out the next point, or the next two; from MOVES
+# on the next point moves; MEETING moves it to a crossing of lines; all above shift the edge beyond.
 MOVES = 2
 MEETING = MOVES + (len(DIRECTIONS) + 2) * len(SHIFTS)
 ATTEMPTS = MEETING + 1 + 2 * len(SHIFTS)
@@ -120,7 +120,8 @@ def slide(
     by: float,
     bx: float,
 ) -> bool:
-    """Slide an end of a shifted edge, which lies on the line a to b, onto its neighbour's line."""
+    """Slide ``place``, an end of the shifted edge from (ay, ax) to (by, bx), along that edge to the
+    line through a and b, the neighbouring edge; return whether it moved."""
     if not meeting(ay, ax, by, bx, a, b, memory.place):
         return False
     dy, dx = memory.place[0] - place[0], memory.place[1] - place[1]
@@ -192,7 +193,7 @@ def polish(
 
     Args:
         line: counted into ``floor.sweeps``.
-        floor, price, memory: see above.
+        floor, price, memory: see ``kernels.floor.line``.
         farthest: unswept floor further from an edge is ignored [pixels].
         most_tried: limit on the moves tried.
 
@@ -228,7 +229,7 @@ def polish(
             if line.next[begin] == NONE:
                 pass_s += gain
                 break
-            # Detours follow once the other moves have converged, otherwise they would stay.
+            # Detours are added last: the other moves cannot remove one that has become needless.
             if passes > 0:
                 gain += detour(line, floor, price, memory, begin, farthest, least)
             elif gain == 0.0:

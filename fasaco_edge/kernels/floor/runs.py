@@ -30,8 +30,7 @@ def common_runs(
         ``before``; how many steps it has; 1 where ``before`` goes the other way, else 0.
     """
     size, most = len(before), len(after)
-    # The index covers the old walk alone, whose size its lattice limits: the new walk may be far
-    # away.
+    # The index spans the old walk alone: the new walk may be far away, and the index too large.
     row0, col0 = before[:, 0].min(), before[:, 1].min()
     rows, cols = before[:, 0].max() - row0 + 1, before[:, 1].max() - col0 + 1
     # The old walk's visits of each cell, in order.

@@ -1,8 +1,8 @@
 """Counts of pixels: free pixels outside reachable cells, and pixels of a rectangle in four reads.
 
-Outside: a pixel is in the cell that its centre is in. Stretches of pixels outside reachable
-cells are found once for all rows of pixels in a row of cells, where the raster is aligned with
-the lattice, and counted in one sweep each.
+Outside: a pixel belongs to the cell that its centre is in. If the raster is aligned with the
+lattice, all rows of pixels in a row of cells have the same stretches outside reachable cells.
+These are found once, and then counted row by row.
 
 Rectangles: summed-area tables, after F. Crow, "Summed-area tables for texture mapping",
 SIGGRAPH 1984.
@@ -97,8 +97,8 @@ def count_free_beside(
     return count
 
 
-# One sum counts two things: the pixels that are not free in its low bits, those that are
-# not unknown from here on.
+# One sum counts two things: pixels that are not free in the bits below KNOWN_BIT, known pixels in
+# the bits from it on.
 KNOWN_BIT = 32
 NOT_FREE = (1 << KNOWN_BIT) - 1
 
@@ -195,7 +195,7 @@ def disc_state(pixels: Pixels, x: float, y: float, radius: float, table: PixelSu
     height, width = pixels.values.shape
     last_row, last_col = pixels.row + height - 1, pixels.col + width - 1
     first, last = int(np.floor(y - radius)), int(np.floor(y + radius))
-    # Beyond the map nothing is known; the rows next to it are the nearest to the disc.
+    # Beyond the map nothing is known: the nearest unknown row is the first one outside the map.
     below, above = max(y - pixels.row, 0.0), max(last_row + 1 - y, 0.0)
     state = COVERABLE
     if (first < pixels.row and below * below < radius * radius) or (

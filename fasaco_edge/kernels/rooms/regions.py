@@ -12,7 +12,8 @@ BESIDE = 8
 
 @lean_kernel
 def draw_cuts(kinds: NDArray[np.uint8], cuts: NDArray[np.float64], longer: float) -> None:
-    """Set the pixels under segments to 0, in place: no way by the sides of pixels crosses them.
+    """Set the pixels under segments to 0, in place, so that no chain of pixels with common sides
+    crosses them.
 
     Args:
         kinds: uint8 (rows, cols).
@@ -61,7 +62,7 @@ def beside_cuts(labels: NDArray[np.int32], cuts: NDArray[np.float64]) -> NDArray
 
 @kernel
 def grow(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> None:
-    """Give free pixels without a label that of the nearest by steps, in place.
+    """Give each free pixel the label of the labelled pixel that is fewest steps away, in place.
 
     Args:
         labels: int32 (rows, cols), 0 for none.

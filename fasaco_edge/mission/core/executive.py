@@ -196,7 +196,7 @@ class Executive:
         return self._work.plan(self._cell, self._update, state, self._now)
 
     def _end_order(self) -> Doing | None:
-        """Stop if the order is over, or its rest waits for a retry."""
+        """Stop if the order is over, or if its last cells wait for a retry."""
         route, orders = self.route, self.orders
         if orders.order_state.stage is Stage.RETURNING and self._cell == orders.goal():
             orders.advance(self._now)

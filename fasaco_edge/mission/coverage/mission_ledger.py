@@ -5,8 +5,8 @@ stays valid, and is compared with each map, until a map knows enough to decide. 
 map is compared with the previous building (``map.building_watch``).
 
 In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
-the rest of its floor. The robot that has passed the cell remembers that floor, in any robot's part,
-and sweeps it when its line passes near again.
+the rest of the cell's floor. The robot that has passed the cell remembers this rest, whoever's part
+the cell is in, and sweeps it when its line passes near again.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ class MissionLedger:
             tool_m: width of the tool [m].
             ahead_m: distance of the tool's centre ahead of the robot's turning point [m].
             shared: cells swept by other robots; None for a robot alone.
-            sight: for a tool wider than the robot; else None.
+            sight: floor that the tool touches, if it is wider than the robot; else None.
         """
         self._sight = sight
         self._cell_m, self._tool_m, self._ahead_m = cell_m, tool_m, ahead_m

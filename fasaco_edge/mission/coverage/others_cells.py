@@ -17,8 +17,8 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 class OthersCells:
     """The cells that other robots have swept, a part of the ledger; here none.
 
-    The ledger keeps cells from an earlier fleet until this robot forgets cells of its own: a fleet
-    that it joins again would count the forgotten cells as swept.
+    A robot that has left its fleet keeps what the others had swept, in case it joins again. Once it
+    forgets cells of its own, it drops that: it would bring the forgotten cells back as swept.
 
     Attributes:
         version: counter of changes.
@@ -35,7 +35,7 @@ class OthersCells:
         return np.zeros((window.rows, window.cols), np.bool_)
 
     def begin_epoch(self, epoch: int) -> None:
-        """Start an epoch with a number new to this robot's ledgers; a restored epoch stays."""
+        """Start an epoch with a new number, unless ``restore`` has set one."""
 
     def record_forgotten(self) -> None:
         """Record that this robot has forgotten some of its own cells."""

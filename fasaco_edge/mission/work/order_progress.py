@@ -47,7 +47,7 @@ class OrderProgress:
             file, None in a mission.
         spent_s: the robot's time since the order began, if it has a limit [s].
         late: why it ends before all is covered; "" if it does not.
-        last: while there is no order, the cancelled one, to be given again; None for none.
+        last: while there is no order, the one that was cancelled; None for none.
     """
 
     order: MissionOrder | None = None

@@ -295,7 +295,7 @@ class Status(Document, frozen=True):
     Attributes:
         version: of the package.
         reason: why it is in that state.
-        troubles: what is wrong in that state; one of each code at most.
+        troubles: the present troubles, at most one of each code.
         rss_mb: memory of the process [MB].
         cpu_s: processor time the process has used [s].
         threads: of the process.
