@@ -21,6 +21,7 @@ from tests.benchmarks.full import FULL
 from tests.benchmarks.online.benchmark import ONLINE
 from tests.benchmarks.peers import PEERS
 from tests.benchmarks.quality import QUALITY
+from tests.benchmarks.replan import REPLAN
 from tests.benchmarks.rooms.benchmark import ROOMS
 from tests.benchmarks.rooms.identity import ROOM_IDS
 from tests.benchmarks.rooms.one_by_one import BY_ROOM
@@ -28,13 +29,13 @@ from tests.benchmarks.table1.benchmark import TABLE1
 from tests.benchmarks.turns.benchmark import TURNS
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (
-    TABLE1, QUALITY, TURNS, FLOOR, PEERS, FULL, FLEET_ONLINE, ONLINE, ROOMS, ROOM_IDS,
+    TABLE1, QUALITY, TURNS, FLOOR, PEERS, REPLAN, FULL, FLEET_ONLINE, ONLINE, ROOMS, ROOM_IDS,
     BY_ROOM,
 )  # fmt: skip
 # What each takes with its defaults, on two cores; the short form of each is a test.
 TAKES = {
     "table1": "half an hour", "quality": "2 minutes", "turns": "a minute", "floor": "minutes",
-    "peers": "half an hour", "full": "minutes", "fleet-online": "half an hour",
+    "peers": "half an hour", "replan": "minutes", "full": "minutes", "fleet-online": "half an hour",
     "online": "half an hour", "rooms": "a minute", "room-ids": "minutes", "by-room": "half an hour",
 }  # fmt: skip
 

@@ -39,9 +39,8 @@ from tests.support.waiting import until
 
 PROGRAM = """\
 #!{python} -I
-import sys
-from fasaco_edge.cli import main
-sys.exit(main())
+from fasaco_edge.__main__ import program
+program()
 """
 TIMEOUT_S = 400.0
 

@@ -102,7 +102,7 @@ def test_a_keep_out_in_mid_mission_loses_nothing(robot):
         (("add", "--name", "a", "0,0;1,1;1,0;0,1"), 1, "keep_out.polygon: crosses or touches"),
         (("add", "--name", " a", "0,0;1,1;1,0"), 1, "keep_out.name: must be 1..64 printable"),
         (("remove",), 2, "the following arguments are required: NAME"),
-        ((), 2, "the following arguments are required: COMMAND"),
+        ((), 2, "a command is missing; there are add, remove, list"),
     ],
 )
 def test_mistakes_need_no_daemon(words, code, said):

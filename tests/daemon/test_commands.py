@@ -303,7 +303,7 @@ def test_mistakes_are_reported_without_a_daemon(tmp_path: Path, monkeypatch, cap
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "the following arguments are required: COMMAND"),
+        ((), "a command is missing; there are start, pause,"),
         (("dance",), "invalid choice: 'dance'"),
         (("start", "--zone", "0,0;1,0;1,1"), "must be NAME or NAME:x,y;x,y;..., got"),
         (("start", "--zone", "a:0,0;1,0"), "must be x,y;x,y;x,y;... in metres, got '0,0;1,0'"),

@@ -24,9 +24,8 @@ PACKAGES = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-pa
 SOURCE = f"{HOME}/source"
 SCRIPT = f"""\
 #!{HOME}/current/bin/python3 -I
-import sys
-from fasaco_edge.cli import main
-sys.exit(main())
+from fasaco_edge.__main__ import program
+program()
 """
 
 

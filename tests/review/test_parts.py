@@ -125,7 +125,7 @@ def test_progress_is_reported(parts):
     assert list(dict.fromkeys(what for what, _, _ in told)) == [
         "reading kB",
         "decoding",
-        "following the robot",
+        "the robot's track",
     ]
     reading = [(done, total) for what, done, total in told if what == "reading kB"]
     assert [done for done, _ in reading] == sorted(done for done, _ in reading)
