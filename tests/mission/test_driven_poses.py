@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
-from fasaco_edge.mission.coverage.drive_meter import Driven, DrivenPoses
+from fasaco_edge.mission.coverage.driven_poses import Driven, DrivenPoses
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
 from tests.mission.line_robot import CONFIG, SPEED_M_S, TOOL_M, LineRobot
 

@@ -6,7 +6,7 @@ import pytest
 
 from fasaco_edge.errors import LedgerMismatchError, WrongFrame
 from fasaco_edge.mission.events import MapReceived, State
-from fasaco_edge.mission.map.inputs import PATIENCE_S
+from fasaco_edge.mission.map.frame_selector import PATIENCE_S
 from tests.mission.world import Drive, building, patch, pose_at, started
 
 HALL = ("########", *("#......#",) * 4, "########")

@@ -15,7 +15,7 @@ from fasaco_edge.grid.polygons import is_near
 from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry, rotated_pose
 from fasaco_edge.mission.events import MapReceived, PoseReceived, State
-from fasaco_edge.mission.map.inputs import PATIENCE_S
+from fasaco_edge.mission.map.frame_selector import PATIENCE_S
 from fasaco_edge.mission.map.placing import are_same
 from fasaco_edge.mission.orders.commands import command_document, read_command
 from fasaco_edge.mission.orders.order import Command, StandingZone, order_document, read_order

@@ -10,7 +10,7 @@ from PIL import Image
 
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.mission.events import MapReceived, State
-from fasaco_edge.mission.map.inputs import PATIENCE_S
+from fasaco_edge.mission.map.frame_selector import PATIENCE_S
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask, mask_polygons
 from fasaco_edge.mission.orders.order import StandingZone, read_order
 from fasaco_edge.mission.orders.zones import with_kept_out

@@ -11,7 +11,7 @@ from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.core.order_changes import OTHERS_FIRST
 from fasaco_edge.mission.core.parts import MissionParts
-from fasaco_edge.mission.coverage.drive_meter import Driven
+from fasaco_edge.mission.coverage.driven_poses import Driven
 from fasaco_edge.mission.events import (
     Answer,
     BatteryReceived,

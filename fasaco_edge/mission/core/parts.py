@@ -17,7 +17,7 @@ from fasaco_edge.mission.coverage.drive_meter import DriveMeter
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.coverage.tool_sight import ToolSight
 from fasaco_edge.mission.line.layer import LineLayer
-from fasaco_edge.mission.map.inputs import InputMonitor
+from fasaco_edge.mission.map.input_monitor import InputMonitor
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.path.map_motion import MapMotion
 from fasaco_edge.mission.path.route import Route

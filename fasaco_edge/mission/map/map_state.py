@@ -34,8 +34,8 @@ from fasaco_edge.mission.coverage.loop_closure import (
 )
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.building_watch import BuildingWatch
+from fasaco_edge.mission.map.frame_selector import FrameSelector
 from fasaco_edge.mission.map.ground import MissionGround
-from fasaco_edge.mission.map.inputs import FrameSelector
 from fasaco_edge.mission.map.obstacles import Obstacles
 from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder

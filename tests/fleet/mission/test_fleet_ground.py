@@ -17,7 +17,7 @@ from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.events import MapReceived, MemberReceived, Part
-from fasaco_edge.mission.map.inputs import PATIENCE_S
+from fasaco_edge.mission.map.frame_selector import PATIENCE_S
 from tests.fleet.mission.fleets import FleetDrive, FleetRobot
 from tests.mission.world import CELL, building, pose_at, reachable_cells
 
