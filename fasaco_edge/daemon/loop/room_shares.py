@@ -25,9 +25,10 @@ class RoomShares:
         self._rooms = np.zeros((0, 0), np.uint16)
 
     def of(self, mission: Mission) -> dict[int, float]:
-        """Return the swept share of the asked-for floor in each room with any, by its number.
+        """Return the swept share of the floor that is asked for in each room, by its number.
 
-        Empty where only cells are counted, and in a fleet: what floor others sweep is not known.
+        Rooms without such floor are left out: all, where only cells are counted, and in a fleet, as
+        the floor that others sweep is not known.
         """
         sheet, floor = mission.rooms.sheet, mission.line.asked_floor(MOST_SQUARES)
         if sheet is None or floor is None or mission.company.has_members:
