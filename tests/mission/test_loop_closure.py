@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from fasaco_edge.mission.coverage.loop_closure import (
 )
 from fasaco_edge.mission.events import MapReceived
 from fasaco_edge.planners.search.near_optimal import NearOptimal
-from tests.mission.world import Drive, pixels, placed, pose_at
+from tests.mission.world import CELL, Drive, building, pixels, placed, pose_at
 
 FOOTPRINT = Footprint(0.3, 0.15)
 HOME = Pose2D(0.0, 0.0)
@@ -191,3 +192,25 @@ def test_cells_of_a_turned_map_are_moved_one_by_one():
     apart = np.abs(np.diff(moved, axis=0))
     assert apart.max() == 1
     assert apart.any(axis=1).all()
+
+
+def test_of_two_motions_the_path_before_the_first_moves_and_none_of_another_order_or_map():
+    drive = Drive((2, 2), MapReceived(building(*["." * 12] * 6)), pose_at(2, 2))
+    drive.plan()
+    route, motion = drive.mission.route, drive.mission._handler.motion
+    pose = pose_at(2, 2).pose.pose
+    moved, path = replace(pose, x=pose.x + CELL), route.path.ahead
+    motion.receive_map(pose)
+    route.publish(path[:3], "cut", drive.now)
+    # The map moves again before a pose comes.
+    motion.receive_map(pose)
+    assert motion.receive_pose(moved).end == moved
+    assert motion.move_path(drive.now) is not None
+    assert route.path_to_keep[-1].tolist() == [path[-1][0], path[-1][1] + 1]
+    motion.receive_map(pose)
+    motion.forget_order()
+    assert motion.receive_pose(moved) is not None
+    assert motion.move_path(drive.now) is None
+    motion.receive_map(pose)
+    motion.leave_map()
+    assert motion.receive_pose(moved) is None

@@ -22,7 +22,7 @@ from tests.mission.test_room_orders import (
     settled,
     visited,
 )
-from tests.mission.test_worth import TIGHT_MIN
+from tests.mission.test_worth import TIGHT_MIN, tick
 from tests.mission.test_worth import finish as finish_slowly
 from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
 
@@ -141,6 +141,33 @@ def test_if_the_robot_turns_out_to_be_in_a_new_room_it_finishes_that_first():
     assert drive.request.reason == "rooms have changed: another one first"
     assert planned(drive) == (4 * len(WEST_COLUMNS) - 1, 0), "the smaller part, with a new number"
     drive.finish()
+
+
+def test_another_order_begins_in_the_robots_own_room():
+    drive = settled(*BOTH, config=ALWAYS)
+    drive.command("start")
+    drive.plan()
+    for _ in range(5):
+        drive.go()
+    drive.command("cancel")
+    drive.cell = IN_EAST
+    drive.tell(pose_at(*IN_EAST))
+    drive.command("start")
+    assert planned(drive) == (0, 89)
+
+
+def test_a_robot_too_slow_for_all_rooms_leaves_its_own_for_one_of_higher_priority():
+    drive = settled(*BOTH, config=ALWAYS)
+    drive.command("room_set", room=RoomRequest(room_at(drive, *IN_EAST).id, priority=80))
+    drive.command("start", {"until_min": 5.0})
+    for _ in range(20):
+        tick(drive)
+    assert drive.mission.orders.scope.worth.least == 0
+    for _ in range(40):
+        tick(drive)
+        drive.tell(after=3.0)
+    assert drive.mission.orders.scope.worth.least == 80
+    assert finish_slowly(drive)[1] > 60
 
 
 def test_priority_comes_before_the_room_that_the_robot_is_in():

@@ -228,15 +228,19 @@ def test_an_unknown_room_number_is_always_refused(zone, where, unknown):
     assert drive.mission.state is State.IDLE
 
 
-def test_an_order_does_not_follow_a_room_that_gets_a_lost_number():
+@pytest.mark.parametrize("is_cancelled", [False, True])
+def test_an_order_does_not_follow_a_room_that_gets_a_lost_number(is_cancelled):
     """After a power cut the rooms' file may be older than the order, or broken."""
     drive = settled(*BOTH)
     start(drive, f"room {room_at(drive, *IN_EAST).id}")
+    if is_cancelled:
+        drive.command("cancel")
     kept = OrderState.from_json(drive.mission.order_state.to_json())
-    (before,) = kept.order.zones
+    (before,) = (kept.last or kept.order).zones
     again = Drive(IN_WEST, MapReceived(building(*BOTH)), pose_at(*IN_WEST), order_state=kept)
     settle(again)
-    (zone,) = again.mission.order_state.order.as_given.zones
+    state = again.mission.order_state
+    (zone,) = (state.last or state.order).as_given.zones
     assert (zone.room, zone.polygon) == (0, before.polygon)
     assert min(room.id for room in again.mission.rooms.rooms) > before.room
 

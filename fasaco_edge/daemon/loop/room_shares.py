@@ -27,7 +27,8 @@ class RoomShares:
     def of(self, mission: Mission) -> dict[int, float]:
         """Return the swept share of the ordered floor in each room, by the room's number.
 
-        Empty where only cells are counted, and in a fleet: what floor others sweep is not known.
+        Rooms without such floor are left out: all, where only cells are counted, and in a fleet, as
+        the floor that others sweep is not known.
         """
         sheet, floor = mission.rooms.sheet, mission.line.asked_floor(MOST_SQUARES)
         if sheet is None or floor is None or mission.company.has_members:

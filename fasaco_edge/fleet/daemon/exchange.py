@@ -1,4 +1,4 @@
-"""Fleet messages: sent to the other robots, received from them as events, and the fleet's status.
+"""Fleet messages: sent to the other robots, filtered and received from them; the fleet's status.
 
 Unused without a block ``fleet`` in the configuration.
 """
@@ -47,7 +47,7 @@ PERIOD_S, LEAST_PERIOD_S = 1.0, 0.25
 # Limit on the tiles of progress, and on those of ground, in a periodic message (once a second) and
 # in a message on a change. A robot sends 20 kB/s, and up to 27 kB/s after a change of the epoch.
 TILES, FEW_TILES = 10, 2
-# Members that the document of a robot and the event of it have in common.
+# Members that a robot's document and its event have in common.
 ALIKE = ("state", "x", "y", "step_s", "epoch", "division", "by", "radius_m", "waits_for")
 
 # Least time between two messages of a robot [s].

@@ -51,7 +51,7 @@ def _price(
     other: int,
     may_end: bool,
 ) -> int:
-    """Return the reduced cost of a passage from a side, MUCH if there is none."""
+    """Return the reduced cost of a passage from a side, TOO_MUCH if there is none."""
     if other < WALK_BEGINS:
         if not ground.steps[cell] >> other & 1:
             return TOO_MUCH

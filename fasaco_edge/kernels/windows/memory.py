@@ -41,7 +41,7 @@ class Choices(NamedTuple):
             lanes below, whether it ends, pairing.
         named: int32 (KINDS,), number of choices whose ends are listed in ``ends``.
         ends: int16 (KINDS, MOST_CHOICES, 2 * MOST_PAIRS), identifiers that are paired up.
-        how: uint8 (KINDS, MOST_CHOICES, MOST_PAIRS), which of the two are new: FIRST_NEW,
+        new_ends: uint8 (KINDS, MOST_CHOICES, MOST_PAIRS), which of the two are new: FIRST_NEW,
             SECOND_NEW, both or neither; NO_PAIR behind the last one.
     """
 
@@ -139,7 +139,7 @@ class Program(NamedTuple):
         cells: of the window.
         reduced: int64 (most cells, 6, 6), costs of passages by the directions of their sides.
         left: int64 (most cells + 1,), least cost of the cells from here on.
-        taken: int16 (12,), identifiers of the slots that a cell has; kinds int64 (12,), their
+        taken: int16 (12,), identifiers of the slots that a cell has; sides int64 (12,), their
             directions.
         at: int64 (11,), its progress: entries NUMBER to RING_PRICE.
         parts: the connected parts of the undecided cells.

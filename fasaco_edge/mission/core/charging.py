@@ -55,7 +55,8 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.received_at = float("-inf")
-        # Times of the last message, and of the last accepted level, or of ``start_timeout``.
+        # Time of the last message; time of the last accepted level, before the first that of
+        # ``start_timeout``.
         self._noted_at = float("-inf")
         self._accepted_at: float | None = None
         # A level not accepted yet, and the time of its first report.
@@ -74,7 +75,10 @@ class BatteryGauge:
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return the time since the last accepted level, before one since ``start_timeout`` [s]."""
+        """Return the time since the last accepted level; until the first, since ``start_timeout``.
+
+        In seconds; 0 before both.
+        """
         return 0.0 if self._accepted_at is None else now - self._accepted_at
 
     def why_silent(self, since: float) -> str:

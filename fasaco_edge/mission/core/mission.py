@@ -137,6 +137,8 @@ class Mission:
         self.map.places.restore(order.places)
         if order.order is not None:
             order = replace(order, order=restored(order.order, self._rooms.book))
+        if order.last is not None:
+            order = replace(order, last=restored(order.last, self._rooms.book))
         self._changes.begin_order(self.rotation.order(order, rotated_by_deg, scale))
         self.state, self.reason = self._executive.status()
 

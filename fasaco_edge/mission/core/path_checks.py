@@ -101,15 +101,16 @@ class PathChecks:
 
     def check_time(self, now: float) -> None:
         """Want a new plan with the most worthwhile floor first if time or battery do not suffice
-        for the path."""
-        orders, route, may_work_s = self._orders, self._route, self._orders.scope.worth.may_work_s
-        is_due = may_work_s < float("inf") and now - self._timed_at >= WORTH_S
+        for all."""
+        orders, route = self._orders, self._route
+        is_limited = orders.scope.worth.may_work_s < float("inf")
+        is_due = is_limited and now - self._timed_at >= WORTH_S
         if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
             return
         self._timed_at = now
         figures = self._line.ahead()
         ahead_s = orders.scope.walk_s(route.path.ahead) if figures is None else figures.seconds
-        if ahead_s > may_work_s and orders.scope.puts_other_first(ahead_s):
+        if orders.scope.puts_other_first(ahead_s):
             route.requests.want("not all can be done in time: the most worthwhile floor first")
 
     @property

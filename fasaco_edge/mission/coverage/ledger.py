@@ -56,7 +56,7 @@ class LedgerSnapshot:
             (TILE * i, TILE * j).
         under_tool: cells under the tool; staying on them adds no visit.
         floor: the swept floor.
-        note: order and progress as JSON, see ``orders.order_state``; "" for none.
+        note: order and progress as JSON, see ``work.order_state``; "" for none.
         trail: the pheromone of the living trail.
         fleet: cells swept by other robots, see ``fleet.shared``; b"" for none.
         lattice_deg: angle of the cells' rows to the x axis of the map frame [deg], about its

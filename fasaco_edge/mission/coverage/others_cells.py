@@ -1,4 +1,4 @@
-"""Cells of others: what other robots have swept, a part of the ledger; here for a single robot."""
+"""Cells that other robots have swept, as a part of the ledger; here that of a single robot."""
 
 from __future__ import annotations
 

@@ -202,7 +202,8 @@ class LineLayer:
     ) -> tuple[GridGeometry, NDArray[np.bool_], NDArray[np.bool_]] | None:
         """Return which squares of the floor are asked for, and which of these are swept, bool.
 
-        None without a floor. ``most``: limit on the squares; larger ones stand for their centres.
+        None without a floor. ``most``: limit on the number of squares; where pixels are more,
+        squares are wider, and count as the pixel in their middle.
         """
         floor = self._map.floor
         if floor is None or self._ahead is None or self.left.areas is None:

@@ -164,7 +164,7 @@ class SweepTally:
         return causes
 
     def sampled(self, step: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return which of every ``step``-th pixel is asked for, and which is swept, too."""
+        """Return which of every ``step``-th pixels are asked for, and which of these are swept."""
         state = self._state[step // 2 :: step, step // 2 :: step]
         return state & WANTED != 0, state & (WANTED | SWEPT) == WANTED | SWEPT
 

@@ -52,7 +52,7 @@ class Zone:
     Attributes:
         name: unique in its order.
         polygon: corners (x, y) [m] in the map frame, the last joined to the first; None for
-            everything reachable; () until ``orders.placing`` finds the standing zone or room of
+            everything reachable; () until ``map.placing`` finds the standing zone or room of
             that name.
         passes: number of passes.
         kinds: settings of each pass; () if all passes are usual.

@@ -24,7 +24,7 @@ from fasaco_edge.planners.problem import CoverageProblem
 
 
 class PlanScope:
-    """Poses the planning problems of an order, what comes first alone. Times are [s].
+    """Poses the planning problems of an order; each covers only what comes first. Times are [s].
 
     Attributes:
         worth: which cells are planned first, by priority.
@@ -110,14 +110,21 @@ class PlanScope:
         return self._company.passable(area, cell, self._config.footprint.robot_radius_m)
 
     def puts_other_first(self, ahead_s: float) -> bool:
-        """Choose again if the path ahead takes too long; return whether the choice changed."""
-        area = self._map.area
-        if area is None:
+        """Choose again if time is too short at the pace of the path ahead, which takes ``ahead_s``.
+
+        Returns:
+            Whether the choice changed.
+        """
+        area, in_turn = self._map.area, self._takes_rooms_in_turn()
+        if area is None or (ahead_s <= self.worth.may_work_s and not in_turn):
             return False
         open_cells = self._cells.open_to_me(area) & area.reachable
         all_rooms = self.worth.first(open_cells, area.lattice.window)
         planned = int(np.count_nonzero(self._room.first(all_rooms, area.lattice)))
-        ahead_s *= int(np.count_nonzero(all_rooms)) / max(planned, 1)
+        if not planned:
+            return False
+        # The path covers one room, and the others have to be done in time, too.
+        ahead_s *= int(np.count_nonzero(all_rooms)) / planned
         return self.worth.puts_other_first(open_cells, area.lattice.window, ahead_s)
 
     def begin_pass(self) -> None:

@@ -17,8 +17,8 @@ NONE = -1
 class RoomInTurn:
     """Chooses a room: the robot's own, or else the nearest one with floor left.
 
-    It stays chosen until none of its floor is left, or it turns out that the robot is in another
-    room: new rooms are known late. Floor that is in no room yet counts as room 0.
+    It stays chosen until none of its floor is left, or until a new room turns out to be around the
+    robot: rooms are known only some time after they were seen. Floor in no room is room 0.
 
     Args:
         cells: the room of each cell.
@@ -40,7 +40,8 @@ class RoomInTurn:
         return self._room != NONE
 
     def begin_pass(self) -> None:
-        """Forget which rooms were tried in vain."""
+        """Forget the room, and which rooms were tried in vain: the robot may be anywhere now."""
+        self._room, self._newest = NONE, 0
         self._given_up.clear()
 
     def give_up(self) -> bool:
@@ -88,7 +89,7 @@ class RoomInTurn:
 
 
 def _way(cells: NDArray[np.bool_], area: ReachableArea, cell: Cell) -> int:
-    """Return the steps from ``cell`` to that of some cells which is nearest in a straight line."""
+    """Return the steps from ``cell`` to the cell that is nearest in rows and columns together."""
     window = area.lattice.window
     found = np.argwhere(cells) + np.array((window.row0, window.col0))
     row, col = found[np.abs(found - cell).sum(axis=1).argmin()].tolist()

@@ -148,7 +148,7 @@ def _in_bounds(walk: Iterable[Cell], most: int) -> list[Cell | str]:
 
 
 def _checked(problem: GridProblem, walk: list[Cell | str], name: str) -> NDArray[np.int32]:
-    """Return a walk, int32 (n, 2); raise IllegalWalk, which names the step, if it is none."""
+    """Return a walk, int32 (n, 2); raise IllegalWalk, with the step, if it is no solution."""
 
     def no(why: str) -> IllegalWalk:
         return IllegalWalk(f"planner {name}: {why}")
