@@ -25,7 +25,7 @@ class RoomShares:
         self._rooms = np.zeros((0, 0), np.uint16)
 
     def of(self, mission: Mission) -> dict[int, float]:
-        """Return the swept share of the asked-for floor in each room with any, by its number.
+        """Return for each room with floor that is asked for, by its number, its swept share.
 
         Empty where only cells are counted, and in a fleet: what floor others sweep is not known.
         """
