@@ -19,11 +19,12 @@ class FasacoError(Exception):
 
     def __init__(self, message: str, *, hint: str | None = None) -> None:
         super().__init__(message)
-        if hint is not None:
-            self.hint = hint
-        # So that a traceback shows it, too: in a notebook there is no command line that prints it.
-        if self.hint:
-            self.add_note(f"hint: {self.hint}")
+        self.advise(self.hint if hint is None else hint)
+
+    def advise(self, hint: str) -> None:
+        """Set the hint; tracebacks show it, too, as a notebook has no command line that does."""
+        self.hint = hint
+        self.__notes__ = [f"hint: {hint}"] if hint else []
 
 
 class DocumentError(FasacoError):

@@ -332,7 +332,7 @@ def _flat(lane: _Lane, size: int) -> NDArray[np.uint8]:
     starts, lengths = edges[0::2], runs[1::2]
     if int(lengths.sum(dtype=np.int64)) != body.size - end:
         raise ValueError(f"runs of {lengths.sum(dtype=np.int64)} bytes, {body.size - end} follow")
-    # BatchPlace of each byte that is not zero: its index among such bytes plus the zeros before it.
+    # Place of each byte that is not zero: its index among such bytes plus the zeros before it.
     places = np.arange(body.size - end)
     places += np.repeat(starts - (np.cumsum(lengths, dtype=np.int64) - lengths), lengths)
     flat = np.zeros(size, np.uint8)

@@ -41,6 +41,8 @@ def described(folder, pixels, **changes):
 def hint_of(act, *given, kind=FasacoError, **named):
     with pytest.raises(kind) as caught:
         act(*given, **named)
+    # In a notebook the traceback alone shows it.
+    assert traceback.format_exception_only(caught.value)[-1] == f"hint: {caught.value.hint}\n"
     return caught.value.hint
 
 

@@ -219,5 +219,6 @@ def drawn_order(document: Members) -> tuple[OrderDocument, list[OrderError]]:
         # Name the feature: line numbers do not help if the file is one line.
         if name := names.get(fault.key[: fault.key.find("]") + 1]):
             fault.what += f" (feature {name!r:.80})"
-        fault.hint = HINT if fault.hint == OrderError.hint else fault.hint
+        if fault.hint == OrderError.hint:
+            fault.advise(HINT)
     return read, faults

@@ -9,13 +9,13 @@ from typing import Any
 from fasaco_edge.errors import BadConfiguration, joined
 
 FOLDER = "CREDENTIALS_DIRECTORY"
-# Removed keys of earlier releases: why, and what to do. A removed key without a value is ignored,
-# as copies of old examples contain it.
 _DOCKING = (
-    "was removed in this version, follow does not command Nav2's docking server",
+    "was removed in this version, `fasaco-edge follow` no longer commands Nav2's docking server",
     "delete the key; the base docks by itself, or on command of a program of your own that reads "
     "the state `charging`",
 )
+# Removed keys of earlier releases: why, and what to do. A removed key without a value is ignored,
+# as copies of old examples contain it.
 REMOVED = {
     "planner.own": (
         "was removed in this version, the daemon plans with its own planners only",

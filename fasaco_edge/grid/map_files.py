@@ -346,6 +346,6 @@ def _read_keys(path: Path) -> tuple[MapKeys, Path]:
         if not os.path.isfile(image):
             faults.append(MapFileError(f"no file {shown(str(image))}", key="image"))
     for fault in (*text.twice, *faults):
-        fault.hint = _KEY_HINTS.get(fault.key.partition("[")[0], _YAML_HINT)
+        fault.advise(_KEY_HINTS.get(fault.key.partition("[")[0], _YAML_HINT))
     text.check(faults)
     return keys, image

@@ -45,7 +45,7 @@ class RecordedView(ServedView):
     def __init__(self, robot: str) -> None:
         super().__init__(Keys())
         self.robot, self.robots = robot, {robot}
-        # DrawingPlace in the recording of each grid shown.
+        # Place in the recording of each grid shown.
         self._drawn: dict[str, DrawingPlace] = {}
 
     def silent_s(self, now: float) -> float:

@@ -6,7 +6,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fasaco_edge.bus.mailbox import Mailbox, Queue, Spacing
+from fasaco_edge.bus.mailbox import LatestSlot, Mailbox, Queue, Spacing
 
 
 def mailbox(length=3):
@@ -126,6 +126,16 @@ def test_a_take_returns_what_a_plain_list_would_keep(kinds):
         assert taken[len(newest) :] == updates[-4:]
         assert box.take_lost("update") == max(len(updates) - 4, 0)
         posted = []
+
+
+def test_a_slot_holds_the_newest():
+    """A planner must not get a request that another has replaced."""
+    slot = LatestSlot()
+    assert slot.take(0) is None
+    slot.put(1)
+    slot.put(2)
+    assert slot.take(0) == 2
+    assert slot.take(0) is None
 
 
 SPACING_S = 0.2

@@ -143,6 +143,7 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
     [
         ("", "a command is missing; there are demo, plan, init"),
         ("mission", "fasaco-edge mission: a command is missing; there are start, "),
+        ("rooms --json", "fasaco-edge rooms: a command is missing; there are list, "),
         ("--verison", "unrecognized arguments: --verison; did you mean --version?"),
         ("plan --planer zigzag", "unrecognized arguments: --planer; did you mean --planner?"),
         ("dance", "invalid choice: 'dance'; there are demo, plan, init"),
@@ -158,6 +159,7 @@ def test_a_mistake_gives_an_error_with_a_hint(folder, capsys, words, code, said)
         ("plan office --end there", "--end: must be anywhere, home or row,column, got 'there'"),
         ("plan office --cell wide", "argument --cell: invalid float value: 'wide'"),
         ("plan office --cell 0,3", "invalid float value: '0,3'; did you mean 0.3?"),
+        ("plan office --ants 1,000", "invalid int value: '1,000'\n"),
         ("ask status --timeout 2,5", "got '2,5'; did you mean 2.5?"),
         ("plan office --planner colony-serch", "'colony-serch'; did you mean colony-search?"),
         ("review a.rrd --pint 1,2", "unrecognized arguments: --pint 1,2; did you mean --point?"),

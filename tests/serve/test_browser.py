@@ -231,6 +231,7 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         until(lambda: has(tab.picture(), tab.js("colours.ahead")))
         assert tab.js("drafts.map((draft) => draft.name).join()") == "keep-out 1"
         assert not TECHNICAL.search(tab.js("document.body.innerText"))
+        offers_to_start_what_is_drawn(tab)
         tab.js("drafts.length = 0; showDrafts()")
         tab.click("resume")
         outsider.wait_status(lambda status: status["state"] == "covering")
@@ -243,6 +244,22 @@ def test_a_mission_is_ordered_by_finger(tmp_path):
         tab.click("trail")
         until(lambda: tab.js("Boolean(model.field)"))
         assert tab.complaints == []
+
+
+def offers_to_start_what_is_drawn(tab: Tab) -> None:
+    """Draw an area in a mission that ends then: the button below the map says what it does."""
+    tab.js("drawing.kind = 'zone'; finish([[1, 1], [2, 1], [2, 2]])")
+    said = tab.js("""(() => {
+      const texts = [], state = model.state;
+      for (const stage of ["", "over"]) {
+        model.state = { ...state, mission: { ...state.mission, paused: false, stage } };
+        show({ kind: "state" });
+        texts.push(find("usedrawn").textContent);
+      }
+      model.state = state;
+      return texts.join();
+    })()""")
+    assert said == "Start anew with these,Start with these"
 
 
 def keep_out_of_no_floor(tab: Tab) -> None:

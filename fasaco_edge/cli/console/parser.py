@@ -6,6 +6,7 @@ import argparse
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, NoReturn
 
 from fasaco_edge.cli.console.help import HelpText
@@ -36,14 +37,18 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print an error, and exit; a misspelt option comes before a missing argument."""
+        lacks_command = message.endswith("required: COMMAND")
         if "arguments are required" in message:
             options = tuple(self._option_string_actions)
             for word in self._given:
                 name = word.partition("=")[0]
-                if name.startswith("--") and not any(each.startswith(name) for each in options):
+                is_known = any(each.startswith(name) for each in options)
+                # It may be an option of the missing command.
+                is_misspelt = not lacks_command or suggestion(name, options)
+                if name.startswith("--") and not is_known and is_misspelt:
                     self._given = ()
                     self.refuse([name])
-        if message.endswith("required: COMMAND"):
+        if lacks_command:
             groups = [each for each in self._actions if isinstance(each.choices, dict)]
             message = f"a command is missing; there are {', '.join(groups[0].choices or ())}"
         print(f"{self.prog}: {message}\nsee: {self.prog} --help", file=sys.stderr)
@@ -61,7 +66,11 @@ class Parser(argparse.ArgumentParser):
             return super()._get_value(action, arg_string)
         except argparse.ArgumentError as error:
             if re.fullmatch(r"-?\d*,\d+", arg_string):
-                error.message += f"; did you mean {arg_string.replace(',', '.')}?"
+                point = arg_string.replace(",", ".")
+                # Not if that is no value, either, as of an option that takes whole numbers.
+                with suppress(argparse.ArgumentError):
+                    super()._get_value(action, point)
+                    error.message += f"; did you mean {point}?"
             raise
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:  # noqa: ANN401

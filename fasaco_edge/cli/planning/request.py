@@ -47,7 +47,7 @@ def watching(
         def show(search: SearchProgress) -> None:
             nonlocal shown
             now = time.perf_counter()
-            if not bar.disable and now - shown >= LEAST_INTERVAL_S:
+            if now - shown >= LEAST_INTERVAL_S:
                 shown = now
                 done = search.work.ants if counted else now - began
                 bar.update(task, completed=done, description=_words(search))

@@ -90,7 +90,7 @@ function show(message) {
       if (!find("login").open) find("login").showModal();
       break;
     case "answer": showAnswer(message); break;
-    case "state": showState(); redraw(); break;
+    case "state": showState(); showBars(); break;
     case "events": showEvents(); break;
     case "recording": showRecording(); break;
     case "time": showTime(message); break;
