@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fasaco_edge import host
-from fasaco_edge.kernels import folder, jit, manifest
+from fasaco_edge.kernels import folder, jit, manifest, scratch
 from tests.support.forked import run_forked
 
 KERNELS = """
@@ -164,6 +164,6 @@ def package_in(root: Path) -> Path:
     for part in (package.parent / "__init__.py", package / "__init__.py"):
         part.touch()
     shutil.copytree(Path(host.__file__).parent, package.parent / "host")
-    for module in (jit, folder, manifest):
+    for module in (jit, folder, manifest, scratch):
         shutil.copy(module.__file__, package)
     return package
