@@ -163,7 +163,7 @@ def user(**more):
         ),
         (
             {"listen": ["tls/0.0.0.0:1"], "security": user()},
-            "bus.listen[0]: tls/0.0.0.0:1: user and password",
+            "bus.listen[0]: tls/0.0.0.0:1: only tcp, ws",
         ),
         (
             {"listen": ["tls/0.0.0.0:1"], "security": tls(), "open_to_everyone": True},
