@@ -177,10 +177,10 @@ def document_of(args: argparse.Namespace) -> dict[str, object]:
     """Return the settings that differ from the defaults."""
     from fasaco_edge.config.robot import RobotConfig
 
-    given, usual = {key: getattr(args, option) for key, option in ROBOT.items()}, RobotConfig()
+    usual = RobotConfig()
     ros = {"domain": args.domain, "namespace": args.namespace}
     parts: dict[str, dict[str, object]] = {
-        "robot": {k: v for k, v in given.items() if v not in (None, getattr(usual, k))},
+        "robot": {k: v for k, v in _robot(args).items() if v != getattr(usual, k)},
         "bus": {},
         "ros2": {},
     }
@@ -192,6 +192,12 @@ def document_of(args: argparse.Namespace) -> dict[str, object]:
     elif args.domain is not None or args.namespace is not None:
         raise BadConfiguration("--domain and --namespace are for maps from ROS 2, see --map-by")
     return {name: part for name, part in parts.items() if part}
+
+
+def _robot(args: argparse.Namespace) -> dict[str, object]:
+    """Return the settings of the robot that options or answers give."""
+    given = {key: getattr(args, option) for key, option in ROBOT.items()}
+    return {key: value for key, value in given.items() if value is not None}
 
 
 def _ask(args: argparse.Namespace) -> None:
@@ -210,8 +216,7 @@ def _ask(args: argparse.Namespace) -> None:
         raise BadConfiguration(
             f"{', '.join(names)} must be given: there is no terminal for questions"
         )
-    options = {key: getattr(args, option) for key, option in ROBOT.items()}
-    _checked({"robot": {key: value for key, value in options.items() if value is not None}})
+    _checked({"robot": _robot(args)})
     for name in missing:
         setattr(args, name, _asked(name))
 

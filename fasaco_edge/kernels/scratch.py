@@ -46,7 +46,7 @@ def scratch_folder() -> str:
 
 
 def _remove_left(base: Path) -> None:
-    """Remove the folders that killed processes of this user left: nobody holds their locks."""
+    """Remove the folders that killed processes of this user left: no process locks them."""
     for left in base.glob(f"{SCRATCH}*"):
         with suppress(OSError), ExitStack() as held:
             opened = os.open(left, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

@@ -40,7 +40,7 @@ TAKES = {
 }  # fmt: skip
 
 
-def told(benchmark: Benchmark[Any]) -> str:
+def with_duration(benchmark: Benchmark[Any]) -> str:
     """Return what a benchmark measures, and how long that takes."""
     return f"{benchmark.summary} ({TAKES[benchmark.name]})"
 
@@ -53,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    add_benchmarks(parser, [replace(one, summary=told(one)) for one in BENCHMARKS])
+    add_benchmarks(parser, [replace(one, summary=with_duration(one)) for one in BENCHMARKS])
     return run_command(parser, sys.argv[1:] if argv is None else argv)
 
 

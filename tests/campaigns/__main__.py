@@ -2,7 +2,7 @@
 
     python -m tests.campaigns
 
-A campaign takes minutes to days; its short form is a test beside it.
+A campaign takes minutes to days; its short form is a test, but of attack, arm64 and manual.
 """
 
 from __future__ import annotations

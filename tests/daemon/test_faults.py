@@ -13,7 +13,7 @@ from fasaco_edge.wire.topics import QOS
 from tests.campaigns.fuzz_daemon import run_campaign
 from tests.support.rooms import map_bytes, pose_bytes, room, update_bytes
 
-# The full campaign, ten thousand, is a command: see fuzz_campaign.py.
+# The full campaign sends ten thousand: `python -m tests.campaigns.fuzz_daemon`.
 SAMPLES = 600
 
 

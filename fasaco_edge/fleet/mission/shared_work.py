@@ -74,11 +74,11 @@ MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 
 
 class DivisionNumbers:
-    """Numbers the divisions of one robot, checks the numbers of others, and tells who takes part.
+    """Numbers the divisions of one robot, checks the numbers of others, and decides who takes part.
 
-    All robots have to agree who does: each makes a new division if the last one leaves out a robot
-    that takes part. If two robots do not receive each other, or a map shows no way between them, a
-    third robot decides.
+    All robots have to agree on who takes part: each makes a new division if the last one leaves out
+    a robot that takes part. If two robots do not receive each other, or a map shows no way between
+    them, a third robot decides.
 
     Attributes:
         number: number of the newest division.

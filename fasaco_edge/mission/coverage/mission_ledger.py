@@ -5,8 +5,8 @@ stays valid, and is compared with each map, until a map knows enough to decide. 
 map is compared with the previous building (``map.building_watch``).
 
 In a fleet a cell counts as swept once a robot has swept its centre, and no robot drives there for
-the rest of the cell's floor. The robot that has passed the cell remembers this rest, whoever's part
-the cell is in, and sweeps it when its line passes near again.
+the rest of the cell's floor. The robot that has passed the cell remembers this rest, in any robot's
+part, and sweeps it when its line passes near again.
 """
 
 from __future__ import annotations
