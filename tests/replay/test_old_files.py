@@ -88,6 +88,7 @@ def test_a_recording_is_reviewed(recording, capsys):
 def test_moments_and_spots_of_a_recording_are_reviewed(recording, capsys):
     at = printed(capsys, "review", recording, "--at", "0:05")["at"]
     assert (at["state"], at["path"]["revision"]) == ("covering", 25)
+    assert at["plan"]["planner"] == "colony-search"
     assert (at["x"], at["y"]) == pytest.approx((3.15, 1.64), abs=0.01)
     (spot,) = printed(capsys, "review", recording, "--point", "1,1")["points"]
     assert (spot["swept"], spot["why"]) == (None, "not known")
