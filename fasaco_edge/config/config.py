@@ -119,7 +119,7 @@ class PlannerConfig(StrictDocument, frozen=True):
 class MissionPolicyConfig(StrictDocument, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and the folder of its progress.
 
-    ``state_dir`` "" is the state folder of the service, else of the user.
+    If ``state_dir`` is "", the folder is the state folder of the service or, without one, the user.
     """
 
     state_dir: str = ""

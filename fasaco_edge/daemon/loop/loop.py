@@ -320,7 +320,7 @@ class Loop:
         """Reply to queries; to commands once the ledger has their changes."""
         commands, runner = self._ports.commands, self._runner
         commands.note(answers, now)
-        if commands.are_asked:
+        if commands.has_open_queries:
             report = self._status.reply(runner, now)
             now = time.monotonic()
             is_kept = self._keeper.is_kept(now) and self._rooms.is_kept(now)

@@ -225,7 +225,7 @@ def _zones(mission: Mission | None, order_state: OrderState) -> Iterator[ZoneRep
             yield ZoneReport(zone.name, zone.passes, polygon=corners)
         return
     for done, (_, corners) in zip(zone_progress(mission), zones, strict=True):
-        counts = done.begun, done.cells, done.covered
+        counts = done.newest_pass, done.cells, done.covered
         yield ZoneReport(done.name, done.passes, *counts, polygon=corners)
 
 

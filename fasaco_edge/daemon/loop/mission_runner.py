@@ -32,8 +32,8 @@ from fasaco_edge.mission.events import (
     PriorityReceived,
     in_runs,
 )
+from fasaco_edge.mission.map.configured_places import ConfiguredPlaces
 from fasaco_edge.mission.map.placing import is_named
-from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.rooms.room_book import RoomBook
 from fasaco_edge.mission.rooms.room_commands import carry_out, check_before_map
 from fasaco_edge.mission.work.order_state import OrderState
@@ -138,7 +138,7 @@ class MissionRunner:
                 carry_out(self.rooms, asked.command, asked.room)
                 return None
             before = self.order_state
-            places = StandingPlaces(self.config.mission, self.config.mission)
+            places = ConfiguredPlaces(self.config.mission, self.config.mission)
             places.restore(before.places)
             if before.frame:
                 places.enter(before.frame)

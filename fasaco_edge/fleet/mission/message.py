@@ -41,7 +41,8 @@ class Messages:
             return None
         layer, pose, tiles = layer_of(mission), mission.pose.pose, mission.ledger.snapshot().tiles
         if layer.others.shared.epoch != self._epoch:
-            # All tiles are sent again. After a restart, the cells swept before are unknown.
+            # A new epoch sends all tiles again. In the first, the cells swept before it are
+            # unknown.
             before = tiles if self._epoch else None
             self._epoch, self._swept, most = (
                 layer.others.shared.epoch,

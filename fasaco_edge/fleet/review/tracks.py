@@ -81,11 +81,11 @@ def tracks_of(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack
             for cell in own.carried(cells_of(note.swept), seat).tolist():
                 track.swept_ms.setdefault((cell[0], cell[1]), note.at_ms)
             ground.append(np.unique(own.carried(cells_of(note.ground), seat), axis=0))
-            if note.in_force:
+            if note.is_repeated:
                 continue
             track.notes.append(note)
-            if note.passes:
-                passed = np.array([(p.at_ms, p.row, p.col) for p in note.passes], np.int64)
+            if note.entered:
+                passed = np.array([(p.at_ms, p.row, p.col) for p in note.entered], np.int64)
                 passed[:, 1:] = own.carried(passed[:, 1:], seat)
                 passes.setdefault(robot.name, []).append(passed)
     for name, pieces in passes.items():

@@ -174,7 +174,7 @@ EVERY_S = 1.0
 class FleetWatch(Watched):
     """The watch of a fleet, see ``live.Watched``."""
 
-    rest_s = REST_S
+    most_wait_s = REST_S
     view: FleetView
 
     def __init__(self, feed: FleetFeed, view: FleetView, console: Console) -> None:

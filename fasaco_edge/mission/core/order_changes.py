@@ -72,7 +72,7 @@ class OrderChanges:
         self.line.receive_map()
 
     def update_area(self) -> None:
-        """Update the reachable area; want a new plan if it changed."""
+        """Update the reachable area; ask for a new plan if the area has changed."""
         before, route = self.map.area, self.route
         self.map.update_area()
         area = self.map.area
@@ -139,7 +139,7 @@ class OrderChanges:
         return update
 
     def follow_rooms(self) -> None:
-        """Let zones of the order follow their rooms; want a plan if the cells to cover change."""
+        """Let zones of the order follow their rooms; ask for a plan if cells to cover change."""
         book, state = self.rooms.book, self.orders.order_state
         if self._followed == (book.version, state.order) or state.order is None:
             return
@@ -183,7 +183,7 @@ class OrderChanges:
         return None
 
     def _replan(self) -> int:
-        """Want a full new plan; return its number, or raise CommandError if none can be made."""
+        """Ask for a full new plan; return its number, or raise CommandError if none can be made."""
         if self.map.lattice is None:
             raise CommandError("nothing to plan: there is no map yet", hint="publish a map first")
         if self.map.pose is None:

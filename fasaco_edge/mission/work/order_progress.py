@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Self
 
-from fasaco_edge.mission.map.standing_places import NO_PLACES, PlacesNote
+from fasaco_edge.mission.map.configured_places import NO_PLACES, PlacesNote
 from fasaco_edge.mission.orders.keep_outs import KeepOuts
 from fasaco_edge.mission.orders.order import Errand, MissionOrder, Zone
 from fasaco_edge.mission.rooms.room_book import MOST_LISTED

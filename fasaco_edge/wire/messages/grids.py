@@ -96,7 +96,7 @@ def read_octets(
 
 
 _FLOAT32 = struct.Struct("<f")
-# A value far beyond any resolution; rounded up, it may overflow float32.
+# Far beyond any resolution; the decimals of larger values may overflow float32.
 _FAR = 1e30
 
 
