@@ -42,8 +42,8 @@ takes 121 MB, 17 MB of them for the map, and 228 MB with pages of libraries, whi
 reclaim (``fasaco-edge bench daemon``). A path of 440,000 cells takes 127 MB more; maps of 25
 million pixels at 20 Hz take 75 MB more, 240 MB if an update of full size follows each, and another
 50 MB with a recorder. The base includes 42 MB of samples other than maps that wait for the loop,
-and the library pages in use. These are up to 16 MB more for a library that was just unpacked than
-for a copy of it, as the system maps it in larger blocks.
+and the library pages in use. A library that was just unpacked takes up to 16 MB more of them than a
+copy of it, as the system maps it in larger blocks.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def floor_pixels(max_pixels: int) -> int:
 def mask_bytes(config: DaemonConfig, limit: int | None) -> int:
     """Return the memory for reading a keep-out mask under a memory limit [bytes].
 
-    It is that of decoding a map and an update in a cycle, as none is decoded while the
+    A mask may take the memory for decoding a map and an update, as none is decoded while the
     configuration is reloaded. A small picture is always read.
     """
     share = MASK_COPIES * afforded(config, limit).map.max_pixels

@@ -50,7 +50,7 @@ LOG = logging.getLogger(__name__)
 # [s].
 RECORDER_STOP_S, RECORDER_LONGEST_S = 1.2, 6.0
 WORKER_STOP_S = 0.4
-# Timeout for the ledger's disk, which writes while the other processes end: in all, and least time
+# Timeout of the last write of the ledger, made while the other processes end [s]; least time for it
 # after they have ended [s].
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
 # Time after which a blocked process exits by itself [s]: SIGKILL, after the 10 s of

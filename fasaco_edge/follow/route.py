@@ -196,7 +196,7 @@ class LegRoute:
         return index, False
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point soon ahead; none if it, or the robot, is off the legs."""
+        """Return the legs up to a point soon ahead; none if it or the robot is off them."""
         way = 0.0
         for index, leg in enumerate(self._ahead()):
             if index == 0:

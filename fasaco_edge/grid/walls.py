@@ -67,9 +67,9 @@ class WallDirection:
 
     Attributes:
         angle_deg: angle of the walls to the axes of the map frame, in (-45, 45] [deg].
-        share: share of all wall that is within 7 degrees of it.
-        wall_m: length of that wall [m], of both sides; a wall one pixel thick between free pixels
-            counts for 0.3 of its length, as vectors cancel out.
+        share: share of all wall that is within 7 degrees of this angle.
+        wall_m: length of the wall in this share [m], of both sides; a wall one pixel thick between
+            free pixels counts for 0.3 of its length, as vectors cancel out.
         is_of_rim: whether the map marks few walls, and the border of free space was used instead.
     """
 

@@ -231,7 +231,7 @@ class World:
         return self.activity is Activity.STOPPED and is_first and not self.drive.moving
 
     def _recent_track(self) -> NDArray[np.float64]:
-        """Return the last points of the track, and the way to rest, on the own map, (n, 2) [m]."""
+        """Return the track's last points, and the way to rest, on the robot's map, (n, 2) [m]."""
         here = (self.pose.x, self.pose.y)
         rest = stopping_point(self.drive, self.config)
         points = 2 + int(math.dist(here, rest) / TRACK_SPACING_M)
@@ -263,7 +263,7 @@ class World:
         return self.mapper.true_place(*self._corners[-1])
 
     def _may_drive_on(self) -> bool:
-        """Return whether no obstacle of the own map, and no other robot, stops the robot."""
+        """Return whether no obstacle of the robot's map, and no other robot, stops the robot."""
         if self.activity is Activity.STOPPED:
             return False
         ahead = driven(self.drive, self._goal(), self.config)

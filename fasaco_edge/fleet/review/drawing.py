@@ -119,7 +119,7 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
         plot.paint(layer(np.array(some, np.int64).reshape(-1, 2)), colour)
         key.append(KeyEntry("tile", colour, f"after another robot {what}, {area_m2:.1f} m2"))
     for track in review.tracks:
-        rows, cols = track.passes[:, 1], track.passes[:, 2]
+        rows, cols = track.entered[:, 1], track.entered[:, 2]
         points = np.array(
             [geometry.to_map(c - window.col0 + 0.5, r - window.row0 + 0.5)
              for r, c in zip(rows.tolist(), cols.tolist(), strict=True)]

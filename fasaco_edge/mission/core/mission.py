@@ -193,7 +193,7 @@ class Mission:
         if path is not None:
             path = self.rotation.path(path, self.lattice)
             path = replace(path, speed_m_s=self.order_state.speed_m_s)
-        plan = decided.plan and self._trail.posed(decided.plan)
+        plan = decided.plan and self._trail.with_trail(decided.plan)
         return replace(happened, plan=plan, path=path)
 
     def _find_rooms(self, happened: Decision, now: float) -> Decision:

@@ -42,13 +42,13 @@ class OrderChanges:
     # Whether the robot is in no fleet: the robots of a fleet have the same cells.
     is_alone: bool
     # Keep-out polygons that apply to every order.
-    _standing: tuple[Polygon, ...] = field(default=(), init=False)
+    _configured: tuple[Polygon, ...] = field(default=(), init=False)
     # The version of the rooms and the order at the last comparison.
     _followed: tuple[int, MissionOrder | None] = field(default=(-1, None), init=False)
 
     def __post_init__(self) -> None:
         policy = self.config.policy
-        self._standing = policy.keep_out + mask_polygons(policy.keep_out_mask)
+        self._configured = policy.keep_out + mask_polygons(policy.keep_out_mask)
 
     @property
     def lattice_deg(self) -> float:
@@ -68,7 +68,7 @@ class OrderChanges:
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:
             drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
-        self.map.keep_out(self._standing + ordered + drawn, self.map.grid)
+        self.map.keep_out(self._configured + ordered + drawn, self.map.grid)
         self.line.receive_map()
 
     def update_area(self) -> None:

@@ -23,7 +23,7 @@ SPARE_TIME = "spare time"
 REPAIR_S, SEARCH_S = 0.05, 0.3
 # A better path replaces the path only if it saves this many steps and this share of the rest.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# This share for a walk from a full search, as its line has to be made and polished again.
+# A walk from a full search has to save this share, as its line is made and polished again.
 NEW_WALK_SHARE = 0.01
 # The share of time is halved at most this many times.
 MOST_VAIN = 4

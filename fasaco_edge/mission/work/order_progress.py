@@ -47,7 +47,7 @@ class OrderProgress:
             file, None in a mission.
         spent_s: the robot's time since the order began, if it has a limit [s].
         late: why it ends before all is covered; "" if it does not.
-        last: while there is no order, the one that was cancelled; None for none.
+        last: the order that was cancelled, until another begins; None for none.
     """
 
     order: MissionOrder | None = None

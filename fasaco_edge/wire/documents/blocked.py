@@ -31,7 +31,7 @@ class Blocked(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         daemon: Zenoh id of the daemon whose path it is.
-        revision: of the path; 0 where that is not known.
+        revision: revision of the path; 0 if unknown.
         reason: obstacle: something is ahead that the map does not show; stuck: the robot does not
             move as commanded, or its controller has given up; elsewhere: it cannot join the path.
         detail: the same in words.

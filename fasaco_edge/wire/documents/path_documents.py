@@ -35,8 +35,8 @@ class PlanFigures(Document, frozen=True):
         gap: planned_cost_s / lower_bound_cost_s - 1.
         saved_by_ants_s: seconds saved on the first walk by ants and by the local search of their
             walks.
-        saved_by_local_search_s: seconds saved by local search on the first walk, or on the one
-            still to drive.
+        saved_by_local_search_s: seconds saved by local search on the first walk, or on the rest of
+            the current walk.
         saved_by_velocity_s: saved_by_ants_s for each cohort, by its velocity in cells per move;
             null if ants saved nothing.
     """

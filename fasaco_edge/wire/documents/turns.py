@@ -44,7 +44,7 @@ class TakenSample(msgspec.Struct, frozen=True, array_like=True):
         topic: its topic.
         checksum: CRC-32 of its payload; 0 if the batch itself holds the sample.
         at: time of arrival of a map or an update [s]; 0 for others, whose time has no effect.
-        told: the sample itself, if it is from before the recorder listened; else None.
+        told: the sample itself, if it arrived before the recorder subscribed; else None.
     """
 
     topic: str
