@@ -67,14 +67,14 @@ class DocumentError(FasacoError):
         """
         made: type[_Fault] = type(self) if isinstance(self, kind) else kind
         hint = None if self.hint == type(self).hint else self.hint
-        places = [joined(key, each) for each in (self.key, *self.others)]
+        places = [nested_key(key, each) for each in (self.key, *self.others)]
         return made(self.what, hint=hint, key=places[0], others=places[1:])
 
 
 _Fault = TypeVar("_Fault", bound=DocumentError)
 
 
-def joined(key: str, below: str) -> str:
+def nested_key(key: str, below: str) -> str:
     """Return the key of ``below``, a key or an index in brackets, in the object at ``key``."""
     return f"{key}{'.' if key and below and below[0] != '[' else ''}{below}"
 

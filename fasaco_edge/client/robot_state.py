@@ -195,7 +195,7 @@ class RobotState:
     def _move(self, pose: Pose2D) -> None:
         if abs(pose.x) <= MAX_COORDINATE_M and abs(pose.y) <= MAX_COORDINATE_M:
             self.pose = pose
-            self.walk.passed(pose)
+            self.walk.note_position(pose)
 
 
 def _order_of(status: Status) -> tuple[object, ...]:
@@ -243,7 +243,7 @@ class WatchedPath:
         if not self._find(pose, LOOK_AHEAD_M):
             self._find(pose, math.inf)
 
-    def passed(self, pose: Pose2D) -> None:
+    def note_position(self, pose: Pose2D) -> None:
         """Note the robot's position; progress only grows."""
         self._find(pose, LOOK_AHEAD_M)
 

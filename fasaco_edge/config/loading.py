@@ -9,7 +9,7 @@ import msgspec
 from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.reading import refused, with_credentials, without_removed
+from fasaco_edge.config.reading import faults_of, with_credentials, without_removed
 from fasaco_edge.errors import BadConfiguration, together
 from fasaco_edge.host.documents import inspected
 from fasaco_edge.host.plain_yaml import read_written
@@ -79,6 +79,6 @@ def inspect_config(
     document, removed = without_removed({} if text.values is None else text.values)
     config, faults = inspected(DaemonConfig, with_credentials(document), BadConfiguration)
     if config:
-        faults += [*removed, *refused(lambda: check(config))]
+        faults += [*removed, *faults_of(lambda: check(config))]
     faults = text.faults(faults)
     return None if faults else config, faults

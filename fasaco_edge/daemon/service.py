@@ -24,7 +24,7 @@ from fasaco_edge.daemon.loop.loop import Loop, Ports
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.mask_topic import MaskTopic
-from fasaco_edge.daemon.memory import afforded, has_default_sizes, needed_bytes
+from fasaco_edge.daemon.memory import has_default_sizes, limited_to_memory, needed_bytes
 from fasaco_edge.daemon.name_claim import NameClaim
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
@@ -154,7 +154,7 @@ def _metrics_of(config: DaemonConfig) -> MetricsServer | None:
 def _afforded(config: DaemonConfig) -> DaemonConfig:
     """Return the configuration, with smaller maps if memory is limited; log that."""
     limit = memory_limit()
-    smaller = afforded(config, limit)
+    smaller = limited_to_memory(config, limit)
     if limit is not None and smaller is not config:
         # If the configuration gives no sizes, maps may be as large as the memory allows.
         LOG.log(

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fasaco_edge.daemon.ledger.file import lock_file, why_no_lock
-from fasaco_edge.daemon.memory import afforded, has_default_sizes, limits_mib
+from fasaco_edge.daemon.memory import has_default_sizes, limited_to_memory, limits_mib
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels.folder import outdated, wanted_folder
@@ -101,7 +101,7 @@ def memory(context: CheckContext) -> Finding:
     if free_mb < WANTED_MB:
         to_do = "stop other programs, or plan with larger cells (robot.tool_width_m)"
         return warn(f"{found}; the daemon may need {WANTED_MB} MB", to_do, details)
-    smaller = afforded(context.config, limit).map
+    smaller = limited_to_memory(context.config, limit).map
     if limit and smaller is not context.config.map:
         high, most = limits_mib(context.config)
         found += f"; the unit's limit is {limit / 1e6:.0f} MB: maps of no more than "

@@ -63,7 +63,7 @@ class Follower(Supervision):
     def step(self, now: float) -> VelocityCommand | None:
         """Return the command to send now, or None."""
         if self._stepped_at is not None:
-            self._pursuit.passed(now - self._stepped_at)
+            self._pursuit.note_time(now - self._stepped_at)
         self._stepped_at = now
         command = self._supervised(self._steer, now)
         if command is None:

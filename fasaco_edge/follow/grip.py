@@ -129,7 +129,7 @@ class Grip:
         if done.share() >= LEAST_SHARE:
             self._tries.moved_to(done.middle())
             return False
-        self._tries.failed(done.middle(), toward, now)
+        self._tries.note_failure(done.middle(), toward, now)
         return True
 
     def sent(self, command: VelocityCommand, seconds: float) -> None:

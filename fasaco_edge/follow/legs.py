@@ -60,14 +60,14 @@ class Leg:
         """Whether the robot only steers at its end."""
         return self.most == math.inf
 
-    def placed(self, point: Point) -> tuple[float, float]:
+    def along_and_left(self, point: Point) -> tuple[float, float]:
         """Return a point's distance along the leg's line, and to its left [m]."""
         dx, dy = point[0] - self.start[0], point[1] - self.start[1]
         return dx * self.ux + dy * self.uy, self.ux * dy - self.uy * dx
 
     def distance(self, point: Point) -> float:
         """Return a point's distance from the leg [m]."""
-        along, aside = self.placed(point)
+        along, aside = self.along_and_left(point)
         beyond = max(-along, along - self.length, 0.0)
         return math.hypot(beyond, aside)
 

@@ -24,7 +24,7 @@ from typing import (
 import msgspec
 from msgspec import UNSET, structs
 
-from fasaco_edge.errors import DocumentError, joined, together
+from fasaco_edge.errors import DocumentError, nested_key, together
 from fasaco_edge.text import nearest, shown
 
 # An annotation of a type, and a value of that type.
@@ -93,7 +93,7 @@ def misfits(held: object, error: type[_Error], key: str = "") -> Iterator[_Error
         for name, encoded in zip(
             held.__struct_fields__, held.__struct_encode_fields__, strict=True
         ):
-            yield from misfits(getattr(held, name), error, joined(key, encoded))
+            yield from misfits(getattr(held, name), error, nested_key(key, encoded))
         if isinstance(held, StrictDocument):
             for fault in held.faults():
                 yield fault.within(key, error)
@@ -146,15 +146,15 @@ class _Reader:
         for name in (each for each in value if isinstance(each, str) and each not in fields):
             if not is_open or nearest(name, fields.keys() - value.keys(), ALIKE):
                 what, meant = self._unknown(name, key, list(fields))
-                self._add(joined(key, name), what, meant)
+                self._add(nested_key(key, name), what, meant)
                 misspelt |= set(meant)
         members = {field.name: UNSET for field in fields.values() if field.required}
         for name, field in fields.items():
             if name in value:
-                read = self.read(field.type, value[name], joined(key, name))
+                read = self.read(field.type, value[name], nested_key(key, name))
                 members |= {} if read is UNSET else {field.name: read}
-            elif field.required and joined(key, name) not in misspelt:
-                self._add(joined(key, name), "missing")
+            elif field.required and nested_key(key, name) not in misspelt:
+                self._add(nested_key(key, name), "missing")
         return kind(**members)
 
     def _items(self, kind: _Kind, value: list[object], key: str) -> _Value:
@@ -163,7 +163,7 @@ class _Reader:
 
     def _unknown(self, name: str, key: str, known: list[str]) -> tuple[str, list[str]]:
         """Return what is wrong with an unknown key, and the keys that it was meant for."""
-        meant = [joined(key, each) for each in nearest(name, known)]
+        meant = [nested_key(key, each) for each in nearest(name, known)]
         # It may belong elsewhere in the document.
         meant = meant or [path for path in _paths(self._root) if path.rpartition(".")[2] == name]
         if meant:
@@ -185,7 +185,7 @@ def _touch(one: str, other: str) -> bool:
 def _paths(kind: type[msgspec.Struct], before: str = "") -> Iterator[str]:
     """Yield all keys of a struct and of those in it, without lists."""
     for field in structs.fields(kind):
-        yield (path := joined(before, field.encode_name))
+        yield (path := nested_key(before, field.encode_name))
         if struct := _struct(field.type):
             yield from _paths(struct, path)
 

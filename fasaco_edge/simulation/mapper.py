@@ -49,7 +49,7 @@ class Mapper:
         rays = rays_for(self._reach_px)
         self._angles = np.arange(rays) * (math.tau / rays)
 
-    def believed(self, pose: Pose2D) -> Pose2D:
+    def estimated(self, pose: Pose2D) -> Pose2D:
         """Return the estimated pose of a robot at ``pose``: the same pose, as there is no error."""
         return pose
 

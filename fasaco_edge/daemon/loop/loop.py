@@ -194,13 +194,13 @@ class Loop:
     ) -> None:
         """Let another mission continue from the ledger, as after a restart of the daemon.
 
-        The turn log ends with ``why``. ``held``: the first events; None for the present map and
-        pose.
+        The turn log ends with ``why``. ``newest_inputs``: the first events; None for the present
+        map and pose.
         """
         self._ports.turns.end(why)
         if config is not None:
             self._status.show(config)
-        held = self._runner.held() if held is None else held
+        held = self._runner.newest_inputs() if held is None else held
         self._runner.restart(config or self.config, held, why)
         self._send_path()
         self._latency = MapLatency()
@@ -295,7 +295,7 @@ class Loop:
         now, failed_at = time.monotonic(), self._failed_at
         self._failed_at = now
         self._status.waits = f"{fault}: waits for another map"
-        held = self._runner.held() if now - failed_at > SOON_S else []
+        held = self._runner.newest_inputs() if now - failed_at > SOON_S else []
         self._restart(str(fault), held=held)
         return Decision(answers=tuple(Answer(asked.number, fault) for asked in commands))
 

@@ -159,9 +159,9 @@ class MissionRunner:
             self._keeper.forget()
         return None
 
-    def held(self) -> list[Event]:
+    def newest_inputs(self) -> list[Event]:
         """Return the newest map and pose as events for a new mission."""
-        return self._held.events if self.mission is None else self.mission.held()
+        return self._held.events if self.mission is None else self.mission.newest_inputs()
 
     def step(self, mission: Mission, events: Sequence[Event], now: float) -> Decision:
         """Step the mission, and take over its path for publication."""

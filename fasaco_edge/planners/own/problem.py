@@ -100,7 +100,7 @@ class OwnPlanner:
             IllegalWalk: the result is not a walk, or does not solve the problem.
         """
         given, began = grid_problem(problem, self.seed), time.perf_counter()
-        cells = walked(self.code, given, self.most_s)
+        cells = walk_of(self.code, given, self.most_s)
         taken_s = time.perf_counter() - began
         window = problem.lattice.window
         cells = cells + np.array((window.row0, window.col0), np.int32)
@@ -108,7 +108,7 @@ class OwnPlanner:
         return CoveragePath(cells, self.code.name, self.seed, cost_s=cost_s, first_walk_s=taken_s)
 
 
-def walked(code: UserCode, problem: GridProblem, most_s: float | None = None) -> NDArray[np.int32]:
+def walk_of(code: UserCode, problem: GridProblem, most_s: float | None = None) -> NDArray[np.int32]:
     """Return the walk of a planner of the user's own, int32 (n, 2).
 
     ``most_s`` is the time that the code may take [s]; None for no limit.
