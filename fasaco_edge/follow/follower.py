@@ -32,7 +32,7 @@ class Follower(Supervision):
     """Follows the newest path while all its inputs are up to date.
 
     Args:
-        limits: of the base.
+        limits: limits of the base.
         patience: timeouts of pose and status.
         moves: whether the base executes the commands; in a dry run it does not.
         sight: finds obstacles that the map does not show; None to use the map alone.

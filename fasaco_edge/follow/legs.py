@@ -124,7 +124,7 @@ def rounding(turn: float, room: float, limits: BaseLimits) -> tuple[float, float
     Args:
         turn: angle of the corner, 0 or more [rad].
         room: distance before and after the corner that the turn may take [m].
-        limits: of the base.
+        limits: limits of the base.
 
     Returns:
         a speed of 0 if the robot has to turn on the spot, infinity if it only steers.

@@ -72,7 +72,7 @@ class SendPiece:
     """A request to begin a goal: to follow points [m] in a frame.
 
     Attributes:
-        id: of the goal.
+        id: id of the goal.
         end_yaw: heading at the last point [rad]; None to keep the heading of arrival.
         is_back: whether it is driven backward: headings are opposite to the motion.
     """

@@ -148,9 +148,9 @@ class MissionConfig:
     """Robot, cost, limits and policy of a mission; by default without retries.
 
     Attributes:
-        footprint: of robot and tool.
+        footprint: footprint of robot and tool.
         max_lattice_cells: limit on the cells of the coverage lattice.
-        cost: of paths.
+        cost: cost of paths.
         policy: retries and timeouts.
         spare_share: share of a processor core for improving a path that is still valid; 0 for
             none.

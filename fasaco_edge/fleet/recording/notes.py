@@ -57,7 +57,7 @@ class Note(msgspec.Struct, array_like=True):
     Attributes:
         robot: its number in ``NoteBatch.robots``.
         at_ms: time since the recording began [ms].
-        state: of its mission; "gone" once it is silent.
+        state: state of its mission; "gone" once it is silent.
         x, y: its position in its map frame [m].
         waits_for: name of the robot that it waits for; "" for none.
         division: number of its division.

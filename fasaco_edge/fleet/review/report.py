@@ -116,10 +116,10 @@ class FleetReview:
     """A fleet's recording, read.
 
     Attributes:
-        figures: of the fleet.
-        seat: of the lattice of all cells.
+        figures: figures of the fleet.
+        seat: seat of the lattice of all cells.
         ground: cells that any robot could reach, int64 (n, 2).
-        tracks: of each robot.
+        tracks: the track of each robot.
     """
 
     figures: FleetFigures

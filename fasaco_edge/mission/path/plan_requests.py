@@ -115,7 +115,7 @@ class Attempt:
             return None  # the map has changed: a repair is due
         return cls(numbering, path.index, joint, problem)
 
-    def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
+    def improved(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
         """Return the improved cells ahead, int32 (n, 2); None if they save too little.
 
         Args:

@@ -226,7 +226,7 @@ class Route:
     ) -> PathUpdate | None:
         if attempt.numbering != self._numberings:
             return None
-        cells = attempt.joined(self.path, event.path.cells)
+        cells = attempt.improved(self.path, event.path.cells)
         if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
         return replace(self.publish(cells, BETTER, now, event), may_wait=True)

@@ -24,7 +24,7 @@ class PlanFigures(Document, frozen=True):
 
     Attributes:
         planner: name of the planner.
-        seed: of all random streams.
+        seed: seed of all random streams.
         ants: ants that walked.
         kicks: perturbations of the local search.
         proposals: moves that the local search tried.
@@ -91,7 +91,7 @@ class PathReport(PlanFigures, frozen=True):
 
     Attributes:
         revision: counts the published paths.
-        steps: as published.
+        steps: number of steps when the path was published.
         remaining_steps: still to drive.
         line_s: seconds that the path ahead takes.
         line_gap: line_s / bound - 1, bound being the least time of any line that sweeps as much
@@ -155,7 +155,7 @@ class TrailAttachment(Document, frozen=True):
     In old recordings a field without an attachment is the pheromone of a cohort of ants.
 
     Attributes:
-        revision: of the path in force.
+        revision: revision of the path in force.
         cells: number of cells that the trail spans: those with a step to another one.
         branching: mean number of directions of a cell that are close to its strongest: 1 if each
             cell has a single one.
