@@ -17,8 +17,9 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 class OthersCells:
     """The cells that other robots have swept, a part of the ledger; here none.
 
-    A robot that has left its fleet keeps what the others had swept, in case it joins again. Once it
-    forgets cells of its own, it drops that: it would bring the forgotten cells back as swept.
+    A robot that has left its fleet keeps the cells that others had swept, in case it joins again.
+    Once it forgets cells of its own, it drops all others, too: else forgotten cells that others had
+    swept would still count.
 
     Attributes:
         version: counter of changes.

@@ -40,7 +40,7 @@ class PublishedLine:
     """Compares the line with the published one.
 
     Args:
-        speed_m_s: of the robot.
+        speed_m_s: speed of the robot.
     """
 
     def __init__(self, speed_m_s: float) -> None:
@@ -138,7 +138,7 @@ class Publication:
 
     Args:
         route: numbers the paths.
-        speed_m_s: of the robot.
+        speed_m_s: speed of the robot.
     """
 
     def __init__(self, route: Route, speed_m_s: float) -> None:
