@@ -7,6 +7,7 @@ import re
 import pytest
 
 from fasaco_edge.daemon.loop import mission_reports
+from fasaco_edge.mission.events import State
 from fasaco_edge.mission.line import unswept
 from fasaco_edge.mission.work import uncovered
 from fasaco_edge.serve import plain
@@ -45,6 +46,12 @@ def test_each_state_has_plain_words(state):
     needs = plain.needs(status(state=state, troubles=troubles))
     assert len(set(needs)) == len(TROUBLES)
     assert not [text for text in needs if TECHNICAL.search(text)]
+
+
+@pytest.mark.parametrize("state", [state for state in State if state.is_at_rest])
+def test_a_robot_at_rest_is_not_said_to_sweep(state):
+    mission = FULL["mission"] | {"stage": "covering"}
+    assert not plain.does(status(state=state, mission=mission)).startswith("Sweeps")
 
 
 def test_a_room_that_is_waited_for_is_named():

@@ -20,13 +20,13 @@ from fasaco_edge.mission.events import (
     PlanRequest,
 )
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.path.path_progress import PathProgress
 from fasaco_edge.mission.path.plan_requests import (
     BROKEN_S,
     Attempt,
     PlanRequests,
     SpareTime,
 )
-from fasaco_edge.mission.work.progress import PathProgress
 from fasaco_edge.mission.work.sequencer import Sequencer
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
