@@ -15,7 +15,7 @@ from fasaco_edge.grid.geometry import Bounds, Polygon
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.serve import plain
 from fasaco_edge.wire.documents.json_text import Corners
-from fasaco_edge.wire.documents.replies import FloorReport, MissionReport
+from fasaco_edge.wire.documents.replies import FloorReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.documents.settings import KnownSettings
 from fasaco_edge.wire.documents.status import FleetReport, Status
@@ -75,7 +75,7 @@ def state(
         "grows": view.grows(now),
         "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
-        "mission": _mission(mission),
+        "mission": _mission(view, mission),
         "again": _again(order),
         "battery": battery and {"level": battery.level, "power": battery.power},
         "in_trouble": bool(status.troubles),
@@ -126,7 +126,9 @@ def _to_go_s(view: RobotState, status: Status) -> int | None:
     return None if not left_s or left_s > MOST_TO_GO_S else round(left_s)
 
 
-def _mission(mission: MissionReport) -> Digest:
+def _mission(view: RobotState, mission: MissionReport) -> Digest:
+    # Of a room its floor, as on the map; of another zone its cells.
+    swept = {title: room.swept for title, room in _rooms_of(view).items()}
     return {
         "ordered": mission.ordered,
         "stage": mission.stage,
@@ -141,7 +143,7 @@ def _mission(mission: MissionReport) -> Digest:
                 "name": zone.name,
                 "pass": zone.pass_number,
                 "passes": zone.passes,
-                "share": zone.covered / zone.cells if zone.cells else 0.0,
+                "share": _of_cells(zone) if (m2 := swept.get(zone.name)) is None else m2,
             }
             for zone in mission.zones[:MOST_AREAS]
         ],
@@ -150,6 +152,16 @@ def _mission(mission: MissionReport) -> Digest:
         "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
+
+
+def _of_cells(zone: ZoneReport) -> float:
+    return zone.covered / zone.cells if zone.cells else 0.0
+
+
+def _rooms_of(view: RobotState) -> dict[str, RoomReport]:
+    """Return the rooms that zones of an order may be, by their titles."""
+    standing = {zone.name for zone in view.settings.mission.zones}
+    return {room.title: room for room in view.rooms.rooms if room.title not in standing}
 
 
 def _part(mission: MissionReport) -> str:
@@ -178,9 +190,7 @@ def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None
     """
     if mission.ordered != "command":
         return None
-    standing = {zone.name for zone in view.settings.mission.zones}
-    rooms = {room.title: room for room in view.rooms.rooms if room.title not in standing}
-    zones: list[Digest] = []
+    rooms, zones = _rooms_of(view), list[Digest]()
     for zone in mission.zones:
         found: Digest = {"name": zone.name, "passes": zone.passes}
         if room := rooms.get(zone.name):

@@ -89,9 +89,10 @@ function showLeft(state) {
   const parts = state.left, isOver = ["over", null].includes(state.mission.stage);
   find("left").hidden = !parts.length;
   find("left-what").textContent = isOver ? "Not swept" : "Left out so far";
-  find("left-m2").textContent = squares(parts.reduce((sum, part) => sum + part.m2, 0));
+  const isKnown = parts.every((part) => part.m2 !== null);
+  find("left-m2").textContent = isKnown ? `: ${squares(parts.reduce((sum, part) => sum + part.m2, 0))}` : "";
   find("left").querySelector("ul").replaceChildren(...parts.map((part) => {
-    const line = item(["span", "m2", squares(part.m2)], part.reason);
+    const line = item(["span", "m2", part.m2 === null ? "" : squares(part.m2)], part.reason);
     // A recording has no places of unswept floor, except of areas with a point.
     if (model.recording && !part.places.length) return line;
     const show = action("", () => showOnMap(part));
