@@ -156,7 +156,11 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("driven", amount(document.driven_m, "m")),
         ("stood", _stood(document)),
         ("replans", replans),
-        ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
+        (
+            "refused",
+            f"{document.faults} message{'s' * (document.faults != 1)}; "
+            f"lost {count(document.recorder_lost, '')}",
+        ),
         ("processor", _processor(document)),
     ]
     return [(name, text) for name, text in found if text]
