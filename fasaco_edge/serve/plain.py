@@ -53,7 +53,8 @@ NEEDS = {
     "stands": "It does not move. Check whether a cable, a carpet or furniture holds it.",
     "beside_line": "It drives beside its path and may leave strips. Call service.",
     "two_publishers": "Two programs send it different maps or places. Call service.",
-    "no_effect": "A keep-out, its home or its dock lies where it has seen no floor. Check the map.",
+    "no_effect": "A keep-out, its home or its dock lies where it has seen no floor yet. If it has "
+    "seen everything, check the map.",
 }
 """What the owner can do about a trouble, by its code."""
 UNSAVED = "It cannot save what it has swept: after a power cut it would start over. Call service."
