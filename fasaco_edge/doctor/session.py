@@ -161,7 +161,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
     for kind, senders in received.items():
         count = senders.total()
-        details.append(f"{kind}: {f'{count} in {listen_s:g} s' if count else 'nothing received'}")
+        details.append(f"{kind}: {count or 'nothing received'} in {listen_s:g} s")
     several = _several(bus, received)
     if keys.of(topics.ALIVE) not in alive:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(received)}"

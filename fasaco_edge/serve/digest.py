@@ -154,8 +154,8 @@ def _mission(view: RobotState, mission: MissionReport) -> Digest:
     }
 
 
-def _of_cells(zone: ZoneReport) -> float:
-    return zone.covered / zone.cells if zone.cells else 0.0
+def _of_cells(zone: ZoneReport) -> float | None:
+    return zone.covered / zone.cells if zone.cells else None
 
 
 def _rooms_of(view: RobotState) -> dict[str, RoomReport]:

@@ -134,7 +134,7 @@ function showProgress(state) {
   const lines = state.mission.zones.map((zone) => {
     const pass = zone.passes > 1 ? `, pass ${zone.pass} of ${zone.passes}` : "";
     // The figures above refer to the current one.
-    const share = zone.name === state.mission.zone ? "now" : percent(zone.share);
+    const share = zone.name === state.mission.zone ? "now" : zone.share === null ? "–" : percent(zone.share);
     return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${share}${pass}` : "to come"]);
   });
   if (!lines.length && state.mission.passes > 1) lines.push(item(["span", "", "everything"], ["span", "quiet", `pass ${state.mission.pass} of ${state.mission.passes}`]));
