@@ -275,7 +275,7 @@ def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
             clock(charge.at_s),
             clock(charge.seconds),
             " to ".join(
-                NOT_KNOWN if level is None else f"{level:.0%}"
+                NOT_KNOWN if level is None else f"{100 * level:.0f} %"
                 for level in (charge.level_from, charge.level_to)
             ),
         )
