@@ -14,8 +14,9 @@ from fasaco_edge.client.robot_state import RobotState
 from fasaco_edge.grid.geometry import Bounds, Polygon
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.serve import plain
+from fasaco_edge.serve.last_order import again, order_of, rooms_of
 from fasaco_edge.wire.documents.json_text import Corners
-from fasaco_edge.wire.documents.replies import FloorReport, MissionReport
+from fasaco_edge.wire.documents.replies import FloorReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.documents.settings import KnownSettings
 from fasaco_edge.wire.documents.status import FleetReport, Status
@@ -58,7 +59,7 @@ def state(
     if mission.last_order is not None:
         order = mission.last_order
     elif order is None and ordered is not None:
-        order = _order_of(view, ordered.mission)
+        order = order_of(view, ordered.mission)
     return found | {
         "state": status.state,
         "word": plain.WORDS.get(status.state, status.state),
@@ -75,8 +76,8 @@ def state(
         "grows": view.grows(now),
         "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
-        "mission": _mission(mission),
-        "again": _again(order),
+        "mission": _mission(view, status),
+        "again": again(order),
         "battery": battery and {"level": battery.level, "power": battery.power},
         "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
@@ -126,7 +127,8 @@ def _to_go_s(view: RobotState, status: Status) -> int | None:
     return None if not left_s or left_s > MOST_TO_GO_S else round(left_s)
 
 
-def _mission(mission: MissionReport) -> Digest:
+def _mission(view: RobotState, status: Status) -> Digest:
+    mission, rooms = status.mission, rooms_of(view)
     return {
         "ordered": mission.ordered,
         "stage": mission.stage,
@@ -141,7 +143,7 @@ def _mission(mission: MissionReport) -> Digest:
                 "name": zone.name,
                 "pass": zone.pass_number,
                 "passes": zone.passes,
-                "share": zone.covered / zone.cells if zone.cells else 0.0,
+                "share": _share(zone, rooms.get(zone.name), status),
             }
             for zone in mission.zones[:MOST_AREAS]
         ],
@@ -150,6 +152,17 @@ def _mission(mission: MissionReport) -> Digest:
         "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
+
+
+def _share(zone: ZoneReport, room: RoomReport | None, status: Status) -> float | None:
+    """Return the share of a zone: of the room's floor, as on the map, else of all the order's floor
+    if it has no other zone, else of cells; None if the zone has none."""
+    if room is not None and room.swept is not None:
+        return room.swept
+    floor = status.floor
+    if len(status.mission.zones) == 1 and floor and floor.reachable_m2 and floor.left is not None:
+        return (floor.reached_m2 or 0.0) / floor.reachable_m2
+    return zone.covered / zone.cells if zone.cells else None
 
 
 def _part(mission: MissionReport) -> str:
@@ -168,54 +181,6 @@ def _comes_more(mission: MissionReport) -> bool:
     is_last_pass = (mission.pass_number or 1) >= mission.passes
     is_last_zone = mission.zone in (None, *(zone.name for zone in mission.zones[-1:]))
     return not (is_last_pass and is_last_zone)
-
-
-def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
-    """Return the order in a status, for an order commanded before this server began; else None.
-
-    A zone with the name of a room is that room. The status has the number of passes, not their
-    kinds.
-    """
-    if mission.ordered != "command":
-        return None
-    configured = {zone.name for zone in view.settings.mission.zones}
-    rooms = {room.title: room for room in view.rooms.rooms if room.title not in configured}
-    zones: list[Digest] = []
-    for zone in mission.zones:
-        found: Digest = {"name": zone.name, "passes": zone.passes}
-        if room := rooms.get(zone.name):
-            found["room"], usual = room.id, room.passes or 1
-            if zone.passes == (usual if isinstance(usual, int) else len(usual)):
-                del found["passes"]
-        elif zone.polygon:
-            found["polygon"] = zone.polygon
-        zones.append(found)
-    return {
-        "zones": zones,
-        "keep_out": [each.polygon for each in mission.keep_outs if each.by == "order"],
-        "return_home": mission.return_home,
-    }
-
-
-def _again(order: dict[str, Any] | None) -> Digest | None:
-    """Return the last order by command, which the user can repeat once it is over; else None.
-
-    It is sent from the order's beginning on: the page keeps it if this server restarts before the
-    end. It is empty if it equals the order of the Start button.
-    """
-    if order is None:
-        return None
-    # A room is repeated by its number only, as its outline may have changed since.
-    given = order.get("zones")
-    zones = [
-        {name: value for name, value in zone.items() if name != "polygon" or "room" not in zone}
-        for zone in (given if isinstance(given, list) else ())
-        if isinstance(zone, dict)
-    ]
-    is_usual = order.get("passes") in (None, 1) and not (
-        zones or order.get("keep_out") or order.get("return_home")
-    )
-    return {} if is_usual else order | {"zones": zones, "keep_covered": False}
 
 
 def _faults(status: Status) -> Iterator[str]:

@@ -112,6 +112,12 @@ def test_floor_left_is_listed_once_with_its_marks():
     canceled = status(floor=floor | {"left": []}, mission=mission | {"ordered": None})
     assert told_left(canceled, underway)[0] == (3.9, plain.ENDED, plain.REST, [])
     assert told_left(canceled) == []
+    # Of one that was cancelled before the page's server began, the map shows where.
+    cancelled = mission | {"ordered": None, "last_order": {}, "unreached": {"areas": []}}
+    assert told_left(status(floor=floor | {"left": []}, mission=cancelled)) == [
+        (None, plain.ENDED, plain.REST, []),
+        (1.5, "no way in: a closed door, or something in the way", 2, []),
+    ]
     forgotten = status(floor={"swept_m2": 0.0}, mission=mission | {"ordered": None})
     assert told_left(forgotten, underway) == []
 
@@ -141,4 +147,4 @@ def test_a_robot_without_a_map_is_shown_so():
 def told_left(of: Status, ordered: Status | None = None) -> list[tuple[object, ...]]:
     """Return the parts of the floor that are left."""
     parts = plain.left(of, ordered)
-    return [(round(part.m2, 3), part.reason, part.marks, part.places) for part in parts]
+    return [(part.m2 and round(part.m2, 3), part.reason, part.marks, part.places) for part in parts]
