@@ -15,6 +15,7 @@ from fasaco_edge.judge.floor import (
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.path import CoveragePath
+from fasaco_edge.text import duration
 
 
 def judged_floor(
@@ -72,11 +73,17 @@ def floor_words(floor: FloorFigures) -> str:
     if floor.seconds_per_m2 is not None:
         words += f", {floor.seconds_per_m2:.1f} s/m2"
     if floor.gap is not None:
-        words += f", at most {100 * floor.gap:.0f} % above the shortest possible time"
+        words += f", {gap_words(floor.seconds, floor.gap)}"
     if floor.illegal_share:
         share = f"{floor.illegal_share:.1%}"
         words += f"; {share} of the line is too close to obstacles or unknown floor"
     return words
+
+
+def gap_words(seconds: float, gap: float) -> str:
+    """Return as text how far a line's time [s] is above its lower bound, by ``gap`` as a share."""
+    least = duration(seconds / (1.0 + gap))
+    return f"{100 * gap:.0f} % above {least}, the time to sweep as much without turns or overlap"
 
 
 def patches_left(floor: FloorFigures) -> str:

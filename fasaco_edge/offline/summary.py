@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fasaco_edge.judge.floor import FloorFigures
-from fasaco_edge.offline.figures import above_bound, patches_left
+from fasaco_edge.offline.figures import above_bound, gap_words, patches_left
 from fasaco_edge.offline.settings import CELLS
 from fasaco_edge.text import percent
 
@@ -25,8 +25,7 @@ def rows_of(plan: Plan) -> Rows:
     if floor is not None:
         rows.append(("swept", _swept(floor)))
     if drive.gap is not None:
-        above = f"line: at most {100 * drive.gap:.1f} % above the shortest possible time"
-        rows.append(("gap", above))
+        rows.append(("gap", f"line: {gap_words(drive.seconds, drive.gap)}"))
     if plan.curve_words:
         rows.append(("curve", plan.curve_words))
     if floor is not None and floor.illegal_share:
