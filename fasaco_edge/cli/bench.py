@@ -8,10 +8,12 @@ from contextlib import closing
 from typing import Any
 
 from rich import box
+from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from fasaco_edge.bench.benchmark import Benchmark, Report, Sample, machine
+from fasaco_edge.bench.benchmark import Benchmark, Report, ResultTable, Sample, machine
 from fasaco_edge.bench.daemon import DAEMON
 from fasaco_edge.bench.planners import PLANNERS
 from fasaco_edge.cli.console import terminal
@@ -21,6 +23,9 @@ from fasaco_edge.cli.console.streams import print_json
 from fasaco_edge.host.processes import peak_mb
 
 BENCHMARKS: tuple[Benchmark[Any], ...] = (PLANNERS, DAEMON)
+
+# More columns than any table has.
+MOST_COLUMNS = 10_000
 
 EPILOG = """\
 examples:
@@ -114,15 +119,7 @@ def _measure(
 def _print(report: Report, interrupted_in: str | None) -> None:
     console = terminal.out()
     for shown in report.tables:
-        table = _table(shown.title)
-        # Text keeps line breaks in a cell; the console escapes them in a plain string.
-        first, *others = map(Text, shown.header)
-        table.add_column(first, style="cyan", overflow="fold")
-        for column in others:
-            table.add_column(column, justify="right", overflow="fold")
-        for row in shown.rows:
-            table.add_row(*map(Text, row))
-        console.print(table)
+        _print_table(console, shown)
     if report.goals:
         console.print(_goals(report))
     for remark in report.remarks:
@@ -130,6 +127,31 @@ def _print(report: Report, interrupted_in: str | None) -> None:
     if interrupted_in is not None:
         text = f"interrupted in {interrupted_in}; these are the measurements made until then"
         console.print(Text(text, "yellow"))
+
+
+def _print_table(console: Console, shown: ResultTable) -> None:
+    """Print a table; on a terminal too narrow for it, each row as a paragraph."""
+    table = _table(shown.title)
+    # Text keeps line breaks in a cell; the console escapes them in a plain string.
+    first, *others = map(Text, shown.header)
+    table.add_column(first, style="cyan", overflow="fold")
+    for column in others:
+        table.add_column(column, justify="right", overflow="fold")
+    for row in shown.rows:
+        table.add_row(*map(Text, row))
+    # With less, words would be broken.
+    options = console.options.update(max_width=MOST_COLUMNS)
+    least = Measurement.get(console, options, table).minimum
+    if console.is_terminal and least > console.width:
+        console.print(Text(shown.title, "bold"))
+        for row in shown.rows:
+            figures = zip(shown.header[1:], row[1:], strict=True)
+            words = ", ".join(f"{name.replace(chr(10), ' ')} {value}" for name, value in figures)
+            console.print(Text.assemble((row[0], "cyan"), f": {words}"))
+        return
+    usual, console.width = console.width, max(console.width, least)
+    console.print(table)
+    console.width = usual
 
 
 def _goals(report: Report) -> Table:

@@ -3,8 +3,10 @@
 import argparse
 import json
 import signal
+from dataclasses import replace
 
 import pytest
+from rich.console import Console
 
 from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report
 from fasaco_edge.cli import bench, main
@@ -100,6 +102,20 @@ def test_table_shows_brackets_and_the_interruption(capsys):
     shown = capsys.readouterr().out
     for words in ("numbers [n]", "of [n]", "[0]", "missed", "interrupted"):
         assert words in shown
+
+
+def test_wide_tables_keep_words_whole(capsys, monkeypatch):
+    names = [f"figure{number}" for number in range(20)]
+    wide = Report("wide", ("map", *names), (("flat", *["0.125"] * 20),), {})
+    benchmark, _ = counting(1)
+    benchmark = replace(benchmark, report=lambda args, samples: wide)
+    for is_terminal in (False, True):
+        monkeypatch.setattr(Console, "is_terminal", is_terminal)
+        assert run(benchmark) == 0
+        shown = capsys.readouterr().out
+        assert all(name in shown for name in names)
+        assert shown.count("0.125") == 20
+        assert (max(map(len, shown.splitlines())) <= 80) is is_terminal
 
 
 @pytest.mark.parametrize(("samples", "code"), [(1, 1), (2, 0)])
