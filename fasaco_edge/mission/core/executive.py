@@ -18,12 +18,30 @@ STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))
 
 
 class Executive:
-    """Decides by ``RULES``; owns the mission's state.
+    """Decides by ``rules``; owns the mission's state.
 
     Attributes:
         mask_frame: the frame of the map that the keep-out mask belongs to; "" for any.
         troubles: current troubles; read-only.
     """
+
+    @property
+    def rules(self) -> tuple[Callable[[], Doing | None], ...]:
+        """The rules, in order; each returns the mission's activity, or None to let the next one
+        decide."""
+        return (
+            self._charge_in_time,
+            self._end_in_time,
+            self._give_way,
+            self._rest,
+            self._find_place,
+            self._run_errand,
+            self._wait_for_room,
+            self._judge_path,
+            self._plan,
+            self._end_order,
+            self._drive,
+        )
 
     def __init__(self, parts: MissionParts, mask_frame: str) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
@@ -65,7 +83,7 @@ class Executive:
         """Return the decision at ``now`` [s]: that of the first rule that returns an activity."""
         self._now, self._update = now, None
         self.way_out.forget_why()
-        doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
+        doing = next(doing for rule in self.rules if (doing := rule()) is not None)
         self._state, self._reason = doing.state, doing.reason
         self.troubles.update(self.doing, now)
         return Decision(plan=doing.plan, path=doing.path)
@@ -223,19 +241,3 @@ class Executive:
             state is State.COVERING and route.requests.pending is None and not route.requests.wanted
         )
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
-
-
-# The rules, in order. A rule returns the mission's activity, or None to let the next rule decide.
-RULES: tuple[Callable[[Executive], Doing | None], ...] = (
-    Executive._charge_in_time,
-    Executive._end_in_time,
-    Executive._give_way,
-    Executive._rest,
-    Executive._find_place,
-    Executive._run_errand,
-    Executive._wait_for_room,
-    Executive._judge_path,
-    Executive._plan,
-    Executive._end_order,
-    Executive._drive,
-)
