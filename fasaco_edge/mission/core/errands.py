@@ -27,7 +27,7 @@ class Errands:
     def __init__(self, parts: MissionParts) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
         self.route, self.charging, self.way_out = parts.route, parts.charging, parts.way_out
-        self.standing = parts.standing
+        self.standing, self.company = parts.standing, parts.company
 
     def consider_charging(self, state: State, now: float) -> None:
         """Begin to charge if due, and end charging if the battery suffices."""
@@ -77,7 +77,7 @@ class Errands:
 
     def way(self, area: ReachableArea, cell: Cell, goal: Cell) -> NDArray[np.int32]:
         """Return the shortest path, if possible around robots that stand in the way."""
-        around = self.orders.scope.passable(area, cell)
+        around = self.company.passable(area, cell)
         path = around.shortest_path(cell, goal) if around.contains(goal) else NO_CELLS
         return path if len(path) else area.shortest_path(cell, goal)
 

@@ -110,7 +110,7 @@ def laid_parts(
     room_cells = RoomCells(lasting.rooms, lattice_deg)
     room_price = RoomPrice(config.policy.by_room, room_cells)
     orders = Sequencer(config, map_state, ledger, company, room_price)
-    route = Route(config.spare_share, map_state, orders)
+    route = Route(config.spare_share, map_state, orders, company)
     line = LineLayer(sweeping, map_state, ledger, orders, route)
     trail = TrailLayer(config, map_state, route)
     motion = MapMotion(ledger, orders, trail, route)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.coverage.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.events import (
     BETTER,
@@ -50,7 +51,9 @@ class Route:
             such limit.
     """
 
-    def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
+    def __init__(
+        self, spare_share: float, map_state: MapState, orders: Sequencer, company: Company
+    ) -> None:
         self.requests = PlanRequests()
         self.path = PathProgress(NO_CELLS)
         # The part of a path kept for later: beyond a block, or the whole rest after a stop.
@@ -66,8 +69,7 @@ class Route:
         self.published_at = self.begun_at = 0.0
         self.is_way_out = False
         self.beside: NDArray[np.float64] | None = None
-        self._map = map_state
-        self._orders = orders
+        self._map, self._orders, self._company = map_state, orders, company
         self._spare = SpareTime(spare_share)
         self._checked_on: ReachableArea | None = None
 
@@ -241,7 +243,7 @@ class Route:
         """
         first = self._first_open(cells, area.lattice.window)
         to = int(cells[first, 0]), int(cells[first, 1])
-        lead = self._orders.scope.passable(area, here).shortest_path(here, to)
+        lead = self._company.passable(area, here).shortest_path(here, to)
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:

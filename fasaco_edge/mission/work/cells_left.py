@@ -134,7 +134,7 @@ class CellsLeft:
         """Return the cells of an area in which this robot has to sweep floor, covered or not."""
         window = area.lattice.window
         asked = self.asked_for(window)
-        mine = self._company.mine_to_sweep(asked, self.unswept(window), area)
+        mine = self._company.mine(asked, area, self.unswept(window))
         if self.keeps_passed:
             mine = mine | (self._ledger.passed.inside(window) & asked)
         return mine

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
-from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -70,7 +69,7 @@ class PlanScope:
         """
         area, state = self._map.area, self._state()
         assert area is not None
-        free = self.passable(area, cell)
+        free = self._company.passable(area, cell)
         lattice, reachable = free.lattice, free.reachable
         to_cover = self._cells.open_to_me(area)
         left = to_cover & reachable
@@ -104,10 +103,6 @@ class PlanScope:
     def walk_s(self, cells: NDArray[np.int32]) -> float:
         """Return the duration of a walk in the present pass [s]."""
         return self._cost().of_walk(cells)
-
-    def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
-        """Return the part of an area that a robot in ``cell`` can reach past other robots."""
-        return self._company.passable(area, cell, self._config.footprint.robot_radius_m)
 
     def puts_other_first(self, ahead_s: float) -> bool:
         """Choose again if time is too short at the pace of the path ahead, which takes ``ahead_s``.

@@ -128,7 +128,7 @@ class PresentPart:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
         exploration, zone = self._order.exploration, self._order.state.current_zone
         area = self._map.area
-        free = None if area is None else self.scope.passable(area, cell)
+        free = None if area is None else self._company.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
         of_others = self._company.viewpoints(self.cells.open_cells, cell)
