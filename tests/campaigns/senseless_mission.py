@@ -351,7 +351,7 @@ class MissionTrial:
             _hold(np.array_equal(now, anew), f"{name} over {geometry}")
         if fresh.floor is not None:
             for name in ("blocked", "places"):
-                now, anew = getattr(mission.map.floor, name), getattr(fresh.floor, name)
+                now, anew = getattr(mission.map.ground.floor, name), getattr(fresh.floor, name)
                 _hold(np.array_equal(now, anew), f"{name} over {geometry}")
             check_tally(mission)
         self.counts["lattices made afresh"] += 1

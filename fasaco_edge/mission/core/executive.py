@@ -131,7 +131,7 @@ class Executive:
             return docked
         if not order.errand and not order.is_open:
             return (State.DONE, self.orders.ending) if order.order else (State.IDLE, order.why)
-        if self.map.lattice is None:
+        if self.map.ground.lattice is None:
             return State.WAITING_FOR_MAP, self.map.why_no_map()
         if self.map.pose is None:
             return State.WAITING_FOR_POSE, self.map.why_no_pose()

@@ -273,7 +273,7 @@ class Mission:
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""
-        if (lattice := self.map.lattice) is None:
+        if (lattice := self.map.ground.lattice) is None:
             return None
         return self.map.coverage(self.covered, self.orders.reach.known(lattice))
 
@@ -321,7 +321,7 @@ class Mission:
     @property
     def lattice(self) -> CoverageLattice | None:
         """The lattice over the newest map, in its own frame; None before there is a map."""
-        return self.map.lattice
+        return self.map.ground.lattice
 
     @property
     def ledger(self) -> CoverageLedger:

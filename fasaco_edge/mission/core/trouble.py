@@ -121,7 +121,7 @@ class Troubles:
 
     def no_map(self, _: State, now: float) -> str:
         """Return why there is no current map."""
-        if self.map.lattice is None:
+        if self.map.ground.lattice is None:
             return self.map.why_no_map() if self.monitor.map_silent_s(now) > REST_S else ""
         if not self.monitor.is_map_stale(now):
             return ""

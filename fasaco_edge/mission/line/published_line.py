@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fasaco_edge.mission.events import PathUpdate
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED, Points
+from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 
 # A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, as the robot
@@ -147,8 +148,7 @@ class Publication:
         # The newest path that waits; the newest reason for a change of the line alone.
         self._waiting: PathUpdate | None = None
         self._why = ""
-        # Where the robot was last seen to move, x, y [m], and until when [s].
-        self._at, self._moved_at = (math.inf, math.inf), -math.inf
+        self._stay = Stay(STANDING_M)
 
     def compare(self, ahead: LineAhead) -> int:
         """Compare the line with the published one; return how many of its points are held."""
@@ -177,7 +177,7 @@ class Publication:
             is_way: whether the path is only a way: then nothing waits.
         """
         route, waiting = self._route, self._waiting
-        stands = self._stands(ahead, now)
+        stands = not self._stay.moves(ahead.here, now) and now - self._stay.since > STANDING_S
         if update is None and not len(route.path.cells):
             self._waiting = None
             return None
@@ -206,13 +206,6 @@ class Publication:
         polished = ahead.line.first_below(POLISHED)
         self._line.record_published(ahead.next_xy(len(ahead.line) + 1), polished)
         return replace(update, xy=ahead.xy())
-
-    def _stands(self, ahead: LineAhead, now: float) -> bool:
-        """Note the robot's place; return whether it stands."""
-        here = ahead.here
-        if math.dist(here, self._at) > STANDING_M:
-            self._at, self._moved_at = here, now
-        return now - self._moved_at > STANDING_S
 
     def _is_settled(self, ahead: LineAhead) -> bool:
         """Whether neither a plan nor polish is under way that changes the next metres."""

@@ -159,8 +159,8 @@ class Route:
         """
         self.requests.discard_pending()
         self.requests.want("map and pose moved")
-        assert self._map.lattice is not None
-        cells = moved_cells(before, motion, self._map.lattice.cell_m)
+        assert self._map.ground.lattice is not None
+        cells = moved_cells(before, motion, self._map.ground.lattice.cell_m)
         cell, area, was_driving = self._map.robot_cell(), self._map.area, len(self.path.cells) > 0
         drivable = 0
         if cell is not None and area is not None and was_driving:

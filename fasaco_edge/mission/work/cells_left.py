@@ -61,7 +61,7 @@ class CellsLeft:
     def is_exploring(self) -> bool:
         """Whether a reachable cell is undecided: the map does not show if the robot fits there."""
         area = self._map.area
-        decided = None if area is None else self._map.is_decided(area.lattice.window)
+        decided = None if area is None else self._map.ground.is_decided(area.lattice.window)
         if area is None or decided is None:
             return False
         return bool((area.reachable & ~decided).any())

@@ -81,7 +81,7 @@ class Sequencer:
 
     def goal(self, errand: Errand = "home") -> Cell | None:
         """Return the destination cell (row, col) of an errand; None for none."""
-        places, lattice = self._map.places, self._map.lattice
+        places, lattice = self._map.places, self._map.ground.lattice
         place = places.place(errand)
         if place is None or lattice is None:
             is_elsewhere = errand == "charge" and places.why_no_dock
@@ -260,7 +260,7 @@ class Sequencer:
         state = self._order.state = replace(self._order.state, stage=Stage.OVER)
         late = f"{state.late}: " if state.late else ""
         self.ending = late + self.uncovered.outcome() + self._sum_up()
-        area, free = self._map.area, self._map.free
+        area, free = self._map.area, self._map.ground.free
         if order is not None and area is not None and free is not None:
             self.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
         if order is not None and (rooms := left_out(order.zones)):
