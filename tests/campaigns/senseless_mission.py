@@ -265,7 +265,7 @@ class MissionTrial:
             self.counts["paths"] += 1
         if lattice is not None and self._turns % FRESH_EVERY == 0:
             geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
-            values = coverage_values(lattice.states, mission.ledger.visits(lattice.window))
+            values = coverage_values(lattice.states, mission.covered.current.visits(lattice.window))
             covered = OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns)
             self._say("coverage", lambda: encode_occupancy_grid(covered))
             self._say("floor", lambda: self._floor(grid))

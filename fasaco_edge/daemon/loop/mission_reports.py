@@ -52,7 +52,7 @@ def map_report(mission: Mission | None) -> MapReport | None:
         rows=geometry.rows,
         cols=geometry.cols,
         resolution_m=geometry.resolution,
-        revision=mission.map_revision,
+        revision=mission.map.map_revision,
         stamp_ns=mission.grid.stamp_ns,
         frame=mission.grid.frame,
         lattice_deg=round(mission.rotation.deg, 3),
@@ -177,7 +177,7 @@ def mission_report(
 ) -> MissionReport:
     """Return the order and its progress; ``standing``: keep-out zones in force for all orders."""
     order, zone = order_state.order, order_state.current_zone
-    home = mission.home if mission else order_state.home
+    home = mission.orders.goal() if mission else order_state.home
     keep_outs = tuple(_keep_outs(order_state))
     return MissionReport(
         ordered=None if order is None else ("itself" if order_state.automatic else "command"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.errands import Errands
@@ -53,7 +54,8 @@ class Executive:
         self._work = OrderWork(parts, self._errands)
         self.troubles = Troubles(parts)
         self._state, self._reason = State.WAITING_FOR_MAP, "no map yet"
-        # State of this step: the time [s], the robot's cell once known, the path made so far.
+        # State of this step: the time [s], the robot's cell once known, and the path made so far,
+        # which is published unless a rule returns another one.
         self._now = 0.0
         self._cell: Cell = 0, 0
         self._update: PathUpdate | None = None
@@ -86,11 +88,18 @@ class Executive:
         doing = next(doing for rule in self.rules if (doing := rule()) is not None)
         self._state, self._reason = doing.state, doing.reason
         self.troubles.update(self.doing, now)
-        return Decision(plan=doing.plan, path=doing.path)
+        return Decision(plan=doing.plan, path=doing.path or self._update)
 
     def _charge_in_time(self) -> None:
-        """Begin or end an errand of charging, by the battery."""
-        self._errands.consider_charging(self._state, self._now)
+        """Begin to charge if due, and end charging if the battery suffices."""
+        orders, charging, now = self.orders, self.charging, self._now
+        charging.update(now)
+        errand, docked = orders.order_state.errand, self._state is State.CHARGING
+        if errand == "charge" and charging.is_enough(now, docked=docked):
+            orders.set_state(replace(orders.order_state, errand=""))
+        elif not errand and charging.is_due(now):
+            charging.begin_errand()
+            orders.set_state(replace(orders.order_state, errand="charge"))
 
     def _end_in_time(self) -> None:
         """End the order if the robot has to turn home to be there in time."""
@@ -119,7 +128,7 @@ class Executive:
             return None
         if resting[0] in STOPPED:
             self._standing.reset()
-        return Doing(*resting, self._update)
+        return Doing(*resting)
 
     def _why_rest(self) -> tuple[State, str] | None:
         """Return state and reason of a robot that has to rest; else None."""
@@ -167,7 +176,7 @@ class Executive:
         route, cell = self.route, self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
-            return self.way_out.lead_out(self.map.why_misplaced(), None, self._now)
+            return self.way_out.lead_out(self.map.why_misplaced(), self._now)
         self._cell = cell
         self._standing.update(cell, self._now)
         if not len(route.path.cells):
@@ -178,14 +187,14 @@ class Executive:
     def _run_errand(self) -> Doing | None:
         """Drive home or to the dock; rest on arrival, and resume the path afterwards."""
         if self.orders.order_state.errand:
-            return self._errands.run(self._cell, self._update, self._now) or self._rest()
+            return self._errands.run(self._cell, self._now) or self._rest()
         self._update = self.route.take_up("goes on", self._now) or self._update
         return None
 
     def _wait_for_room(self) -> Doing | None:
         """Wait for a room that the order names, after all its other zones."""
         name = self.orders.order_state.waits_for
-        return self._work.wait_for_room(name, self._update, self._now) if name else None
+        return self._work.wait_for_room(name, self._now) if name else None
 
     def _judge_path(self) -> None:
         """Want a plan if the path no longer serves the order."""
@@ -207,11 +216,11 @@ class Executive:
         if not route.requests.wanted or route.requests.pending is not None:
             return None
         if why := route.requests.why_not_yet(self._now):
-            return Doing(State.BLOCKED, why, self._update)
+            return Doing(State.BLOCKED, why)
         # Wait a moment after the robot was stopped.
         if state is State.BLOCKED and not self._standing.has_waited:
-            return Doing(state, self._reason, self._update)
-        return self._work.plan(self._cell, self._update, state, self._now)
+            return Doing(state, self._reason)
+        return self._work.plan(self._cell, state, self._now)
 
     def _end_order(self) -> Doing | None:
         """Stop if the order is over, or if its last cells wait for a retry."""
@@ -220,7 +229,7 @@ class Executive:
             orders.advance(self._now)
         waits = orders.is_waiting and route.path.finished and route.requests.pending is None
         if waits or orders.order_state.stage is Stage.OVER:
-            return self._work.settle(self._update, self._now)
+            return self._work.settle(self._now)
         return None
 
     def _drive(self) -> Doing:

@@ -20,7 +20,7 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
-from fasaco_edge.mission.events import Doing, PathUpdate, State
+from fasaco_edge.mission.events import Doing, State
 from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius, is_clear_between
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.stay import Stay
@@ -77,9 +77,7 @@ class WayOut:
         """Forget the track: the robot was carried, or drove it on another map."""
         self._track.clear()
 
-    def lead_out(
-        self, why: str, update: PathUpdate | None, now: float, goal: Cell | None = None
-    ) -> Doing:
+    def lead_out(self, why: str, now: float, goal: Cell | None = None) -> Doing:
         """Lead the robot back along its track, to a place where it can continue, or to a goal.
 
         A robot in a keep-out zone stays, as a person has drawn the zone. To be called in each step
@@ -87,21 +85,19 @@ class WayOut:
 
         Args:
             why: what shuts it in.
-            update: the path that this step has made so far; returned if there is no new one.
             now: time [s].
             goal: destination; None for the nearest work.
         """
         if self._map.is_kept_out:
-            return Doing(State.BLOCKED, why, update)
+            return Doing(State.BLOCKED, why)
 
         def leads_on(area: ReachableArea) -> bool:
             return area.contains(goal) if goal else not self._orders.is_shut_in(area)
 
-        way = self._lead(leads_on, why, now)
+        way, update = self._lead(leads_on, why, now), None
         back = f"{why}: drives back along its track"
         if way is not None:
-            reason = back if len(way) else why
-            update = self._route.publish_way_out(way, reason, now) or update
+            update = self._route.publish_way_out(way, back if len(way) else why, now)
         if self._route.is_way_out:
             return Doing(State.COVERING, back, update)
         return Doing(State.BLOCKED, why, update)

@@ -125,16 +125,10 @@ class Attempt:
         if path.index > self.joint:
             return None
         ahead = better[path.index - self.index :]
-        share = NEW_WALK_SHARE if self.problem.is_full else LEAST_SHARE
-        return ahead if _is_worth_it(self.problem, path.ahead, ahead, share) else None
-
-
-def _is_worth_it(
-    problem: CoverageProblem, before: NDArray[np.int32], after: NDArray[np.int32], share: float
-) -> bool:
-    cost_us = problem.price_us(before)
-    least_us = max(LEAST_STEPS * problem.cost.step_us, share * cost_us)
-    return cost_us - problem.price_us(after) >= least_us
+        problem, share = self.problem, NEW_WALK_SHARE if self.problem.is_full else LEAST_SHARE
+        cost_us = problem.price_us(path.ahead)
+        least_us = max(LEAST_STEPS * problem.cost.step_us, share * cost_us)
+        return ahead if cost_us - problem.price_us(ahead) >= least_us else None
 
 
 class PlanRequests:

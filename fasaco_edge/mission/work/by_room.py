@@ -17,22 +17,11 @@ from fasaco_edge.planners.problem import CoverageProblem
 PRICE = 20.0
 
 
-class RoomPrice:
-    """Adds rooms, and the price of steps between them, to the problems of a mission.
-
-    Args:
-        by_room: whether rooms matter.
-        cells: the room of each cell.
-    """
-
-    def __init__(self, by_room: ByRoom, cells: RoomCells) -> None:
-        self._price, self.cells = 0.0 if by_room == "never" else PRICE, cells
-
-    def added_to(self, problem: CoverageProblem) -> CoverageProblem:
-        """Return a problem with the rooms of its cells, and the price of steps between them."""
-        rooms = self.cells.on(problem.lattice) if self._price else None
-        if rooms is None:
-            return problem
-        cost = problem.cost
-        room_s = self._price * (cost.step_s + cost.quarter_turn_s)
-        return replace(problem, cost=replace(cost, room_s=room_s), rooms=rooms)
+def with_rooms(problem: CoverageProblem, cells: RoomCells, by_room: ByRoom) -> CoverageProblem:
+    """Return a problem with the rooms of its cells, and the price of steps between them."""
+    rooms = None if by_room == "never" else cells.on(problem.lattice)
+    if rooms is None:
+        return problem
+    cost = problem.cost
+    room_s = PRICE * (cost.step_s + cost.quarter_turn_s)
+    return replace(problem, cost=replace(cost, room_s=room_s), rooms=rooms)

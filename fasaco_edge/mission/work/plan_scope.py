@@ -13,7 +13,8 @@ from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.rooms.room_cells import RoomCells
+from fasaco_edge.mission.work.by_room import with_rooms
 from fasaco_edge.mission.work.cells_left import CellsLeft, visits_due
 from fasaco_edge.mission.work.order_state import OrderState
 from fasaco_edge.mission.work.room_in_turn import RoomInTurn
@@ -35,17 +36,17 @@ class PlanScope:
         map_state: MapState,
         cells: CellsLeft,
         company: Company,
-        room_price: RoomPrice,
+        room_cells: RoomCells,
         state: Callable[[], OrderState],
     ) -> None:
         self._config, self._map, self._cells = config, map_state, cells
-        self._company, self._room_price, self._state = company, room_price, state
+        self._company, self._room_cells, self._state = company, room_cells, state
         self.worth = WorthFirst(
             *(config.footprint.cell_m, config.cost.step_s),
             lambda: state().current_zone,
             lambda: map_state.grid.frame if map_state.grid is not None else "",
         )
-        self._room = RoomInTurn(room_price.cells, self._takes_rooms_in_turn)
+        self._room = RoomInTurn(room_cells, self._takes_rooms_in_turn)
 
     def _takes_rooms_in_turn(self) -> bool:
         zone = self._state().current_zone
@@ -91,7 +92,7 @@ class PlanScope:
             # An attempt may start in a cell that is not in the robot's area.
             reachable=reachable if area.contains(cell) else None,
         )
-        return self._room_price.added_to(problem)
+        return with_rooms(problem, self._room_cells, self._config.policy.by_room)
 
     def _cost(self) -> CoverageCost:
         """Return the cost of paths in the present pass, by its lanes and its speed."""
@@ -164,23 +165,14 @@ class PlanScope:
     @property
     def is_part(self) -> bool:
         """Whether other cells are left than those planned now."""
-        if not self._has_first:
-            return False
         first, left = self._counts()
         return left > first
 
     @property
     def is_first_done(self) -> bool:
         """Whether the cells planned first are covered, and other cells are left."""
-        if not self._has_first:
-            return False
         first, left = self._counts()
         return left > 0 and not first
-
-    @property
-    def _has_first(self) -> bool:
-        """Whether a priority or a room puts some cells first."""
-        return self.worth.least > 0 or self._room.is_chosen
 
     def by_priority(self, ledger: MissionLedger) -> OrderState:
         """Return the order, its remaining zones sorted by priority if time does not allow all.

@@ -13,7 +13,7 @@ from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.work.cells_left import CellsLeft
 from fasaco_edge.mission.work.exploration import Exploration
 from fasaco_edge.mission.work.order_reach import OrderReach
@@ -46,7 +46,7 @@ class PresentPart:
         map_state: MapState,
         ledger: MissionLedger,
         company: Company,
-        room_price: RoomPrice,
+        room_cells: RoomCells,
         order: PresentOrder,
     ) -> None:
         self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
@@ -60,7 +60,7 @@ class PresentPart:
         self._has_new_lanes = False
         self.cells = CellsLeft(config, map_state, ledger, company, order)
         self.scope = PlanScope(
-            config, map_state, self.cells, company, room_price, lambda: order.state
+            config, map_state, self.cells, company, room_cells, lambda: order.state
         )
 
     def begin_order(self) -> None:

@@ -19,7 +19,7 @@ from fasaco_edge.mission.map.placing import left_out
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.mission.rooms.room_book import MOST_LISTED
-from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.work.cells_left import LeftBehind, zones_beyond
 from fasaco_edge.mission.work.order_reach import CellsOn
 from fasaco_edge.mission.work.order_state import AT_HOME, OrderState, Stage
@@ -48,11 +48,11 @@ class Sequencer:
         map_state: MapState,
         ledger: MissionLedger,
         company: Company,
-        room_price: RoomPrice,
+        room_cells: RoomCells,
     ) -> None:
         self._config, self._map, self._ledger = config, map_state, ledger
         self._order = order = PresentOrder()
-        self.part = part = PresentPart(config, map_state, ledger, company, room_price, order)
+        self.part = part = PresentPart(config, map_state, ledger, company, room_cells, order)
         self.cells, self.scope = part.cells, part.scope
         self.reach, self.uncovered = part.reach, part.uncovered
         # Whether floor opens while the robot is on its way home.
