@@ -10,7 +10,7 @@ from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.rooms.room_watch import RoomWatch, update
-from fasaco_edge.mission.work.by_room import with_rooms
+from fasaco_edge.mission.work.plan_scope import with_rooms
 from fasaco_edge.mission.work.progress import seconds_in
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem

@@ -12,7 +12,7 @@ from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.map.placing import left_out
 from fasaco_edge.mission.orders.order import order_document
-from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.wire.documents.replies import (
     CoverageReport,
     FloorLeft,
@@ -126,7 +126,7 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
         return FloorReport(swept_m2)
     # Before the first path no floor is planned; on the way home the line is set aside.
     order = mission.order_state
-    is_planned = mission.route.revision > 0 or mission.orders.is_over
+    is_planned = mission.route.revision > 0 or order.stage is Stage.OVER
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
     comes_later = (is_aside and order.is_open) or mission.orders.scope.is_part

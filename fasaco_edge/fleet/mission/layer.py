@@ -175,14 +175,7 @@ class FleetLayer(Company):
         self._shut = None, self._shut[1]
 
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
-        """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
-
-        Args:
-            open_cells: returns which cells of a window still need a visit, bool (rows, cols).
-            cell: this robot's cell.
-            now: time [s].
-            at_once: whether this robot is out of work.
-        """
+        """Divide the remaining area again if worthwhile, see ``Company.share``."""
         area = self._map.area
         if silent := self.others.forget_silent(now):
             return f"{silent} is silent: only the map shows whether it stands in the way"

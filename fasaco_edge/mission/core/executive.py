@@ -22,7 +22,6 @@ class Executive:
     """Decides by ``rules``; owns the mission's state.
 
     Attributes:
-        mask_frame: the frame of the map that the keep-out mask belongs to; "" for any.
         troubles: current troubles; read-only.
     """
 
@@ -44,11 +43,11 @@ class Executive:
             self._drive,
         )
 
-    def __init__(self, parts: MissionParts, mask_frame: str) -> None:
+    def __init__(self, parts: MissionParts) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
         self.route, self.company, self.charging = parts.route, parts.company, parts.charging
         self.time_limit, self.giving_way, self.dock = parts.time_limit, parts.giving_way, parts.dock
-        self.way_out, self.blocked, self.mask_frame = parts.way_out, parts.blocked, mask_frame
+        self.way_out, self.blocked = parts.way_out, parts.blocked
         self._standing, self._checks = parts.standing, PathChecks(parts)
         self._errands = Errands(parts)
         self._work = OrderWork(parts, self._errands)
@@ -151,11 +150,11 @@ class Executive:
         """Return why the keep-out zones of this map are missing; "" if they are known."""
         if why := self.map.places.why_no_keep_out:
             return why
-        grid = self.map.grid
-        if grid is None or self.mask_frame in ("", grid.frame):
+        grid, mask_frame = self.map.grid, self.map.places.mask_frame
+        if grid is None or mask_frame in ("", grid.frame):
             return ""
         return (
-            f"the keep-out mask is in frame {self.mask_frame!r}, the map in {grid.frame!r}: "
+            f"the keep-out mask is in frame {mask_frame!r}, the map in {grid.frame!r}: "
             f"waits for a mask in {grid.frame!r}"
         )
 

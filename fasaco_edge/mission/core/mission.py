@@ -36,7 +36,6 @@ from fasaco_edge.mission.events import (
     State,
 )
 from fasaco_edge.mission.map.placing import restored
-from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.rooms.room_book import RoomBook
 from fasaco_edge.mission.rooms.room_watch import RoomWatch
 from fasaco_edge.mission.work.idle_places import IdlePlaces
@@ -88,8 +87,7 @@ class Mission:
         self.giving_way, self.room_cells = parts.giving_way, parts.room_cells
         self._trail, self._changes = parts.trail, parts.changes
         self._handler = EventHandler(parts)
-        mask = mask_frame(self._config.policy.keep_out_mask)
-        self._executive = Executive(parts, mask)
+        self._executive = Executive(parts)
 
     def restore(
         self,

@@ -25,6 +25,7 @@ from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFlo
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.unswept import causes_of
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.work.order_state import Stage
 from fasaco_edge.mission.work.sequencer import Sequencer
 
 # The robot does not drive to a cell with less unswept floor than this [m2].
@@ -115,7 +116,7 @@ class UnsweptTally:
             return None
         self._explain()
         left_m2 = tally.left_m2
-        possible = self._possible_m2 if self._orders.is_over else None
+        possible = self._possible_m2 if self._orders.order_state.stage is Stage.OVER else None
         ahead_m2, passed_m2 = tally.open_m2 - left_m2, tally.passed_m2
         return FloorToSweep(
             tally.wanted_m2, ahead_m2, left_m2, passed_m2, tally.beyond_m2, possible

@@ -127,7 +127,7 @@ class LineLayer:
             or self._polisher is None
             or self._map.ground.floor is None
         ):
-            self._publication.reset()
+            self._publication.line.reset()
             return update
         touched, self._touched = self._touched, None
         self._unchecked = Window.around(self._unchecked, touched)
@@ -160,7 +160,9 @@ class LineLayer:
         held = self._publication.compare(ahead)
         may_change = (update is None or update.may_wait) and not reason and not is_further
         is_new = update is not None or touched is not None
-        may_change = may_change and not (is_new and (ahead.is_cut or not self._publication.is_near))
+        may_change = may_change and not (
+            is_new and (ahead.is_cut or not self._publication.line.is_near)
+        )
         # A way is not polished, as the robot sweeps nothing beside it.
         if may_change and is_driven and not self._is_way:
             held = max(held, ahead.line.first_below(CURVED)) if self._curver else held

@@ -137,6 +137,9 @@ STANDING_M, STANDING_S = 0.05, 3.0
 class Publication:
     """Keeps back paths that may wait.
 
+    Attributes:
+        line: the line as last published.
+
     Args:
         route: numbers the paths.
         speed_m_s: of the robot.
@@ -144,7 +147,7 @@ class Publication:
 
     def __init__(self, route: Route, speed_m_s: float) -> None:
         self._route = route
-        self._line = PublishedLine(speed_m_s)
+        self.line = PublishedLine(speed_m_s)
         # The newest path that waits; the newest reason for a change of the line alone.
         self._waiting: PathUpdate | None = None
         self._why = ""
@@ -152,17 +155,8 @@ class Publication:
 
     def compare(self, ahead: LineAhead) -> int:
         """Compare the line with the published one; return how many of its points are held."""
-        self._line.compare(ahead.next_xy(COMPARED_POINTS))
-        return self._line.held
-
-    @property
-    def is_near(self) -> bool:
-        """Whether the robot is near what has changed, as of the last comparison."""
-        return self._line.is_near
-
-    def reset(self) -> None:
-        """Forget the line: the robot has none, or another one."""
-        self._line.reset()
+        self.line.compare(ahead.next_xy(COMPARED_POINTS))
+        return self.line.held
 
     def finish(
         self, ahead: LineAhead, update: PathUpdate | None, reason: str, now: float, *, is_way: bool
@@ -186,7 +180,7 @@ class Publication:
                 route.keep_back()
                 plan = waiting.plan if waiting and update.plan is None else update.plan
                 waiting = self._waiting = replace(update, plan=plan)
-            is_due = self._line.is_due(
+            is_due = self.line.is_due(
                 now, self._is_settled(ahead), lambda xy: route.is_cut and ahead.leads_on(xy)
             )
             is_due = is_due or (stands and waiting is not None)
@@ -198,13 +192,13 @@ class Publication:
                 update = replace(waiting, revision=update.revision, cells=update.cells)
         self._waiting, self._why = None, ""
         if update.xy is not None:
-            self.reset()
+            self.line.reset()
             return update  # a way out, along no cells
         if not len(update.cells):
-            self.reset()
+            self.line.reset()
             return replace(update, xy=NONE)
         polished = ahead.line.first_below(POLISHED)
-        self._line.record_published(ahead.next_xy(len(ahead.line) + 1), polished)
+        self.line.record_published(ahead.next_xy(len(ahead.line) + 1), polished)
         return replace(update, xy=ahead.xy())
 
     def _is_settled(self, ahead: LineAhead) -> bool:

@@ -64,13 +64,10 @@ class SpareTime:
         self._vain = min(self._vain + 1, MOST_VAIN) if walk == self._walk else 0
         self._walk, self._last = walk, (seconds, now)
 
-    def rest(self, seconds: float, now: float) -> None:
-        """Make no attempt for ``seconds`` from ``now`` [s]: a plan failed."""
+    def rest(self, now: float, seconds: float = SKIPPED_S) -> None:
+        """Make no attempt for ``seconds`` from ``now`` [s]: there was nothing to improve, or a plan
+        failed."""
         self._resting_until = max(self._resting_until, now + seconds)
-
-    def skip(self, now: float) -> None:
-        """Note that there was nothing to improve at ``now`` [s]."""
-        self._resting_until = now + SKIPPED_S
 
 
 @dataclass(frozen=True, slots=True)

@@ -171,7 +171,7 @@ class Route:
         is_full = number % 2 == 1 and self._searched != self._walks
         attempt = Attempt.at(self.path, self._numberings, self._orders, number, is_full=is_full)
         if attempt is None:
-            self._spare.skip(now)
+            self._spare.rest(now)
             return None
         if is_full:
             self._searched = self._walks
@@ -179,7 +179,7 @@ class Route:
 
     def fail(self, event: PlanBroken, now: float) -> None:
         """Note that the pending plan failed: the same problem would fail again."""
-        self._spare.rest(BROKEN_S, now)
+        self._spare.rest(now, BROKEN_S)
         self.outdated += self.requests.close_failed(event, now)
 
     def accept(self, event: PlanReady, now: float) -> PathUpdate | None:

@@ -105,17 +105,7 @@ class PresentPart:
     def problem(
         self, cell: Cell, before: NDArray[np.int32], home: Cell | None, *, attempt: int = 0
     ) -> CoverageProblem:
-        """Return the planning problem of the cells that are open now.
-
-        Args:
-            cell: the robot's cell.
-            before: int32 (n, 2), the current path from that cell on.
-            home: the cell (row, col) in which the order ends; None for none.
-            attempt: see ``CoverageProblem``.
-
-        Raises:
-            NothingToCover: no cell is open.
-        """
+        """Return the planning problem of the cells that are open now, see ``PlanScope.problem``."""
         area = self._map.area
         assert area is not None
         self._order.exploration.end_if_reached(self._order.state.current_zone, area)

@@ -35,6 +35,11 @@ class RoomInTurn:
         self._seen: NDArray[np.uint16] | None = None
         self._newest = 0
 
+    @property
+    def is_chosen(self) -> bool:
+        """Whether a room is planned alone."""
+        return self._room != NONE
+
     def begin_pass(self) -> None:
         """Forget the room, and which rooms were tried in vain: the robot may be anywhere now."""
         self._room, self._newest = NONE, 0

@@ -94,11 +94,6 @@ class Sequencer:
         """Whether the robot waits for a retry."""
         return self._retry_at is not None
 
-    @property
-    def is_over(self) -> bool:
-        """Whether the order is over."""
-        return self._order.state.stage is Stage.OVER
-
     def begin_order(self, state: OrderState) -> None:
         """Begin with another order, or with none."""
         self._order.state = replace(state, reached=None)
