@@ -45,7 +45,7 @@ class Executive:
 
     def __init__(self, parts: MissionParts) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
-        self.route, self.company, self.charging = parts.route, parts.company, parts.charging
+        self.route, self.charging = parts.route, parts.charging
         self.time_limit, self.giving_way, self.dock = parts.time_limit, parts.giving_way, parts.dock
         self.way_out, self.blocked = parts.way_out, parts.blocked
         self._standing, self._checks = parts.standing, PathChecks(parts)
@@ -199,12 +199,7 @@ class Executive:
         """Want a plan if the path no longer serves the order."""
         cell, now = self._cell, self._now
         if self._state in DRIVING:
-            self._checks.check_deviation(cell, now)
-        if self._state is State.COVERING and self.company.has_members:
-            self._checks.check_worth(now)
-        if self._state is State.COVERING:
-            self._checks.check_time(now)
-            self._checks.check_room(cell)
+            self._checks.check(cell, now, is_covering=self._state is State.COVERING)
         if reason := self.orders.begin_stage(cell, now):
             self.route.requests.want(reason)
         if reason := self._work.share(cell, now):
