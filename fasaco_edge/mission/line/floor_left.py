@@ -228,8 +228,7 @@ class UnsweptTally:
         if part is None or self._asked is None or self._asked[0] != floor.stands.lattice.window:
             return
         self._unexplained = None
-        whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-        for strip in strips(part.intersection(whole) or NOWHERE):
+        for strip in strips(part.intersection(floor.geometry.window) or NOWHERE):
             free = self._map.ground.free_floor or floor
             tally.set_causes(strip, causes_of(floor, free, self._asked[2], strip))
 
@@ -239,7 +238,7 @@ class UnsweptTally:
         assert tally is not None
         assert floor is not None
         swept = self._ledger.floor
-        whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+        whole = floor.geometry.window
         # A reset makes another object, and forgetting may change any pixel.
         known, since = self._swept
         news = swept.changed_since(since) if known is swept else ANYWHERE
@@ -276,7 +275,7 @@ class UnsweptTally:
         asked = self._orders.scope.worth.first(asked, window)
         before, self._asked = self._asked, (window, asked, reachable)
         if before is None:
-            return Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+            return floor.geometry.window
         changed = asked != carried(before[1], before[0], window)
         changed |= reachable != carried(before[2], before[0], window)
         return floor.pixels_of(changed) if changed.any() else None

@@ -88,8 +88,7 @@ class LineLayer:
         elif self._ahead.follow_floor(floor):
             self._is_dropped = True
         if self.left.follow(floor, self._ahead.tally):
-            whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-            self._touched = self._unchecked = whole
+            self._touched = self._unchecked = floor.geometry.window
             return
         assert floor.shift is not None
         touched, self._unchecked = (
