@@ -22,7 +22,7 @@ class FasacoError(Exception):
         self.advise(self.hint if hint is None else hint)
 
     def advise(self, hint: str) -> None:
-        """Set the hint; tracebacks show it, too, as a notebook has no command line that does."""
+        """Set the hint; tracebacks show it, too: in a notebook no command line prints it."""
         self.hint = hint
         self.__notes__ = [f"hint: {hint}"] if hint else []
 
@@ -62,18 +62,19 @@ class DocumentError(FasacoError):
     def within(self, key: str, kind: type[_Fault]) -> _Fault:
         """Return the fault of a document that has this one under ``key``, as an error ``kind``.
 
-        It keeps its kind if that is one of ``kind``, and else its hint if that is its own.
+        A fault that is a ``kind`` keeps its class; another one keeps its hint, unless that is the
+        hint of its class.
         """
         made: type[_Fault] = type(self) if isinstance(self, kind) else kind
         hint = None if self.hint == type(self).hint else self.hint
-        places = [joined(key, each) for each in (self.key, *self.others)]
+        places = [nested_key(key, each) for each in (self.key, *self.others)]
         return made(self.what, hint=hint, key=places[0], others=places[1:])
 
 
 _Fault = TypeVar("_Fault", bound=DocumentError)
 
 
-def joined(key: str, below: str) -> str:
+def nested_key(key: str, below: str) -> str:
     """Return the key of ``below``, a key or an index in brackets, in the object at ``key``."""
     return f"{key}{'.' if key and below and below[0] != '[' else ''}{below}"
 
@@ -166,7 +167,7 @@ class MapFileError(DocumentError):
 
 
 class PatchWithoutBase(FasacoError):
-    """A map update came before any map, or does not fit the one there is."""
+    """A map update came before any map, or does not fit the present map."""
 
     code = "patch_without_base"
     hint = "publish the full map first, latched, and again when asked: updates refer to it"

@@ -71,7 +71,7 @@ class _Lane(msgspec.Struct, array_like=True):
     Attributes:
         numbers, at_ns, ahead_ns: for each sample its number, its time, and the wall clock minus
             its time; after the first sample, as differences from the previous sample.
-        attachments: of each sample; empty if all are empty.
+        attachments: attachments of each sample; empty if all are empty.
         against: number of the sample from which the first payload's difference is taken.
         checksum: CRC-32 of all payloads in order.
         sparse, body: the residual.

@@ -36,10 +36,10 @@ LASTING = ("run", "simulate", "follow", "serve", "watch")
 BEGUN = {"run": "(planning|covering|paused): ", "simulate": ""}
 # What makes a command quicker, or keeps it apart from other tests.
 BESIDE = {
-    "bench": "--maps office --seeds 1 --ants 64 --budget 0.05",
+    "bench": "--maps office --seeds 1 --ants 64 --budget 0.5",
     "follow": "--speed 8",
     "init": "--listen 0.2",
-    "plan": "--budget 0.05",
+    "plan": "--budget 0.5",
     "run": "--state state",
     "serve": "--listen 127.0.0.1:8465",
     "simulate": "--speed 8",

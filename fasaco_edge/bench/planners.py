@@ -144,7 +144,7 @@ def _known(colony: ColonyConfig) -> Generator[tuple[str, CoveragePlanner], None,
     from fasaco_edge.planners.registry import planner_of  # noqa: PLC0415
 
     for name, entry in REGISTRY.items():
-        # The planner of missions uses the missions' threshold of equation (4).
+        # The planner of missions takes q0 from the configuration of missions.
         q0 = PlannerConfig().q0 if entry.has_local_search else colony.q0
         yield name, planner_of(name, replace(colony, q0=q0))
 

@@ -223,7 +223,7 @@ class MapSource:
         self._poses.put(encode_pose_stamped(pose))
 
     def put_map(self, grid: OccupancyGrid) -> float:
-        """Publish a map; return the time of that [s, monotonic]."""
+        """Publish a map; return when that was [s, monotonic]."""
         payload = encode_occupancy_grid(grid)
         at = time.monotonic()
         self._maps.put(payload)

@@ -12,15 +12,15 @@ if TYPE_CHECKING:
 class Sample:
     """A message from the bus.
 
-    Payload and attachment stay in Zenoh's buffers until they are read: a message that is replaced
-    by a newer one before that is never copied.
+    Payload and attachment stay in Zenoh's buffers until they are read: a message that a newer one
+    replaces first is never copied.
 
     Attributes:
         key: its key.
         schema: message type in its encoding; "" without a type.
         size: size of payload and attachment together [bytes].
-        sender: id of the session that published it, as stated in the sample; "" if unknown. If that
-            session sets no timestamps, it may be the id of the first router on the way, or of this
+        sender: id of the session that published it, as stated in the sample; "" if unknown. If the
+            session sets no timestamps, the sender may be the first router on the way, or this
             session.
     """
 

@@ -2,9 +2,9 @@
 
 Each process shows a liveliness token that ends with ``<its Zenoh id>/<its state>``: waits, yields,
 or a word for the active process. A process that finds another one active waits until that one is
-gone. The process with the smallest id is the next to become active, and the one of two active
-processes that continues after a network partition: so all agree, whatever their clocks show. Below,
-the active process is the daemon that "plans".
+gone. Of the processes that wait, the one with the smallest id becomes active next; of two that are
+active after a network partition, the one with the smaller id continues. So all agree, whatever
+their clocks show. Below, the active process is the daemon that "plans".
 """
 
 from __future__ import annotations

@@ -2,9 +2,8 @@
 
 Samples arrive as they are published, and as replies to queries. A reply may overtake published
 samples: it has a higher priority, and samples are delivered by another thread. Samples that a reply
-has overtaken are dropped as older. If more than the newest sample of a publisher is used, samples
-wait until the replies are complete. After a lost sample they wait for the next reply, which may
-contain it.
+has overtaken are dropped as older. If ``depth`` is above 1, samples wait until the replies are
+complete. After a lost sample they wait for the next reply, which may contain it.
 
 The cache of each publisher is queried at most once a second, and not while a reply is pending. Up
 to MOST_PUBLISHERS of a key are queried.
@@ -31,7 +30,7 @@ _SEQUENCE_NUMBERS = 1 << 32
 
 @dataclass(slots=True)
 class AskedPublisher:
-    """A publisher that exists.
+    """A publisher whose cache is queried.
 
     Attributes:
         name: its name in its liveliness token.
@@ -139,9 +138,9 @@ class SampleOrder:
         self._last_mark = OrderedDict[str, int]()
         # When that sample was published, by the publisher's clock; 0 if unknown.
         self._stamps = OrderedDict[str, int]()
-        # The marks of publishers without a token. Only replies are dropped by these marks: samples
-        # of a publisher that has restarted with an earlier clock would be lost, as only a token
-        # shows the restart.
+        # The marks of publishers without a token. Only replies are dropped by them. Published
+        # samples are not, as a publisher may have restarted with an earlier clock: only a token
+        # shows it.
         self._unconfirmed = OrderedDict[str, int]()
         # Samples that wait for replies.
         self._held: list[tuple[str, int, zenoh.Sample]] = []

@@ -149,7 +149,7 @@ def show_mission(reply: QueryReply) -> None:
 def _rows(answer: replies.Reply) -> list[tuple[str, str]]:
     mission = answer.mission
     rows = [("robot", answer.robot), ("state", answer.state)]
-    # On its path a robot has no other reason than the path's number.
+    # While a robot follows its path, its reason is only the path's number.
     if not re.fullmatch(r"path \d+", answer.reason):
         rows.append(("reason", plain(answer.reason)))
     if mission.ordered is not None:

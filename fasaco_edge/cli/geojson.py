@@ -30,8 +30,8 @@ def read_order_file(path: Path) -> MissionOrder:
     """Return the order in a YAML, JSON or GeoJSON file.
 
     Raises:
-        OrderError: the file cannot be read, or the order is invalid: the first fault with the
-            others, each with file and line.
+        OrderError: the file cannot be read, or the order is invalid. It is the first fault, and
+            holds the others as ``rest``, each with file and line.
     """
     # JSON is not read as YAML 1.1, in which 1e3 is a text.
     parse = json.loads if path.suffix in (".json", SUFFIX) else None
@@ -126,7 +126,7 @@ class _Polygon(_Drawn, frozen=True):
 
 
 class _Properties(_Drawn, frozen=True):
-    """Members of a zone, checked as those of an order; and marks of other features."""
+    """Properties of a feature: a zone's members, which ``OrderDocument`` checks, and marks."""
 
     name: Any = None
     passes: Any = None
@@ -176,7 +176,7 @@ OF_ORDERS = _Collection.__struct_fields__[2:]
 
 
 def drawn_order(document: Members) -> tuple[OrderDocument, list[OrderError]]:
-    """Return the order in a collection of polygons, and all faults, with keys of the collection.
+    """Return the order in a collection of polygons, and all faults, at keys of the collection.
 
     A polygon is a zone, whose members are its properties; with ``"keep_out": true`` it is a
     keep-out. A feature with the number of a room orders that room, whatever its outline. With

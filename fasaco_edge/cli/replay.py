@@ -75,8 +75,8 @@ def run(args: argparse.Namespace) -> int:
     samples = RecordedSamples(args.recordings)
     recorded, robots_clock = read_run(samples), read_clock(args.recordings)
     config = load_config(args.config) if args.config else recorded.daemon_config()
-    is_as_it_was = args.config is None and args.work is None
-    record = read_turns(samples) if is_as_it_was else None
+    is_unchanged = args.config is None and args.work is None
+    record = read_turns(samples) if is_unchanged else None
     replay: Replay | CycleReplay
     if record is not None:
         replay = CycleReplay(config, record)

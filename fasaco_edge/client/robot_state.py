@@ -29,10 +29,11 @@ if TYPE_CHECKING:
 
     Points = Sequence[tuple[float, float]] | NDArray[np.float64]
 
-# Time without a status, which comes once a second, after which the daemon is silent [s].
+# The daemon is silent after this time without a status [s]; it publishes one a second.
 SILENCE_S = 3.5
-# A map is complete once it has not grown for this time [s], and for this share of the time in which
-# it grew: a robot that sweeps explored floor finds nothing new for minutes.
+# A map is complete once it has not grown for this time [s], and not for this share of the time in
+# which it grew. The share is for large maps: a robot that sweeps explored floor finds nothing new
+# for minutes.
 COMPLETE_S, COMPLETE_SHARE = 180.0, 0.5
 # Time without a pose on its own key after which the poses in the status are used [s].
 POSE_LASTS_S = 2.0
@@ -162,7 +163,7 @@ class RobotState:
             self.walk.revision,
             len(self.walk.xy) - 1,
         ):
-            self.walk.left(status.path.remaining_steps)
+            self.walk.note_remaining(status.path.remaining_steps)
         pose = status.pose
         if pose is not None and now - self._posed_at > POSE_LASTS_S:
             self._move(Pose2D(pose.x, pose.y, pose.yaw))
@@ -194,7 +195,7 @@ class RobotState:
     def _move(self, pose: Pose2D) -> None:
         if abs(pose.x) <= MAX_COORDINATE_M and abs(pose.y) <= MAX_COORDINATE_M:
             self.pose = pose
-            self.walk.passed(pose)
+            self.walk.note_position(pose)
 
 
 def _order_of(status: Status) -> tuple[object, ...]:
@@ -210,8 +211,8 @@ def _zones(order: object) -> list[dict[str, object]]:
 # Largest progress along the path from one pose to the next [m], as the path may pass the same place
 # again farther ahead.
 LOOK_AHEAD_M = 2.5
-# Largest distance of a robot that is on its path; largest difference of distances that count as
-# equal, so that the first place on the path is used [m].
+# Largest distance of a robot that is on its path [m]. If the path passes the robot several times at
+# distances that differ by less than EQUAL_M [m], the first place counts.
 NEAR_M, EQUAL_M = 0.5, 0.02
 
 
@@ -231,7 +232,7 @@ class WatchedPath:
         self.at = 0
         self.beyond_m = 0.0
 
-    def left(self, steps: int) -> None:
+    def note_remaining(self, steps: int) -> None:
         """Note the number of remaining steps, each from one point to the next."""
         at = len(self.xy) - 1 - max(steps, 0)
         if at > self.at:
@@ -242,7 +243,7 @@ class WatchedPath:
         if not self._find(pose, LOOK_AHEAD_M):
             self._find(pose, math.inf)
 
-    def passed(self, pose: Pose2D) -> None:
+    def note_position(self, pose: Pose2D) -> None:
         """Note the robot's position; progress only grows."""
         self._find(pose, LOOK_AHEAD_M)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 from msgspec import Meta
 
-from fasaco_edge.config.reading import refused
+from fasaco_edge.config.reading import faults_of
 from fasaco_edge.config.robot import RobotConfig
 from fasaco_edge.config.ros import RosConfig
 from fasaco_edge.config.security import BusConfig
@@ -95,7 +95,7 @@ class PlannerConfig(StrictDocument, frozen=True):
     align: Literal["walls", "axes"] | Annotated[float, Meta(ge=-45, le=45)] = "walls"
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(self.colony, others=["velocities"])
+        yield from faults_of(self.colony, others=["velocities"])
 
     def colony(self) -> ColonyConfig:
         """Return the configuration of the colony.
@@ -119,7 +119,7 @@ class PlannerConfig(StrictDocument, frozen=True):
 class MissionPolicyConfig(StrictDocument, MissionPolicy, frozen=True, kw_only=True):
     """The mission's policy, and the folder of its progress.
 
-    ``state_dir`` "" is the state folder of the service, else of the user.
+    If ``state_dir`` is "", the folder is the state folder of the service or, without one, the user.
     """
 
     state_dir: str = ""
@@ -134,7 +134,7 @@ class MissionPolicyConfig(StrictDocument, MissionPolicy, frozen=True, kw_only=Tr
                 text = f"must be left out beside mission.keep_out_topic, got {mask!r}"
                 yield BadConfiguration(text, key="keep_out_mask", others=["keep_out_topic"])
             return
-        yield from refused(lambda: mask_polygons(mask), key="keep_out_mask")
+        yield from faults_of(lambda: mask_polygons(mask), key="keep_out_mask")
 
     def state_folder(self, environ: Mapping[str, str] = os.environ) -> Path:
         """Return the folder of the coverage ledger.
@@ -251,7 +251,7 @@ class MetricsConfig(StrictDocument, frozen=True):
     open_to_everyone: bool = False
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(self.address, key="listen")
+        yield from faults_of(self.address, key="listen")
 
     def address(self) -> Address | None:
         """Return the address; None for none.
@@ -294,9 +294,9 @@ class DaemonConfig(StrictDocument, frozen=True):
     ros2: RosConfig | msgspec.UnsetType = msgspec.UNSET
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(lambda: Keys(robot=self.robot.name), key="robot.name")
+        yield from faults_of(lambda: Keys(robot=self.robot.name), key="robot.name")
         others = ("robot.tool_width_m", "robot.quarter_turn_s", "robot.turn_deg_s")
-        for error in refused(self.robot.cost):
+        for error in faults_of(self.robot.cost):
             yield BadConfiguration(error.said, key="robot.speed_m_s", others=others)
         if self.bus.security.roles.ros and not self.ros2:
             text = "without a block ros2 there is no such role"

@@ -9,7 +9,7 @@ import msgspec
 from msgspec import structs
 
 from fasaco_edge.config.config import DaemonConfig
-from fasaco_edge.config.reading import refused, with_credentials, without_removed
+from fasaco_edge.config.reading import faults_of, with_credentials, without_removed
 from fasaco_edge.errors import BadConfiguration, together
 from fasaco_edge.host.documents import inspected
 from fasaco_edge.host.plain_yaml import read_written
@@ -20,8 +20,8 @@ def load_config(path: Path | None) -> DaemonConfig:
     """Read a YAML file; without one return the defaults.
 
     Raises:
-        BadConfiguration: the file is missing, is no YAML, has unknown keys or
-            impossible values: the first of these faults with the others.
+        BadConfiguration: the file is missing, is no YAML, has unknown keys or impossible values. It
+            is the first fault, and holds the others as ``rest``.
     """
     config, faults = inspect_config(path)
     if config is None:
@@ -32,8 +32,8 @@ def load_config(path: Path | None) -> DaemonConfig:
 def with_mask(config: DaemonConfig, file: Path | None, most_bytes: int | None) -> DaemonConfig:
     """Return a configuration that contains its keep-out mask.
 
-    It names the mask relative to its own ``file``. ``most_bytes``: limit on the memory for reading
-    the mask [bytes]; None for no limit.
+    ``file``: the file of the configuration, which names the mask relative to its own place.
+    ``most_bytes``: limit on the memory for reading the mask [bytes]; None for no limit.
 
     Raises:
         BadConfiguration: the mask cannot be read, or takes more memory.
@@ -79,6 +79,6 @@ def inspect_config(
     document, removed = without_removed({} if text.values is None else text.values)
     config, faults = inspected(DaemonConfig, with_credentials(document), BadConfiguration)
     if config:
-        faults += [*removed, *refused(lambda: check(config))]
+        faults += [*removed, *faults_of(lambda: check(config))]
     faults = text.faults(faults)
     return None if faults else config, faults

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from fasaco_edge.errors import BadConfiguration, joined
+from fasaco_edge.errors import BadConfiguration, nested_key
 
 FOLDER = "CREDENTIALS_DIRECTORY"
 _DOCKING = (
@@ -34,7 +34,7 @@ REMOVED = {
 }
 
 
-def refused(
+def faults_of(
     check: Callable[[], object], *, key: str = "", others: Sequence[str] = ()
 ) -> Iterator[BadConfiguration]:
     """Yield the error that a check raises, with ``key`` as its key unless that is ""."""
@@ -52,7 +52,7 @@ def without_removed(document: object, key: str = "") -> tuple[Any, list[BadConfi
     if not isinstance(document, Mapping):
         return document, faults
     for name, value in document.items():
-        path = joined(key, str(name))
+        path = nested_key(key, str(name))
         if path in REMOVED:
             what, hint = REMOVED[path]
             if value not in (None, ""):

@@ -73,17 +73,15 @@ class RobotConfig(StrictDocument, frozen=True):
     acceleration of driving [m/s2], and the largest bend that is steered while driving [deg].
     ``overlap`` is the share of the tool's width by which cells overlap if a line is driven
     (``planner.line``); the line then leaves out floor swept already. Passes of an order may set
-    another one.
-    ``footprint`` replaces ``radius_m`` by the radius of the disc around it.
+    another overlap. ``footprint`` replaces ``radius_m`` by the radius of the disc around it.
     ``clearance_m`` is the distance that lines keep from walls and furniture in addition to the
     radius. A line keeps half of it, or none, where it would otherwise miss much floor.
     ``turn_radius_m`` is the radius of the tightest arc; 0 for a robot that turns on the spot. With
     a radius, lines become curves of lanes and of arcs a tenth wider; ``reverses`` is whether the
-    robot may drive them backward, too.
-    ``tool_ahead_m`` is the distance of the tool's centre ahead of the turning point, below 0 if
-    behind.
-    ``time_scale`` is the number of a simulated robot's seconds in a real second. Timeouts of the
-    daemon are real seconds; reports of a recording have the robot's seconds.
+    robot may drive them backward, too. ``tool_ahead_m`` is the distance of the tool's centre ahead
+    of the turning point, below 0 if behind. ``time_scale`` is the number of a simulated robot's
+    seconds in a real second. Timeouts of the daemon are real seconds; reports of a recording have
+    the robot's seconds.
     """
 
     name: str = "robot"

@@ -14,7 +14,7 @@ from msgspec import Meta, structs
 from fasaco_edge.bus import DEFAULT_ENDPOINT, access
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.config.endpoints import UNIX, endpoint_faults, from_here, is_local, protocol_of
-from fasaco_edge.config.reading import refused
+from fasaco_edge.config.reading import faults_of
 from fasaco_edge.errors import BadConfiguration, ClockBeforeCertificate, OpenToEveryone
 from fasaco_edge.host.documents import StrictDocument, inspected
 from fasaco_edge.host.plain_yaml import read_bounded, read_written
@@ -182,7 +182,7 @@ class BusConfig(StrictDocument, frozen=True):
     security: SecurityConfig = SecurityConfig()
 
     def faults(self) -> Iterator[BadConfiguration]:
-        yield from refused(lambda: Keys(base=self.base))
+        yield from faults_of(lambda: Keys(base=self.base))
         if not (self.listen or self.connect):
             text = "must not be empty if bus.connect is empty"
             yield BadConfiguration(text, key="listen", others=["connect"])

@@ -7,9 +7,9 @@ A daemon whose maps have at most P pixels, on a lattice of at most C cells, take
 and, if it plans lines over the floor, ``FLOOR_BYTES * P + STAND_BYTES * C`` more: its fine raster
 has no more pixels than a map may have (``grid.fine_raster``). This applies to any input at any rate
 and resolution. If ``MemoryMax=`` of the unit limits the memory, maps are limited so that the sum is
-at most 90 % of it, above which the system throttles the service (``afforded``). Without that limit,
-the configuration gives the largest map. One test checks the systemd units against these constants,
-another measures memory.
+at most 90 % of it, above which the system throttles the service (``limited_to_memory``). Without
+that limit, the configuration gives the largest map. One test checks the systemd units against these
+constants, another measures memory.
 
 A pixel is a byte, held in up to ten copies if updates are as large as the map:
 
@@ -42,8 +42,8 @@ takes 121 MB, 17 MB of them for the map, and 228 MB with pages of libraries, whi
 reclaim (``fasaco-edge bench daemon``). A path of 440,000 cells takes 127 MB more; maps of 25
 million pixels at 20 Hz take 75 MB more, 240 MB if an update of full size follows each, and another
 50 MB with a recorder. The base includes 42 MB of samples other than maps that wait for the loop,
-and the library pages in use. These are up to 16 MB more for a library that was just unpacked than
-for a copy of it, as the system maps it in larger blocks.
+and the library pages in use. A library that was just unpacked takes up to 16 MB more of them than a
+copy of it, as the system maps it in larger blocks.
 """
 
 from __future__ import annotations
@@ -141,10 +141,10 @@ def floor_pixels(max_pixels: int) -> int:
 def mask_bytes(config: DaemonConfig, limit: int | None) -> int:
     """Return the memory for reading a keep-out mask under a memory limit [bytes].
 
-    It is that of decoding a map and an update in a cycle, as none is decoded while the
+    A mask may take the memory for decoding a map and an update, as none is decoded while the
     configuration is reloaded. A small picture is always read.
     """
-    share = MASK_COPIES * afforded(config, limit).map.max_pixels
+    share = MASK_COPIES * limited_to_memory(config, limit).map.max_pixels
     return max(share - PILLOW_BYTES, LEAST_MASK_BYTES)
 
 
@@ -158,7 +158,7 @@ def limits_mib(config: DaemonConfig) -> tuple[int, int]:
     return high, most
 
 
-def afforded(config: DaemonConfig, limit: int | None) -> DaemonConfig:
+def limited_to_memory(config: DaemonConfig, limit: int | None) -> DaemonConfig:
     """Return the configuration with map and lattice sizes limited to fit ``limit`` [bytes].
 
     None is no limit. Both shrink by the same factor, but not below the size of a small flat.

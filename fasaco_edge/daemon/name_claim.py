@@ -21,7 +21,7 @@ class NameClaim(BusClaim):
         self._was_waiting = False
 
     def report(self) -> ClaimReport:
-        """Return this part of the status."""
+        """Return the claim's part of the status."""
         return ClaimReport(self._bus.id, str(self.state))
 
     @property

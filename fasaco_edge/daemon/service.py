@@ -24,7 +24,7 @@ from fasaco_edge.daemon.loop.loop import Loop, Ports
 from fasaco_edge.daemon.loop.outbox import Outbox
 from fasaco_edge.daemon.loop.turn_log import TurnLog
 from fasaco_edge.daemon.mask_topic import MaskTopic
-from fasaco_edge.daemon.memory import afforded, has_default_sizes, needed_bytes
+from fasaco_edge.daemon.memory import has_default_sizes, limited_to_memory, needed_bytes
 from fasaco_edge.daemon.name_claim import NameClaim
 from fasaco_edge.daemon.notify import ServiceManager, Watchdog
 from fasaco_edge.daemon.reload import Reload
@@ -50,7 +50,7 @@ LOG = logging.getLogger(__name__)
 # [s].
 RECORDER_STOP_S, RECORDER_LONGEST_S = 1.2, 6.0
 WORKER_STOP_S = 0.4
-# Timeout for the ledger's disk, which writes while the other processes end: in all, and least time
+# Timeout of the last write of the ledger, made while the other processes end [s]; least time for it
 # after they have ended [s].
 LEDGER_STOP_S, LEDGER_LEAST_S = 0.5, 0.2
 # Time after which a blocked process exits by itself [s]: SIGKILL, after the 10 s of
@@ -154,7 +154,7 @@ def _metrics_of(config: DaemonConfig) -> MetricsServer | None:
 def _afforded(config: DaemonConfig) -> DaemonConfig:
     """Return the configuration, with smaller maps if memory is limited; log that."""
     limit = memory_limit()
-    smaller = afforded(config, limit)
+    smaller = limited_to_memory(config, limit)
     if limit is not None and smaller is not config:
         # If the configuration gives no sizes, maps may be as large as the memory allows.
         LOG.log(

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from fasaco_edge.daemon.ledger.file import lock_file, why_no_lock
-from fasaco_edge.daemon.memory import afforded, has_default_sizes, limits_mib
+from fasaco_edge.daemon.memory import has_default_sizes, limited_to_memory, limits_mib
 from fasaco_edge.doctor.finding import CheckContext, Finding, Level, fail, ok, warn, worst
 from fasaco_edge.host.files import why_not_trusted
 from fasaco_edge.kernels.folder import outdated, wanted_folder
@@ -28,7 +28,7 @@ STA_UNSYNC = 0x40
 TIME_ERROR = 5
 # Memory that a daemon needs at most to plan a large building [MB].
 WANTED_MB = 350
-# A limit below this number of pixels is a warning: a map of 100 m x 100 m at 5 cm.
+# Least limit on pixels without a warning: those of a map of 100 m x 100 m at 5 cm.
 WANTED_PIXELS = 4_000_000
 PI_CMDLINES = ("boot/firmware/cmdline.txt", "boot/cmdline.txt")
 
@@ -101,7 +101,7 @@ def memory(context: CheckContext) -> Finding:
     if free_mb < WANTED_MB:
         to_do = "stop other programs, or plan with larger cells (robot.tool_width_m)"
         return warn(f"{found}; the daemon may need {WANTED_MB} MB", to_do, details)
-    smaller = afforded(context.config, limit).map
+    smaller = limited_to_memory(context.config, limit).map
     if limit and smaller is not context.config.map:
         high, most = limits_mib(context.config)
         found += f"; the unit's limit is {limit / 1e6:.0f} MB: maps of no more than "
@@ -162,12 +162,12 @@ def disk(context: CheckContext) -> Finding:
     """Check the free space where the daemon writes."""
     least_mb = LEAST_MB | {"recordings": float(context.config.recording.least_free_mb)}
     folders = _folders(context)
-    rooms = [_room(name, folder, least_mb[name]) for name, folder in folders.items()]
+    spaces = [_space(name, folder, least_mb[name]) for name, folder in folders.items()]
     lock = lock_file(folders["state"], context.config.robot.name)
     if why := why_no_lock(lock):
-        rooms.append(fail(f"no progress is written: {why}", f"remove {lock}"))
-    bad = worst(rooms)
-    details = tuple(room.found for room in rooms)
+        spaces.append(fail(f"no progress is written: {why}", f"remove {lock}"))
+    bad = worst(spaces)
+    details = tuple(space.found for space in spaces)
     if bad.level is Level.OK:
         return ok("there is space in each folder", details)
     return replace(bad, details=details)
@@ -182,19 +182,19 @@ def _folders(context: CheckContext) -> dict[str, Path]:
     return folders | ({"recordings": context.recordings} if context.recordings else {})
 
 
-def _room(name: str, folder: Path, least_mb: float) -> Finding:
+def _space(name: str, folder: Path, least_mb: float) -> Finding:
     try:
         there = folder
         while not there.exists():
             there = there.parent
-        room = os.statvfs(there)
+        system = os.statvfs(there)
     except OSError as error:
         return warn(f"{name}: {folder}: {error.strerror}", "run doctor as root")
-    free_mb = room.f_bavail * room.f_frsize / 1e6
+    free_mb = system.f_bavail * system.f_frsize / 1e6
     found = f"{name}: {folder}: {free_mb:,.0f} MB free"
-    if room.f_flag & os.ST_RDONLY:
+    if system.f_flag & os.ST_RDONLY:
         return fail(f"{found}, read-only", f"mount {there} for writing")
-    if room.f_files and not room.f_favail:
+    if system.f_files and not system.f_favail:
         return fail(f"{found}, but no file more", "delete files there")
     if free_mb < least_mb:
         to_do = f"free {least_mb:.0f} MB in {there}"

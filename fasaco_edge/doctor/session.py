@@ -118,7 +118,7 @@ def session(context: CheckContext) -> Finding:
 
 
 def lacking_inputs(status: Status) -> list[str]:
-    """Return the inputs that a daemon waits for; none while it loads: it looks at them later."""
+    """Return the inputs that a daemon waits for; none before it looks at inputs, while it loads."""
     if status.state == "loading":
         return []
     return [kind for kind in ("map", "pose") if getattr(status, kind) is None]

@@ -37,7 +37,7 @@ class Clock:
         return self._time + lead + max(since - SILENT_S, 0.0) * self._pace
 
     def take_stamp(self, stamp_ns: int, now: float) -> float:
-        """Take in the stamp of a pose that arrived at ``now``; return the robot's time of that."""
+        """Take in the stamp of a pose that arrived at ``now``; return the robot's time then."""
         if self._pace == 1.0:
             return now
         time = self.at(now)

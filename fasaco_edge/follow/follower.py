@@ -32,7 +32,7 @@ class Follower(Supervision):
     """Follows the newest path while all its inputs are up to date.
 
     Args:
-        limits: of the base.
+        limits: limits of the base.
         patience: timeouts of pose and status.
         moves: whether the base executes the commands; in a dry run it does not.
         sight: finds obstacles that the map does not show; None to use the map alone.
@@ -63,7 +63,7 @@ class Follower(Supervision):
     def step(self, now: float) -> VelocityCommand | None:
         """Return the command to send now, or None."""
         if self._stepped_at is not None:
-            self._pursuit.passed(now - self._stepped_at)
+            self._pursuit.note_time(now - self._stepped_at)
         self._stepped_at = now
         command = self._supervised(self._steer, now)
         if command is None:

@@ -25,7 +25,7 @@ MEAN_S = 1.0
 MOVED_M, MEANS = 0.1, 5
 # Noise adds to that distance: this many times the median step from one average to the next. Number
 # of last steps for the median, and least number. The few steps of a moved robot hardly change it.
-# Normal noise alone moves one average in 2^(4^2) that far.
+# Normally distributed noise moves only one average in 2^16 that far.
 SCATTERS, STEPS, LEAST_STEPS = 4.0, 30, 6
 
 # Position and turn, as lengths [m].
@@ -129,7 +129,7 @@ class Grip:
         if done.share() >= LEAST_SHARE:
             self._tries.moved_to(done.middle())
             return False
-        self._tries.failed(done.middle(), toward, now)
+        self._tries.note_failure(done.middle(), toward, now)
         return True
 
     def sent(self, command: VelocityCommand, seconds: float) -> None:

@@ -60,14 +60,14 @@ class Leg:
         """Whether the robot only steers at its end."""
         return self.most == math.inf
 
-    def placed(self, point: Point) -> tuple[float, float]:
+    def along_and_left(self, point: Point) -> tuple[float, float]:
         """Return a point's distance along the leg's line, and to its left [m]."""
         dx, dy = point[0] - self.start[0], point[1] - self.start[1]
         return dx * self.ux + dy * self.uy, self.ux * dy - self.uy * dx
 
     def distance(self, point: Point) -> float:
         """Return a point's distance from the leg [m]."""
-        along, aside = self.placed(point)
+        along, aside = self.along_and_left(point)
         beyond = max(-along, along - self.length, 0.0)
         return math.hypot(beyond, aside)
 
@@ -124,7 +124,7 @@ def rounding(turn: float, room: float, limits: BaseLimits) -> tuple[float, float
     Args:
         turn: angle of the corner, 0 or more [rad].
         room: distance before and after the corner that the turn may take [m].
-        limits: of the base.
+        limits: limits of the base.
 
     Returns:
         a speed of 0 if the robot has to turn on the spot, infinity if it only steers.

@@ -66,7 +66,7 @@ class SendPiece:
     """A request to begin a goal: to follow points [m] in a frame.
 
     Attributes:
-        id: of the goal.
+        id: id of the goal.
         end_yaw: heading at the last point [rad]; None to keep the heading of arrival.
         is_back: whether it is driven backward: headings are opposite to the motion.
     """
@@ -319,7 +319,7 @@ class Nav2Follower(Supervision):
     ) -> None:
         self._trouble_of_nav2 = (state, detail)
         if self._path is not None:
-            self._tries.failed(self._here, self._toward(self._path), now, for_good=for_good)
+            self._tries.note_failure(self._here, self._toward(self._path), now, for_good=for_good)
 
     def _toward(self, path: PathDriven) -> float:
         """Return the direction from the robot to the path's point LEADS_M ahead [rad]."""

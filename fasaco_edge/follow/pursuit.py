@@ -52,7 +52,7 @@ class Pursuit:
         self._seconds, self._late = period, 0.0
         self.last = STAND
 
-    def passed(self, seconds: float) -> None:
+    def note_time(self, seconds: float) -> None:
         """Note the time since the last command [s]."""
         self._seconds = min(max(seconds, self._period), MOST_PERIODS * self._period)
         self._late = max(self._seconds - self._period, FORGETTING * self._late)
@@ -80,7 +80,7 @@ class Pursuit:
         early_x, early_y = early * math.cos(pose.yaw), early * math.sin(pose.yaw)
         route.round_corner((pose.x + early_x, pose.y + early_y), self.last.speed)
         while (leg := route.leg) is not None:
-            along, _ = leg.placed(here)
+            along, _ = leg.along_and_left(here)
             ends = route.ends(along, limits.speed**2 / limits.acceleration + limits.speed)
             left, speed = ends[0]
             if speed > 0.0 or left > ARRIVED_M or self._braked() > 0.0:

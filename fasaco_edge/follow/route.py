@@ -82,7 +82,7 @@ class LegRoute:
 
     def pass_bends(self, here: Point) -> None:
         """Go on to the leg that ``here`` is on, past bends that are steered."""
-        while (leg := self.leg) and leg.bends and leg.placed(here)[0] >= leg.length:
+        while (leg := self.leg) and leg.bends and leg.along_and_left(here)[0] >= leg.length:
             self.next_leg()
 
     def round_corner(self, here: Point, speed: float) -> None:
@@ -93,7 +93,7 @@ class LegRoute:
         leg = self.leg
         if leg is None or leg.stops or leg.bends:
             return
-        late = leg.placed(here)[0] + leg.early_s * min(speed, leg.most) - leg.length
+        late = leg.along_and_left(here)[0] + leg.early_s * min(speed, leg.most) - leg.length
         if late > MISSED_M:
             self._legs[0] = replace(leg, most=0.0)
         elif late >= 0.0:
@@ -164,7 +164,7 @@ class LegRoute:
             return JoinOutcome.AT_REST
         if aside <= NEAREST_M:
             del self._legs[:index]
-            begin = leg.at(min(max(leg.placed(here)[0], 0.0), leg.length))
+            begin = leg.at(min(max(leg.along_and_left(here)[0], 0.0), leg.length))
             rest_m = math.dist(begin, leg.end)
             rest = [replace(leg, start=begin, length=rest_m)] if rest_m >= LEAST_LEG_M else []
             self._legs[:1] = rest
@@ -189,23 +189,23 @@ class LegRoute:
         way, index = 0.0, 0
         while (one := self._leg(index)) and (after := self._leg(index + 1)):
             way += one.length
-            is_past = one.placed(here)[0] >= one.length
+            is_past = one.along_and_left(here)[0] >= one.length
             if way > JOIN_WITHIN_M or not is_past or after.distance(here) > one.distance(here):
                 break
             index += 1
         return index, False
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point soon ahead; none if it, or the robot, is off the legs."""
+        """Return the legs up to a point soon ahead; none if it or the robot is off them."""
         way = 0.0
         for index, leg in enumerate(self._ahead()):
             if index == 0:
-                way = -leg.placed(here)[0]
+                way = -leg.along_and_left(here)[0]
                 if leg.distance(here) > NEAREST_M:
                     break
             if way > LEAD_M:
                 break
-            along, aside = leg.placed(point)
+            along, aside = leg.along_and_left(point)
             # The robot may be unable to come to rest at a nearer point.
             on_leg = LEAST_LEG_M <= along <= leg.length + LEAST_LEG_M
             is_ahead = on_leg and LEAST_LEAD_M <= way + along <= LEAD_M

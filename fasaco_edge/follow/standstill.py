@@ -132,7 +132,9 @@ class Tries:
         self._place = None
         self._directions.clear()
 
-    def failed(self, here: Point, toward: float, now: float, *, for_good: bool = False) -> None:
+    def note_failure(
+        self, here: Point, toward: float, now: float, *, for_good: bool = False
+    ) -> None:
         """Note a failed try; ``for_good``: only progress ends its pause."""
         if self._place is None:
             self._place = here

@@ -30,8 +30,8 @@ class OccupancyGrid:
 
     Attributes:
         geometry: size, resolution and placement.
-        cells: int8 (rows, cols), read-only; -1 unknown, 0 free .. 100 occupied
-            (the probability of equation (2) in percent).
+        cells: int8 (rows, cols), read-only; -1 unknown, 0 free .. 100 occupied (the probability
+            that the pixel is occupied, in percent).
         frame: name of the map frame.
         stamp_ns: time of the map [ns], by its publisher's clock.
     """

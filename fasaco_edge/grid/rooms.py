@@ -2,8 +2,9 @@
 
 Free-standing furniture is ignored. Doors are narrow gaps between the ends of walls, and a mouth is
 the end of a narrow passage (``kernels.rooms.doors``). Each door and mouth is cut, and each
-connected part is then a region. A region too small for a room is joined to a neighbour through the
-least certain of them. On an incomplete map, a room is found once enough of its floor has been seen.
+connected part is then a region. A region too small for a room is joined to a neighbour through its
+least certain door or mouth. On an incomplete map, a room is found once enough of its floor has been
+seen.
 """
 
 from __future__ import annotations
@@ -33,19 +34,19 @@ DOOR_M, WALL_M, BESIDE_M = 1.3, 0.45, 0.5
 PASSAGE_M = 0.8
 # Smallest room with a door, and smallest one with mouths of passages alone [m2].
 ROOM_M2, WITHOUT_DOOR_M2 = 1.5, 4.0
-# Longest edge of furniture; edge up to which everything is furniture; least thickness of furniture
-# with a longer edge [m].
+# Furniture: longest edge; size below which everything is furniture; above it, the least thickness
+# [m].
 LONGEST_M, SMALL_M, THICK_M = 2.5, 0.6, 0.3
-# Unknown pixels within this distance of free floor that borders on unknown pixels belong to an
-# unseen part of the building [m].
+# Around the edge of the explored floor, unknown pixels up to this distance belong to an unseen part
+# of the building [m].
 OPEN_M = 0.5
 # Largest ratio of unknown to wall pixels beside free pixels. Above it the map does not mark walls,
 # and all pixels that are not free count as wall.
 MOST_UNMARKED = 4
 # Largest clearance in a door [m].
 CLEAR_M = 2.0
-# Directions of chords lead to integer points on half of a square's border, so their unit vectors
-# are equal on all machines.
+# Directions in which doors are searched for: to the integer points on half of a square's border, so
+# that the unit vectors are equal on all machines.
 _HALF = 6
 _RING = [(row, _HALF) for row in range(1 - _HALF, _HALF + 1)] + [
     (_HALF, col) for col in range(_HALF - 1, -_HALF - 1, -1)
@@ -131,7 +132,7 @@ def _counted(labels: NDArray[np.int32], free: NDArray[np.bool_]) -> NDArray[np.f
 
 
 def _numbered(rooms: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
-    """Return the rooms of regions, numbered by their first regions, and their number."""
+    """Return the room of each region, numbered in order of regions; and the number of rooms."""
     names = dict.fromkeys(room for room in rooms.tolist() if room)
     numbers = np.zeros(len(rooms), np.int32)
     numbers[list(names)] = np.arange(1, len(names) + 1)
@@ -142,7 +143,7 @@ _UNKNOWN, _FREE, _WALL = 0, 1, 2
 
 
 def _kinds(grid: OccupancyGrid) -> tuple[GridGeometry, NDArray[np.uint8]]:
-    """Return the kinds of pixels of the known part, uint8 (rows, cols), joined to ``PIXEL_M``."""
+    """Return the kinds of the known pixels, uint8 (rows, cols); fine ones joined to ``PIXEL_M``."""
     given, cells = grid.geometry, grid.cells
     known = Window.of(cells >= 0)
     if known is None:

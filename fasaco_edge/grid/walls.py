@@ -5,9 +5,10 @@ lane meets them obliquely. If the map is rotated back by that angle, cells are a
 
 Method: a histogram of gradient directions, used by O'Gorman and Clowes (1976) to find straight
 edges. Each edge between a free and an occupied pixel contributes a unit vector across it. Smoothed
-vectors are normal to the wall; their directions modulo a quarter-turn peak at the direction of most
-walls. The sum of the vectors around the peak gives the angle: along a straight wall of stepped
-pixels, vectors add up to its normal. Sums are of integers, so all machines find the same angle.
+vectors are normal to the wall. Modulo a quarter-turn, most of their directions are near that of
+most walls: the peak of the histogram. The sum of the vectors around the peak gives the angle: along
+a straight wall of stepped pixels, vectors add up to its normal. Sums are of integers, so all
+machines find the same angle.
 
 Source: F. O'Gorman, M. B. Clowes, "Finding picture edges through collinearity of feature points",
 IEEE Transactions on Computers C-25(4), 1976. Deviation: only directions vote, not lines.
@@ -43,7 +44,8 @@ REACH = sum(SHIFTS) + 1
 LEAST_SQUARE = (EDGE // 128) ** 2
 
 # Bins of the histogram per quarter-turn; half-width of a peak, and of the sum for the angle [bins].
-# At steps of a wall nearly parallel to the pixels, vectors deviate by up to 9 degrees.
+# The sum takes in vectors at the steps of a wall nearly parallel to the pixels, which deviate by up
+# to 9 degrees.
 BINS, PEAK, AROUND = 180, 14, 20
 MOST_ROUNDS = 8
 
@@ -54,8 +56,8 @@ BETTER = 1.25
 # Walls within this angle of the pixels' axes are parallel to them [deg]. Likewise walls near 45
 # degrees are at 45 degrees, so that nearly equal maps do not rotate by 45 and by -45 degrees.
 NEAR_DEG = 0.3
-# Least useful rotation [deg]. A rotation by 1 degree leaves a seventh of the patches in the same
-# time; from 2 degrees on a rotation also saves time.
+# Least useful rotation [deg]. For walls at 1 degree it takes no time, and leaves a seventh of the
+# unswept patches; for walls at 2 degrees or more it also saves time.
 LEAST_ROTATION_DEG = 0.5
 
 
@@ -65,9 +67,9 @@ class WallDirection:
 
     Attributes:
         angle_deg: angle of the walls to the axes of the map frame, in (-45, 45] [deg].
-        share: share of all wall that is within 7 degrees of it.
-        wall_m: length of that wall [m], of both sides; a wall one pixel thick between free pixels
-            counts for 0.3 of its length, as vectors cancel out.
+        share: share of all wall that is within 7 degrees of this angle.
+        wall_m: length of the wall in this share [m], of both sides; a wall one pixel thick between
+            free pixels counts for 0.3 of its length, as vectors cancel out.
         is_of_rim: whether the map marks few walls, and the border of free space was used instead.
     """
 
@@ -120,8 +122,8 @@ class _Votes:
     """The vectors across the walls of a map, by direction.
 
     Attributes:
-        sums: int64 (3, BINS): sums over the vectors of each bin: length, x and y, rotated by
-            quarters into the first quarter, which is centred at -45 degrees.
+        sums: int64 (3, BINS): for each bin the sums of the vectors' lengths, x and y. Vectors are
+            first rotated by quarter-turns into the directions from -45 to 45 degrees.
         edges, rim: number of free pixels' sides beside a wall, and beside something unknown.
     """
 
@@ -215,14 +217,14 @@ def _across(steps: NDArray[np.int8]) -> NDArray[np.int16]:
 
 def _vote(east: NDArray[np.int16], north: NDArray[np.int16], sums: NDArray[np.int64]) -> None:
     """Add a tile's vectors to ``sums``, int64 (3, 4 * BINS), by direction in a full circle."""
-    # Both differences are at the corners of pixels.
+    # A step lies between two pixels; sums of two steps, east and north, lie at the same corners.
     x = _smoothed(east[1:] + east[:-1])
     y = _smoothed(north[:, 1:] + north[:, :-1])
     squares = x.astype(np.int32) ** 2 + y.astype(np.int32) ** 2
     kept = np.flatnonzero(squares >= LEAST_SQUARE)
     x, y, squares = x.ravel()[kept], y.ravel()[kept], squares.ravel()[kept]
-    # Rounding has no effect. Bins end at odd multiples of a quarter-degree; their tangents are
-    # irrational, and fractions of such small integers are not near them.
+    # Rounding moves no vector to another bin: bins end at odd multiples of a quarter-degree, whose
+    # tangents are irrational, and y / x of such small integers is not near to one.
     degrees = np.degrees(np.arctan2(y, x, dtype=np.float64))
     bins = np.floor((degrees + 45.0) * (BINS / 90) + 0.5).astype(np.intp) % (4 * BINS)
     for kind, values in enumerate((np.rint(np.sqrt(squares)), x, y)):

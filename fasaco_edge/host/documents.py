@@ -1,6 +1,7 @@
-"""Documents that people write, as structs: each with all its faults, and each fault with its key.
+"""Documents that people write, read into structs, with all faults, each with its key.
 
-What types show comes first, then what structs say of themselves (``StrictDocument.faults``).
+First come the values that do not fit their types, then the faults that the structs find themselves
+(``StrictDocument.faults``).
 """
 
 from __future__ import annotations
@@ -23,16 +24,16 @@ from typing import (
 import msgspec
 from msgspec import UNSET, structs
 
-from fasaco_edge.errors import DocumentError, joined, together
+from fasaco_edge.errors import DocumentError, nested_key, together
 from fasaco_edge.text import nearest, shown
 
-# A type as an annotation has it, and a value of such a type.
+# An annotation of a type, and a value of that type.
 _Kind: TypeAlias = Any
 _Value: TypeAlias = Any
-# Faults of types after which no more are looked for.
+# Number of values that do not fit, after which the search for them ends.
 MOST_FAULTS = 50
-# Least similarity of an unknown key to a missing one that counts as a misspelling where unknown
-# keys are allowed.
+# Where unknown keys are allowed, least similarity to a missing key from which an unknown key counts
+# as misspelt.
 ALIKE = 0.8
 
 
@@ -45,10 +46,10 @@ class StrictDocument(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
     is_open: ClassVar[bool] = False
 
     def faults(self) -> Iterator[DocumentError]:
-        """Yield what its types do not show, each under its key in this object.
+        """Yield the faults that types do not show; keys are relative to this object.
 
-        Members that do not fit their types have their defaults here. Required ones are UNSET, which
-        is false, and so are objects and lists in a list.
+        A member whose value does not fit has its default, or is UNSET if it has none; an object or
+        list in a list is UNSET, too. UNSET is false.
         """
         yield from ()
 
@@ -62,7 +63,7 @@ def inspected(
 ) -> tuple[_Struct, list[_Error]]:
     """Return a parsed document as a struct, and all its faults.
 
-    With faults the struct is as ``StrictDocument.faults`` says; UNSET if the document is no object.
+    For members at fault see ``StrictDocument.faults``; a document that is no object becomes UNSET.
     """
     reader = _Reader(kind, error)
     read: _Struct = reader.read(kind, document, "")
@@ -78,7 +79,7 @@ def converted(kind: type[_Struct], document: object, error: type[_Error]) -> _St
     """Return a parsed document as a struct.
 
     Raises:
-        DocumentError: ``error``, the first fault with the others.
+        DocumentError: an ``error``, the first fault, which holds the others as ``rest``.
     """
     read, faults = inspected(kind, document, error)
     if faults:
@@ -87,12 +88,12 @@ def converted(kind: type[_Struct], document: object, error: type[_Error]) -> _St
 
 
 def misfits(held: object, error: type[_Error], key: str = "") -> Iterator[_Error]:
-    """Yield what a struct at ``key``, and those in it, say of themselves."""
+    """Yield the faults that a struct at ``key``, and the structs in it, find themselves."""
     if isinstance(held, msgspec.Struct):
         for name, encoded in zip(
             held.__struct_fields__, held.__struct_encode_fields__, strict=True
         ):
-            yield from misfits(getattr(held, name), error, joined(key, encoded))
+            yield from misfits(getattr(held, name), error, nested_key(key, encoded))
         if isinstance(held, StrictDocument):
             for fault in held.faults():
                 yield fault.within(key, error)
@@ -110,11 +111,11 @@ class _Reader:
         self._root, self._error = root, error
 
     def read(self, kind: _Kind, value: object, key: str) -> _Value:
-        """Return a value as ``kind``; what does not fit is left out, and UNSET if nothing does."""
+        """Return a value as ``kind``, without the parts that do not fit; UNSET if no part fits."""
         try:
             return msgspec.convert(value, kind)
         except (msgspec.ValidationError, UnicodeEncodeError) as error:
-            # The latter of a lone surrogate, without a place.
+            # A lone surrogate raises UnicodeEncodeError, which names no place.
             message = "Invalid text" if isinstance(error, UnicodeEncodeError) else str(error)
         before, read = len(self.faults), UNSET
         if before >= MOST_FAULTS:
@@ -128,7 +129,7 @@ class _Reader:
             and (of := _of_items(kind))
         ):
             read = self._items(of, value, key)
-        # Without a fault its unknown keys are those of other programs.
+        # If no part has a fault, the value itself has; but unknown keys may be of other programs.
         if len(self.faults) == before and not expected.startswith("object contains unknown"):
             expected = _expected(kind, expected)
             if isinstance(misfit, str) and re.fullmatch(r"-?\d+,\d+", misfit):
@@ -145,15 +146,15 @@ class _Reader:
         for name in (each for each in value if isinstance(each, str) and each not in fields):
             if not is_open or nearest(name, fields.keys() - value.keys(), ALIKE):
                 what, meant = self._unknown(name, key, list(fields))
-                self._add(joined(key, name), what, meant)
+                self._add(nested_key(key, name), what, meant)
                 misspelt |= set(meant)
         members = {field.name: UNSET for field in fields.values() if field.required}
         for name, field in fields.items():
             if name in value:
-                read = self.read(field.type, value[name], joined(key, name))
+                read = self.read(field.type, value[name], nested_key(key, name))
                 members |= {} if read is UNSET else {field.name: read}
-            elif field.required and joined(key, name) not in misspelt:
-                self._add(joined(key, name), "missing")
+            elif field.required and nested_key(key, name) not in misspelt:
+                self._add(nested_key(key, name), "missing")
         return kind(**members)
 
     def _items(self, kind: _Kind, value: list[object], key: str) -> _Value:
@@ -162,7 +163,7 @@ class _Reader:
 
     def _unknown(self, name: str, key: str, known: list[str]) -> tuple[str, list[str]]:
         """Return what is wrong with an unknown key, and the keys that it was meant for."""
-        meant = [joined(key, each) for each in nearest(name, known)]
+        meant = [nested_key(key, each) for each in nearest(name, known)]
         # It may belong elsewhere in the document.
         meant = meant or [path for path in _paths(self._root) if path.rpartition(".")[2] == name]
         if meant:
@@ -184,7 +185,7 @@ def _touch(one: str, other: str) -> bool:
 def _paths(kind: type[msgspec.Struct], before: str = "") -> Iterator[str]:
     """Yield all keys of a struct and of those in it, without lists."""
     for field in structs.fields(kind):
-        yield (path := joined(before, field.encode_name))
+        yield (path := nested_key(before, field.encode_name))
         if struct := _struct(field.type):
             yield from _paths(struct, path)
 
@@ -214,7 +215,7 @@ def _of_items(kind: _Kind) -> _Kind:
 
 
 def _expected(kind: _Kind, expected: str) -> str:
-    """Return what a type expects: its words, if it takes no others."""
+    """Return what a type expects: the allowed words, if it allows only some."""
     arms = _arms(kind)
     words = [str(each) for arm in arms if get_origin(arm) is Literal for each in get_args(arm)]
     are_words = all(get_origin(arm) is Literal or arm is bool for arm in arms)

@@ -92,7 +92,7 @@ class Written(Generic[_Error]):
             raise together(faults)
 
     def _line_of(self, key: str) -> int | None:
-        """Return the line of a key, or of its section if it is missing; None if both are."""
+        """Return the line of a key or, without the key, of its section; None without either."""
         while key:
             if key in self.lines:
                 return self.lines[key]
@@ -144,7 +144,7 @@ def read_written(
 
 
 def _keys_of_json(text: str) -> list[tuple[str, int]]:
-    """Return the keys of JSON, of which YAML takes no tabs; none where it takes nothing."""
+    """Return the keys of JSON, read as YAML without tabs; none if YAML refuses the text."""
     try:
         return compose(text.replace("\t", " "))[0]
     except PlainYamlError:
@@ -193,7 +193,7 @@ def dump(document: object) -> str:
     return yaml.dump(document, Dumper=_Dumper, sort_keys=False)
 
 
-# What the parser says of frequent mistakes, and what that means.
+# Messages of the parser for frequent mistakes, and their meaning.
 _PLAIN = {
     "found character '\\t' that cannot start any token": "a tab: indent by spaces",
     "expected <block end>, but found '<block mapping start>'": (

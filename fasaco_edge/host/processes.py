@@ -56,7 +56,7 @@ def peak_mb(pid: int | str = "self") -> float:
 def memory_limit(root: Path = Path("/")) -> int | None:
     """Return this process's memory limit by control groups [bytes]; None if none is known.
 
-    It is the lowest limit of its group and the groups above that are visible from inside.
+    It is the lowest limit of the process's group and of the groups above it that are visible.
     """
     try:
         groups = (root / "proc/self/cgroup").read_text(encoding="utf-8").splitlines()

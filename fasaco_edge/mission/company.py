@@ -111,7 +111,7 @@ class Waiting:
         """Return what the robot does while it waits or makes way; None if it need not.
 
         Args:
-            state: of the mission so far.
+            state: state of the mission so far.
             now: time [s].
             may_drive: whether inputs, map and dock let the robot drive.
         """

@@ -11,7 +11,7 @@ from msgspec import Meta
 
 from fasaco_edge.grid.geometry import FARTHEST_M, MAX_LATTICE_CELLS, Polygon, Pose2D
 from fasaco_edge.mission.orders.keep_outs import MOST_KEEP_OUT
-from fasaco_edge.mission.orders.order import MOST_ZONES, Errand, Minutes, StandingZone
+from fasaco_edge.mission.orders.order import MOST_ZONES, ConfiguredZone, Errand, Minutes
 from fasaco_edge.planners.cost import STEPS_ALONE, CoverageCost
 from fasaco_edge.planners.living_trail import PAPERS_RULES, TrailRules
 
@@ -73,7 +73,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
         map_frame: frame of the map to which zones, keep_out, a mask of a file, home and dock
             belong; "" for the first map used with them.
         by_room: whether a room is finished before the next is begun: if that costs little, or
-            always; with other robots, "always" is as "auto".
+            always; with other robots, "always" has the effect of "auto".
     """
 
     autostart: bool = True
@@ -82,7 +82,7 @@ class MissionPolicy(msgspec.Struct, frozen=True, kw_only=True):
     lost_pose_s: Period = 3.0
     stale_map_s: Period = 0.0
     until_min: Minutes = 0.0
-    zones: Annotated[tuple[StandingZone, ...], Meta(max_length=MOST_ZONES)] = ()
+    zones: Annotated[tuple[ConfiguredZone, ...], Meta(max_length=MOST_ZONES)] = ()
     keep_out: Annotated[tuple[Polygon, ...], Meta(max_length=MOST_KEEP_OUT)] = ()
     keep_out_mask: str = ""
     keep_out_topic: bool = False
@@ -148,9 +148,9 @@ class MissionConfig:
     """Robot, cost, limits and policy of a mission; by default without retries.
 
     Attributes:
-        footprint: of robot and tool.
+        footprint: footprint of robot and tool.
         max_lattice_cells: limit on the cells of the coverage lattice.
-        cost: of paths.
+        cost: cost of paths.
         policy: retries and timeouts.
         spare_share: share of a processor core for improving a path that is still valid; 0 for
             none.

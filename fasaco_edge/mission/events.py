@@ -177,10 +177,10 @@ class FollowerBlocked:
     """A report of the follower: what keeps the robot from driving its path.
 
     Attributes:
-        revision: of the path; 0 if not known.
+        revision: revision of the path; 0 if not known.
         detail: the obstruction, in words.
         held_s: its duration [s].
-        frame: of the places.
+        frame: frame of the places.
         x, y: the robot's place [m].
         points: places x, y of the obstacle ahead [m], the nearest first; () for none.
     """
@@ -334,7 +334,7 @@ class Doing(NamedTuple):
     """The mission's activity in a step.
 
     Attributes:
-        state: of the mission.
+        state: state of the mission.
         reason: its reason; "" to report the number of the path.
         path: a path to publish.
         plan: a plan to make.

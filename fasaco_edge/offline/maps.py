@@ -75,8 +75,9 @@ def load_map(
 
     Args:
         source: a map_server YAML file, the name of a built-in map (``fasaco-edge maps``), an image
-            alone, or a coverage grid: a .npy file or an array, bool (rows, cols), True = coverable.
-        resolution_m: edge of a pixel [m] of an image alone; None otherwise.
+            without a YAML file, or a coverage grid: a .npy file or an array, bool (rows, cols),
+            True = coverable.
+        resolution_m: edge of a pixel of an image without a YAML file [m]; None otherwise.
         unknown_free: whether unknown pixels count as free.
 
     Raises:

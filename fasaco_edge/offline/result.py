@@ -33,7 +33,7 @@ from fasaco_edge.offline.settings import CELLS, Search
 from fasaco_edge.planners.cost import count_turns
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.living_trail import Tau, branching
-from fasaco_edge.planners.own.problem import GridProblem, posed
+from fasaco_edge.planners.own.problem import GridProblem, grid_problem
 from fasaco_edge.planners.path import CoveragePath, walk_figures
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.text import duration, percent
@@ -126,7 +126,7 @@ class Plan:
     @property
     def grid_problem(self) -> GridProblem:
         """The problem, as the input of a planner of your own."""
-        return posed(self.problem, self.search.seed)
+        return grid_problem(self.problem, self.search.seed)
 
     @property
     def cells(self) -> NDArray[np.int32]:

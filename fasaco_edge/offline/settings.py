@@ -17,7 +17,7 @@ CELLS, THOROUGH = "cells", "thorough"
 # Directions of the rows of cells for a line over the floor, other than an angle [deg].
 WALLS, AXES = "walls", "axes"
 # Default time budget of a planner with local search [s]; other planners have none. Values of q0 in
-# equation (4): the best with local search, and the paper's.
+# equation (4), Carr and Wang 2022: the best with local search, and the paper's.
 BUDGET_S = 2.0
 SEARCH_Q0, PAPER_Q0 = 0.9, 0.7
 # Planner whose settings apply to a planner of the user's own.

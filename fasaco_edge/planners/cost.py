@@ -1,7 +1,7 @@
 """Cost of a walk, in seconds for steps and quarter-turns; and counts of a search's work.
 
 A search may add a price to each step across preferred lanes, and to each step into another room.
-Walks then cost more than their seconds; ``seconds`` is the cost without these prices.
+Walks then cost more than their seconds; ``without_prices`` is the cost in seconds alone.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ANY_LANES: Lanes = ""
 ROWS: Lanes = "rows"
 COLUMNS: Lanes = "columns"
 # Price of a step across the lanes, as a share of the time of a step and a quarter-turn.
-ACROSS = 0.6
+PRICE_ACROSS = 0.6
 
 
 class Turns(NamedTuple):
@@ -49,8 +49,8 @@ class CoverageCost:
         step_s: a step to a neighbouring cell [s].
         quarter_turn_s: a turn by 90 degrees on the spot [s].
         room_s: added to a step into another room [s].
-        row_s, col_s: added to a step along a row, along a column, so that lanes in the other
-            direction are preferred [s].
+        row_s: added to a step along a row [s]; lanes along columns are then preferred.
+        col_s: added to a step along a column [s]; lanes along rows are then preferred.
     """
 
     step_s: float = 1.0
@@ -82,12 +82,12 @@ class CoverageCost:
 
     def along(self, lanes: Lanes) -> Self:
         """Return this cost with a preference for lanes in a direction."""
-        across_s = ACROSS * (self.step_s + self.quarter_turn_s)
+        across_s = PRICE_ACROSS * (self.step_s + self.quarter_turn_s)
         row_s, col_s = across_s * (lanes == COLUMNS), across_s * (lanes == ROWS)
         return replace(self, row_s=row_s, col_s=col_s)
 
     @property
-    def seconds(self) -> Self:
+    def without_prices(self) -> Self:
         """This cost without a preference for lanes, or for rooms."""
         return replace(self.along(ANY_LANES), room_s=0.0)
 
@@ -127,7 +127,12 @@ class CoverageCost:
         return round(self.col_s * MICROSECONDS)
 
     def quality(self, cells: int, cost_us: int) -> float:
-        """Return delta phi of equation (8): the cost of one step per cell over the cost [us]."""
+        """Return delta phi of equation (8), Carr and Wang 2022; 1 for a walk of one step per cell.
+
+        Args:
+            cells: number of cells that the walk covers.
+            cost_us: cost of the walk [us].
+        """
         # Whole numbers are divided, so for steps alone the result equals cells / steps bit for bit.
         return cells * self.step_us / max(cost_us, self.step_us)
 

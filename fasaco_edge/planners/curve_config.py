@@ -10,7 +10,7 @@ class CurveConfig:
     """How a robot with a turning radius drives.
 
     Attributes:
-        radius_m: of its tightest arcs, above 0 [m].
+        radius_m: radius of its tightest arcs, above 0 [m].
         reverses: whether it can drive backward.
         speed_m_s, arc_m_s: on straights and on arcs [m/s].
         stop_s: additional time of a change between forward and backward [s].

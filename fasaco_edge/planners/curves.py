@@ -37,9 +37,9 @@ AHEAD_WINDOW, BOTH_WINDOW, WIDER = 6.0, 4.5, (2.0, 4.0, 8.0)
 # Cost of a turn on the spot [s]: a robot with a turning radius cannot drive it.
 SPOT_S = 1000.0
 # Factor on the seconds of driving backward.
-BACKWARD = 2.0
+BACKWARD_FACTOR = 2.0
 # Least distance along the line after which a pixel counts as swept again [tool's widths].
-AGAIN = 2.5
+SWEPT_AGAIN = 2.5
 # Number of start directions of a robot whose heading is not known.
 HEADINGS = 8
 # Largest distance of the points of an arc [m].
@@ -51,7 +51,7 @@ STEERED_RAD = 0.02
 TURNED_RAD = 1e-9
 # Poses of a curve are at least this far apart [m].
 LEAST_M = 1e-3
-# Decimals of points [m] and headings [rad]; to these, all computers compute the same sines.
+# Decimals of points [m] and headings [rad]; so rounded, they are equal on all computers.
 DECIMALS = 6
 
 
@@ -148,7 +148,7 @@ class _Search:
             reverses=config.reverses,
             straight_s=unit / config.speed_m_s,
             arc_s=unit / config.arc_m_s,
-            back=BACKWARD,
+            back=BACKWARD_FACTOR,
             stop_s=config.stop_s,
             steered=STEERED_RAD,
             spot_s=SPOT_S,
@@ -225,7 +225,7 @@ class _Search:
         assert seen is not None
         part = np.ascontiguousarray(self._to_sweep[seen.slices_in(Window(0, 0, rows, cols))])
         corner = np.array([seen.col0, seen.row0], np.float64)
-        counts = kernel.count_swept(middles - corner, way, part, width / 2.0, AGAIN * width)
+        counts = kernel.count_swept(middles - corner, way, part, width / 2.0, SWEPT_AGAIN * width)
         return counts.astype(np.float64) * (0.5 * self._config.price_s_m2 * unit * unit)
 
     def _ways(self) -> kernel.Ways:
@@ -290,7 +290,7 @@ class _Search:
             poses[-1], legs[-1] = self._pose(state), int(self._line.leg[state >> 1])
         drawn, is_backward = np.array(poses), np.array(backward, np.bool_)
         kept = _needed(drawn, is_backward, LEAST_M / self._floor.geometry.resolution)
-        # A segment takes the direction in which its end is reached: poses before may be dropped.
+        # If poses before a kept one were dropped, its segment has the direction of its last part.
         spots = len(self._spots(states, ways))
         return self._as_curve(drawn[kept], is_backward[kept[1:] - 1], np.array(legs)[kept], spots)
 

@@ -35,7 +35,7 @@ class Saved(NamedTuple):
         """Return the savings of a search in which ants have rebuilt discs.
 
         Args:
-            saved_us: of the whole search [us].
+            saved_us: time that the whole search saved [us].
             velocities: int64 (cohorts,).
             ants_us: savings of each cohort [us], int64 (cohorts,).
         """

@@ -49,8 +49,9 @@ class CoverageProblem:
         attempt: number of an attempt to improve a valid ``before``, from 1; each attempt tries
             other places. 0 if a plan is needed.
         trail: the mission's living trail, for planners whose ants start from it; None for none.
-        whole: the whole problem, if this is its rest after some steps, see ``after``; a path has
-            these steps first, and the figures of the whole problem. None for a whole problem.
+        whole: the whole problem, if this is its rest after some steps, see ``after``; a path then
+            begins with these steps, and has the figures of the whole problem. None for a whole
+            problem.
         rooms: uint16 (rows, cols), the room of each cell, 0 for none; None without a price for
             steps from one room into another.
     """

@@ -128,8 +128,8 @@ class Replay:
 
     Args:
         config: configuration of the replayed daemon.
-        ready_ns: earliest begin of its mission, see ``RecordedRun``; None to begin with the first
-            map.
+        ready_ns: earliest beginning of its mission, see ``RecordedRun``; None to begin with the
+            first map.
         work: number of proposals of each plan.
 
     Attributes:

@@ -88,11 +88,11 @@ class ReviewDocument(msgspec.Struct):
             the tool passed over, along the recorded poses. If all orders have zones, only floor in
             zones counts.
         swept_by_others_m2: reachable floor that other robots of the fleet swept, by their cells
-            [m2]. It is not part of these figures; null for a robot alone.
+            [m2]. ``reachable_m2`` and ``swept_m2`` leave it out. Null for a robot alone.
         patches_over_4_dm2, largest_patch_m2: number of connected unswept patches of this floor
             above 4 dm2; area of the largest one [m2].
         swept_before_m2: floor swept before the recording began, approximately, by the daemon's
-            count [m2]. It counts as unswept, as its poses are missing, unless it was swept again.
+            count [m2]. As its poses are missing, it counts as unswept until it is swept again.
         left: the largest unswept patches: m2, and a place in the middle (x, y) [m].
         ledger_swept_m2: floor that the daemon counted as swept at the end, reachable or not [m2].
         left_by_reason: unswept reachable floor at the end, by the daemon's reasons [m2].
@@ -116,9 +116,9 @@ class ReviewDocument(msgspec.Struct):
             computer's clock [s].
         restored_cells: cells that were covered before a restart.
         states: seconds in each state.
-        troubles: each period in which the mission was degraded, blocked or silent, had a trouble in
-            another state (see its reason), or the recorder could not write (`recorder: disk full`,
-            `recorder: stalled`): state, reason, at_s, seconds.
+        troubles: state, reason, at_s, seconds of each period in which the mission was degraded,
+            blocked or silent, or had a trouble in another state (`reason` is then the trouble), or
+            in which the recorder could not write (`recorder: disk full`, `recorder: stalled`).
         charges: each period of charging: at_s, seconds, level_from, level_to (0 to 1; null if
             unknown).
         longest_stand: the longest standstill during a mission: at_s, seconds, place (x, y) [m], and

@@ -24,7 +24,7 @@ AT_REST = (
 )
 TROUBLES = ("degraded", "blocked", "silent")
 RECORDER_IN_ORDER = ("recording", "stopping")
-# Begin of the details in a reason: "path blocked at cell (2, 3)" has the kind "path blocked".
+# Beginning of the details in a reason: "path blocked at cell (2, 3)" has the kind "path blocked".
 _DETAIL = re.compile(r":| at cell|,| \d")
 # Texts of ``grid.reachable_area.AreaChange``.
 _MAP = "map: "
@@ -101,7 +101,7 @@ def longest_stand(data: RunData, states: Sequence[Span]) -> Stand | None:
 
 
 def _stand(data: RunData, begin_s: float, end_s: float) -> tuple[float, float, float, float] | None:
-    """Return begin, length [s], x, y [m] of the longest standstill; None without a pose."""
+    """Return time, duration [s], x, y [m] of the longest standstill; None without a pose."""
     chosen = (data.times >= begin_s) & (data.times <= end_s)
     times, poses = data.times[chosen].tolist(), data.track[chosen].tolist()
     if not times:

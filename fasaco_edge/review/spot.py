@@ -187,7 +187,7 @@ class _Judge:
         if self._is_within(ordered):
             return self._spot("keep-out", "in a keep-out zone of the order")
         if self._is_within(self._data.keep_out):
-            return self._spot("keep-out", "in a standing keep-out zone")
+            return self._spot("keep-out", "in a keep-out zone of the configuration or the operator")
         return None
 
     def _out_of_reach(self, grid: OccupancyGrid, footprint: Footprint) -> Spot:

@@ -174,8 +174,8 @@ def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None
     """
     if mission.ordered != "command":
         return None
-    standing = {zone.name for zone in view.settings.mission.zones}
-    rooms = {room.title: room for room in view.rooms.rooms if room.title not in standing}
+    configured = {zone.name for zone in view.settings.mission.zones}
+    rooms = {room.title: room for room in view.rooms.rooms if room.title not in configured}
     zones: list[Digest] = []
     for zone in mission.zones:
         found: Digest = {"name": zone.name, "passes": zone.passes}
@@ -240,7 +240,7 @@ def _fleet(fleet: FleetReport) -> list[Digest]:
 
 
 def areas(settings: KnownSettings, report: MissionReport) -> Digest:
-    """Return standing zones, the zones of the order, and keep-outs in force."""
+    """Return configured zones, the zones of the order, and keep-outs in force."""
     mission = settings.mission
     return {
         "zones": [

@@ -1,8 +1,8 @@
 """Access control of the page and its commands: hosts, origins, tokens.
 
 A page of another site in a user's browser can call this server, too. Such requests have an Origin
-header of the other site, or a host name that was made to resolve to this server (DNS rebinding).
-Requests with an IP address as host are safe from the latter.
+header of the other site, or a host name that was made to resolve to this server (DNS rebinding). A
+request with an IP address as host cannot be a DNS rebinding.
 """
 
 from __future__ import annotations

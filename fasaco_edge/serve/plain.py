@@ -161,7 +161,7 @@ class LeftFloor:
     """Unswept floor with one reason.
 
     Attributes:
-        reason: in the owner's words.
+        reason: why it is unswept, in the owner's words.
         m2: its area [m2].
         marks: its marks on the map, see ``MARKS``.
         places: points (x, y) in it [m], if it has no marks.

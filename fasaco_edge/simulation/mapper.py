@@ -38,7 +38,7 @@ class Mapper:
     def __init__(self, truth: OccupancyGrid, config: SimulationConfig) -> None:
         resolution = truth.geometry.resolution
         self._truth = truth
-        # Raster of the own map.
+        # Raster of the robot's own map.
         self._geometry = truth.geometry
         self._known: NDArray[np.int8] = np.full(truth.cells.shape, UNKNOWN, np.int8)
         self._extent: Window | None = None
@@ -49,7 +49,7 @@ class Mapper:
         rays = rays_for(self._reach_px)
         self._angles = np.arange(rays) * (math.tau / rays)
 
-    def believed(self, pose: Pose2D) -> Pose2D:
+    def estimated(self, pose: Pose2D) -> Pose2D:
         """Return the estimated pose of a robot at ``pose``: the same pose, as there is no error."""
         return pose
 
@@ -74,7 +74,7 @@ class Mapper:
         return changed
 
     def is_clear(self, start: Point, end: Point, margin_m: float = 0.0) -> bool:
-        """Return whether the hull can move straight between two points [m], by the own map.
+        """Return whether the hull can move straight between two points [m], by the robot's own map.
 
         Unknown pixels are not clear. Checks are half a pixel, or SPACING_M, apart: an obstacle
         thinner than the padding may fit between two checks, and stop the robot. A margin around the
@@ -96,12 +96,12 @@ class Mapper:
         )
 
     def is_clear_at(self, point: Point) -> bool:
-        """Return whether the hull fits at a point [m], by the own map; not on unknown pixels."""
+        """Return whether the hull fits at a point [m] of the robot's map; not on unknown pixels."""
         x, y = self._geometry.to_pixels(*point)
         return bool(disc_is_free(self._known, x, y, self._hull_px, self._free_at_most))
 
     def snapshot(self, stamp_ns: int) -> OccupancyGrid | None:
-        """Return the own map, cropped to its known part; None before anything is known.
+        """Return the robot's own map, cropped to its known part; None before anything is known.
 
         The crop is rounded outward to whole chunks, within the raster.
         """

@@ -60,7 +60,7 @@ class Pace:
         """Return how long the next tick has been due [s]; negative before it is due."""
         return now_s - self._due_s
 
-    def ticked(self, now_s: float) -> None:
+    def note_tick(self, now_s: float) -> None:
         """Note that a tick was run."""
         self._due_s = max(self._due_s + self._interval_s, now_s - DEBT_S)
 
@@ -167,7 +167,7 @@ class SimulatedRobot:
                 if self._waits(now_s, patience_s):
                     break
                 self.publish(world.tick())
-                pace.ticked(now_s)
+                pace.note_tick(now_s)
             if now_s - self._reported[0] >= REPORT_EVERY_S:
                 self._drop_silent(now_s)
                 report(self.progress(now_s))

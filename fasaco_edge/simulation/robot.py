@@ -219,7 +219,7 @@ def corners(xy: NDArray[np.float64]) -> NDArray[np.float64]:
     return points[bend]
 
 
-def joined(
+def corners_to_end(
     path: NDArray[np.float64],
     track: NDArray[np.float64],
     is_clear: Callable[[Point, Point], bool],
@@ -261,7 +261,7 @@ def joined(
 
 
 def passed_waypoints(path: NDArray[np.float64], track: NDArray[np.float64]) -> int:
-    """Return how many of the first waypoints the robot drove through, in order; see ``joined``.
+    """Return how many of the first waypoints the robot drove through in order.
 
     It counts from the latest visit to the first waypoint: earlier visits belong to earlier paths.
     """

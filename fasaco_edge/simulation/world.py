@@ -24,8 +24,8 @@ from fasaco_edge.simulation.robot import (
     Battery,
     DriveState,
     SimulationConfig,
+    corners_to_end,
     driven,
-    joined,
     moved_by,
     stopping_point,
 )
@@ -137,9 +137,9 @@ class World:
         return self.drive.pose
 
     @property
-    def believed(self) -> Pose2D:
+    def estimated_pose(self) -> Pose2D:
         """Its mapper's estimate of the pose."""
-        return self.mapper.believed(self.drive.pose)
+        return self.mapper.estimated(self.drive.pose)
 
     @property
     def stamp_ns(self) -> int:
@@ -154,7 +154,7 @@ class World:
 
     def emission(self) -> Emission:
         """Return map and pose as they are now; there is no map before the first tick."""
-        pose = StampedPose(self.believed, self.frame, self.stamp_ns)
+        pose = StampedPose(self.estimated_pose, self.frame, self.stamp_ns)
         return Emission(self.mapper.snapshot(self.stamp_ns), pose, self.battery)
 
     def follow(self, path: NDArray[np.float64]) -> None:
@@ -191,7 +191,7 @@ class World:
             self.mapper.scan(self.pose)
             if self.activity is Activity.NO_WAY or self._may_try_again():
                 self._join()
-        pose = StampedPose(self.believed, self.frame, self.stamp_ns)
+        pose = StampedPose(self.estimated_pose, self.frame, self.stamp_ns)
         return Emission(
             self.mapper.snapshot(self.stamp_ns) if self._is_due(self.config.map_hz) else None,
             pose if self._is_due(self.config.pose_hz) else None,
@@ -219,7 +219,7 @@ class World:
         # Driving straight on, even within the margin, has priority over driving back.
         for goes_back, margin_m in ((False, MARGIN_M), (False, 0.0), (True, MARGIN_M), (True, 0.0)):
             has_room = partial(is_clear, margin_m=margin_m)
-            route = joined(self._path, track, has_room, goes_back=goes_back)
+            route = corners_to_end(self._path, track, has_room, goes_back=goes_back)
             if route is not None:
                 self._corners = [(float(x), float(y)) for x, y in route[::-1]]
                 self.activity = Activity.DRIVING if self._corners else Activity.IDLE
@@ -231,7 +231,7 @@ class World:
         return self.activity is Activity.STOPPED and is_first and not self.drive.moving
 
     def _recent_track(self) -> NDArray[np.float64]:
-        """Return the last points of the track, and the way to rest, on the own map, (n, 2) [m]."""
+        """Return the track's last points, and the way to rest, on the robot's map, (n, 2) [m]."""
         here = (self.pose.x, self.pose.y)
         rest = stopping_point(self.drive, self.config)
         points = 2 + int(math.dist(here, rest) / TRACK_SPACING_M)
@@ -240,7 +240,7 @@ class World:
         return np.array([self._on_map((x, y)) for x, y in track], np.float64)
 
     def _on_map(self, place: Point) -> Point:
-        pose = self.mapper.believed(Pose2D(*place))
+        pose = self.mapper.estimated(Pose2D(*place))
         return pose.x, pose.y
 
     def _move(self) -> None:
@@ -263,7 +263,7 @@ class World:
         return self.mapper.true_place(*self._corners[-1])
 
     def _may_drive_on(self) -> bool:
-        """Return whether no obstacle of the own map, and no other robot, stops the robot."""
+        """Return whether no obstacle of the robot's map, and no other robot, stops the robot."""
         if self.activity is Activity.STOPPED:
             return False
         ahead = driven(self.drive, self._goal(), self.config)

@@ -44,11 +44,11 @@ class Watched(ABC):
     """A watch of one robot, or of a fleet.
 
     Attributes:
-        rest_s: longest wait for complete data once something is known [s].
+        most_wait_s: longest wait from ``is_known`` to ``is_whole`` [s].
         view: its newest data.
     """
 
-    rest_s: float
+    most_wait_s: float
     view: WatchedView
 
     @abstractmethod
@@ -106,7 +106,7 @@ def watch_on_screen(
 
 def watch_in_lines(watched: Watched) -> None:
     """Print events, and once a second the state, until a signal arrives."""
-    # The present state arrives within the first second.
+    # No line before the present state has arrived, which takes less than a second.
     printed, last_line, next_line_at = 0, "", phrases.steady_now() + LINE_EVERY_S
     with stop_event(*END_SIGNALS) as stop:
         while not stop.is_set():
@@ -139,7 +139,7 @@ def look_once(watched: Watched, timeout_s: float) -> bool:
             if stop.is_set() or time.monotonic() > deadline:
                 return False
             watched.take(FRAME_S)
-        deadline = time.monotonic() + watched.rest_s
+        deadline = time.monotonic() + watched.most_wait_s
         while not (stop.is_set() or watched.is_whole()) and time.monotonic() < deadline:
             watched.take(FRAME_S)
     return True

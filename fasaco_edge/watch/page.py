@@ -165,7 +165,7 @@ def headline(view: RobotView, now: float, width: int) -> Text:
 class RobotWatch(Watched):
     """The watch of one robot."""
 
-    rest_s = 1.0
+    most_wait_s = 1.0
     view: RobotView
 
     def __init__(self, feed: Feed, view: RobotView, console: Console) -> None:

@@ -53,7 +53,7 @@ class Keys:
         return robot if is_chunk(robot) else ""
 
     def claim(self, own: str, stand: str, topic: Topic = CLAIM) -> str:
-        """Return the token of the daemon with the Zenoh id ``own``, which "plans" or "waits".
+        """Return the token of the daemon with the Zenoh id ``own``; ``stand``: "plans" or "waits".
 
         ``topic`` may be another topic whose key has the same ending.
         """

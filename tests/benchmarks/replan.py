@@ -130,7 +130,7 @@ def _timed_parts() -> tuple[tuple[str, type | ModuleType, str], ...]:
         ("route", Route, "accept"),
         ("route", Route, "truncate"),
         ("trail", TrailLayer, "finish"),
-        ("trail", TrailLayer, "posed"),
+        ("trail", TrailLayer, "with_trail"),
         ("open floor", UnsweptTally, "update"),
         ("follow", LineLayer, "receive_map"),
         ("laying", layer, "lay"),

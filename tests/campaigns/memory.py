@@ -36,7 +36,7 @@ from PIL import Image
 from fasaco_edge.bench.processes import warm_kernels
 from fasaco_edge.config.config import DaemonConfig
 from fasaco_edge.config.loading import load_config
-from fasaco_edge.daemon.memory import afforded, needed_bytes
+from fasaco_edge.daemon.memory import limited_to_memory, needed_bytes
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.host.processes import peak_mb
@@ -165,7 +165,7 @@ def pour_with_mask(
         document["mission"]["keep_out_mask"] = str(mask_file(flood, config.parent))
         config.write_text(yaml.safe_dump(document))
         reload = threading.Timer(seconds / 2, daemon.process.send_signal, [signal.SIGHUP])
-    largest = isqrt(afforded(load_config(config), limit).map.max_pixels)
+    largest = isqrt(limited_to_memory(load_config(config), limit).map.max_pixels)
     reload.start()
     pour(replace(flood, kind="updates", side=largest), daemon, outsider, seconds)
     reload.join()
@@ -255,7 +255,7 @@ def run_flood(
         ):
             file = next(folder.glob("daemon*.yaml"))
             written, has_mask = load_config(file), None
-            needs = needed_bytes(afforded(written, limit))
+            needs = needed_bytes(limited_to_memory(written, limit))
             outsider.put("map", map_bytes(room(8.0, 6.0)))
             outsider.put("pose", pose_bytes(0.75, 0.75))
             if flood.kind == "message":

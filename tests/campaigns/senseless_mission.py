@@ -276,7 +276,7 @@ class MissionTrial:
 
     def _floor(self, grid: OccupancyGrid) -> bytes:
         """Return the swept floor as it is published, b"" where it is too wide to be shown."""
-        shown = self._mission.covered.floor.snapshot().shown(
+        shown = self._mission.covered.floor.snapshot().as_grid(
             MOST_SQUARES, grid.frame, grid.stamp_ns
         )
         return b"" if shown is None else encode_occupancy_grid(shown)

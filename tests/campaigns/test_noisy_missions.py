@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from fasaco_edge.follow.estimate import VelocityCommand
+
+pytest.importorskip("scipy", reason="needs the extra 'lab'")
+
 from tests.campaigns.lab.halls import hall
 from tests.campaigns.lab.judge import Ending
 from tests.campaigns.lab.known_floor import FloorAccount

@@ -22,8 +22,8 @@ from fasaco_edge.daemon.memory import (
     MIB,
     PILLOW_BYTES,
     SPARE,
-    afforded,
     floor_pixels,
+    limited_to_memory,
     limits_mib,
     mask_bytes,
     most_bytes,
@@ -53,11 +53,11 @@ def test_the_drop_in_for_large_maps_allows_the_memory_needed():
         most * MIB,
     )
     assert needed_bytes(DEFAULT) <= high * MIB < most * MIB
-    assert afforded(DEFAULT, most * MIB) == DEFAULT
+    assert limited_to_memory(DEFAULT, most * MIB) == DEFAULT
 
 
 def test_the_units_limit_allows_maps_as_large_as_documented():
-    smaller = afforded(DEFAULT, unit_limit())
+    smaller = limited_to_memory(DEFAULT, unit_limit())
     assert needed_bytes(smaller) <= unit_limit("MemoryHigh") * 1.02 < unit_limit()
     pixels, cells = smaller.map.max_pixels // 100_000 / 10, smaller.map.max_lattice_cells // 1000
     guide = " ".join((ROOT / "deploy" / "README.md").read_text().split())
@@ -91,7 +91,7 @@ def test_the_guides_say_the_formula():
 def test_a_mask_is_read_in_what_maps_leave(limit):
     """While the configuration is read again no map and no update are decoded."""
     most = mask_bytes(DEFAULT, limit)
-    assert most + PILLOW_BYTES <= 2 * afforded(DEFAULT, limit).map.max_pixels or (
+    assert most + PILLOW_BYTES <= 2 * limited_to_memory(DEFAULT, limit).map.max_pixels or (
         most == LEAST_MASK_BYTES < BASE_BYTES / 10
     )
     assert most <= mask_bytes(DEFAULT, None)
@@ -112,7 +112,7 @@ def test_queued_messages_are_part_of_the_estimate(max_pixels):
 def test_under_any_limit_no_more_is_taken_than_it_affords(limit, pixels, cells):
     maps = MapConfig(max_pixels=pixels, max_lattice_cells=cells)
     config = structs.replace(DEFAULT, map=maps)
-    smaller = afforded(config, limit)
+    smaller = limited_to_memory(config, limit)
     pixel, cell = unit_bytes(config)
     least = BASE_BYTES + pixel * LEAST_PIXELS + cell * LEAST_CELLS
     assert needed_bytes(smaller) <= max(limit, least)
@@ -120,7 +120,7 @@ def test_under_any_limit_no_more_is_taken_than_it_affords(limit, pixels, cells):
     assert smaller.map.max_lattice_cells <= cells
     if needed_bytes(config) <= int(limit / SPARE):
         assert smaller is config
-    assert afforded(config, None) is config
+    assert limited_to_memory(config, None) is config
 
 
 @pytest.mark.parametrize("side", [500, 2000, 5000])

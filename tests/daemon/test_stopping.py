@@ -67,6 +67,7 @@ def test_a_signal_ends_it_while_it_compiles(tmp_path):
 
 
 def test_it_answers_while_it_plans(tmp_path):
+    """Statuses come once a second; on a busy machine later, but not after more work."""
     with (
         daemon_process(tmp_path, planner=ENDLESS) as running,
         Outsider(running.endpoint) as outsider,
@@ -78,8 +79,12 @@ def test_it_answers_while_it_plans(tmp_path):
         later = outsider.wait_status(lambda status: status["uptime_s"] > since + 2.0)
         counts = ("plans", "unchanged", "outdated", "attempts")
         assert later["plan"] == dict.fromkeys(counts, 0) | {"planning": True}
-        said = sorted({heard.json()["uptime_s"] for heard in outsider.status.heard})
-        assert max(np.diff([moment for moment in said if moment >= since])) < 2.0
+        said = sorted(
+            (status["uptime_s"], status["cpu_s"])
+            for status in (heard.json() for heard in outsider.status.heard)
+            if status["uptime_s"] >= since
+        )
+        assert max(np.diff([cpu_s for _, cpu_s in said])) < 2.0
 
 
 @contextmanager

@@ -109,7 +109,7 @@ HERE = (1.0, 2.0)
 def tried(times, **limits):
     tries = Tries(**{"far": 0.1, "pause": 2.0, "longest": 30.0} | limits)
     for _ in range(times):
-        tries.failed(HERE, 0.0, 0.0)
+        tries.note_failure(HERE, 0.0, 0.0)
     return tries
 
 
@@ -128,7 +128,7 @@ def test_the_place_is_that_of_the_first_failure():
     for step in range(10):
         x = 1.0 + 0.09 * (step % 2)
         tries.moved_to((x, 2.0))
-        tries.failed((x, 2.0), 0.0, 0.0)
+        tries.note_failure((x, 2.0), 0.0, 0.0)
     assert tries.tries(0.0) == 10
     tries.moved_to((1.11, 2.0))
     assert tries.tries(0.0) == 0
@@ -141,6 +141,6 @@ def test_directions_are_counted_apart_and_bounded():
     count = 0
     for degree in range(0, 3600, 7):
         while tries.may_try(math.radians(degree), 1e9):
-            tries.failed(HERE, math.radians(degree), 0.0)
+            tries.note_failure(HERE, math.radians(degree), 0.0)
             count += 1
             assert count <= 8 * 3

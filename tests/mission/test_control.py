@@ -326,7 +326,9 @@ def test_how_far_each_zone_is():
     drive.command("start", {**TWO_ZONES, "passes": 2})
     seen = []
     for _ in range(300):
-        zones = [(zone.begun, zone.cells, zone.covered) for zone in zone_progress(drive.mission)]
+        zones = [
+            (zone.newest_pass, zone.cells, zone.covered) for zone in zone_progress(drive.mission)
+        ]
         seen.append(zones)
         if drive.mission.state is State.DONE:
             break

@@ -15,7 +15,7 @@ from fasaco_edge.mission.orders.keep_outs import KeepOut
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask
 from fasaco_edge.mission.work.idle_places import PERIOD_S, IdlePlaces
 from fasaco_edge.mission.work.order_state import OrderState
-from tests.mission.test_standing_zones import mask_file
+from tests.mission.test_configured_zones import mask_file
 from tests.mission.world import CELL, CONFIG, Drive, building, pose_at, rectangle, with_policy
 from tests.support.processes import slowness
 

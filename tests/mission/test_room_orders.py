@@ -18,7 +18,7 @@ from fasaco_edge.mission.events import MapReceived, PoseReceived, State
 from fasaco_edge.mission.map.frame_selector import PATIENCE_S
 from fasaco_edge.mission.map.placing import are_same
 from fasaco_edge.mission.orders.commands import command_document, read_command
-from fasaco_edge.mission.orders.order import Command, StandingZone, order_document, read_order
+from fasaco_edge.mission.orders.order import Command, ConfiguredZone, order_document, read_order
 from fasaco_edge.mission.orders.passes import PassDocument
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.mission.orders.zones import in_zones
@@ -104,7 +104,7 @@ def test_a_room_is_ordered_by_its_name_and_by_its_number():
 
 
 def test_an_unknown_room_is_refused_with_the_known_ones():
-    zone = StandingZone(name="rug", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
+    zone = ConfiguredZone(name="rug", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
     drive = settled(*BOTH, config=with_policy(CONFIG, zones=(zone,)))
     name(drive, room_at(drive, *IN_EAST).id, "kitchen")
     start(drive, "rug", "attic")
@@ -113,7 +113,7 @@ def test_an_unknown_room_is_refused_with_the_known_ones():
     assert "there are rug; nor a room: there are " in str(drive.refused)
     assert "'kitchen'" in str(drive.refused)
     assert drive.mission.state is State.IDLE
-    # A standing zone comes before a room of its name.
+    # A configured zone comes before a room of its name.
     name(drive, room_at(drive, *IN_WEST).id, "rug")
     start(drive, "rug")
     assert drive.mission.order_state.order.zones[0].polygon == tuple(map(tuple, zone.polygon))
@@ -221,7 +221,7 @@ def test_an_order_for_everything_reports_the_skipped_room(monkeypatch):
 @pytest.mark.parametrize("unknown", ["refuse", "wait"])
 def test_an_unknown_room_number_is_always_refused(zone, where, unknown):
     """Whatever room gets the number next would be swept."""
-    bay = StandingZone(name="bay", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
+    bay = ConfiguredZone(name="bay", polygon=[tuple(at) for at in rectangle(0, 0, 4, 4)])
     drive = settled(*BOTH, config=with_policy(CONFIG, zones=(bay,)))
     drive.command("start", {"zones": [zone], "unknown": unknown})
     assert where in str(drive.refused)

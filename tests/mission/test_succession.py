@@ -26,7 +26,7 @@ def replace(drive):
     after.restore(before.snapshot(), before.order_state)
     after.continue_from(before)
     drive.mission, drive.request, drive.walk, drive.revision = after, None, [], 0
-    drive.tell(*before.held())
+    drive.tell(*before.newest_inputs())
 
 
 def live_through(drive, seconds, without="", **battery):

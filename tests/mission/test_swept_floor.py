@@ -341,7 +341,7 @@ def test_the_reported_windows_contain_all_changes(sigma_m):
 
 def test_it_is_shown_in_pixels_where_these_are_not_too_many():
     floor = drive((0.1, 0.1), (0.5, 0.2))
-    shown = floor.snapshot().shown(10**6, "map", 7)
+    shown = floor.snapshot().as_grid(10**6, "map", 7)
     assert (shown.frame, shown.stamp_ns, shown.geometry.resolution) == ("map", 7, PIXEL_M)
     assert set(np.unique(shown.cells).tolist()) == {0, 100}
     assert np.array_equal(shown.cells > 0, floor.swept_on(shown.geometry))
@@ -351,7 +351,7 @@ def test_it_is_shown_in_pixels_where_these_are_not_too_many():
 @pytest.mark.parametrize("most", [60_000, 1_000, 300, 70, 20, 5])
 def test_too_many_pixels_are_shown_as_squares_with_shares(most):
     floor = drive(*[(-1.0 + 0.05 * n, 0.3) for n in range(90)])
-    shown = floor.snapshot().shown(most, "map", 0)
+    shown = floor.snapshot().as_grid(most, "map", 0)
     rows, cols = shown.cells.shape
     assert shown.cells.size <= most < 64_000
     side = round(shown.geometry.resolution / PIXEL_M)
@@ -365,8 +365,8 @@ def test_too_many_pixels_are_shown_as_squares_with_shares(most):
 
 def test_floor_too_large_for_squares_is_not_shown():
     astray = drive((0.0, 0.0), (9000.0, 9000.0))
-    assert astray.snapshot().shown(10**6, "map", 0) is None
-    blank = NO_FLOOR.shown(10**6, "map", 0)
+    assert astray.snapshot().as_grid(10**6, "map", 0) is None
+    blank = NO_FLOOR.as_grid(10**6, "map", 0)
     assert blank.cells.size
     assert not blank.cells.any()
 

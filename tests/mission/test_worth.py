@@ -173,7 +173,7 @@ def test_a_map_of_dirt_says_what_comes_first():
     # It also holds in a mission that succeeds this one, and within zones.
     after = Mission(drive.config)
     after.restore(order=WAITS)
-    after.step(drive.mission.held(), 0.0)
+    after.step(drive.mission.newest_inputs(), 0.0)
     order = {"zones": [{"name": "all", "polygon": rectangle(0, 0, 10, 21)}], "until_min": 2.5}
     decision = after.step([CommandReceived(1, "start", read_order(order), discard=True)], 1.0)
     assert after.orders.scope.worth.least == 90

@@ -67,7 +67,7 @@ def test_figures_are_sums_and_those_of_each_pass(flat, tmp_path):
     assert told["floor"]["seconds_per_m2"] == pytest.approx(seconds / swept_m2, rel=1e-3)
     for plan in flat.plans:
         # Seconds alone, without the price of a step across.
-        assert plan.cost_s == plan.problem.cost.seconds.of_walk(plan.cells)
+        assert plan.cost_s == plan.problem.cost.without_prices.of_walk(plan.cells)
         assert plan.path.lower_bound_cost_s <= plan.cost_s
     flat.plot(tmp_path / "passes.png")
     with Image.open(tmp_path / "passes.png") as picture:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.kernels.ants.colony import walk_cost
-from fasaco_edge.planners.cost import ACROSS, COLUMNS, ROWS, CoverageCost
+from fasaco_edge.planners.cost import COLUMNS, PRICE_ACROSS, ROWS, CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem, FramedGround
 from tests import naive
 from tests.support.examples import examples
@@ -44,12 +44,12 @@ def test_twin_counts_the_same_price_of_steps_across_lanes(headings, cost, lanes)
     across = sum(bool(col) == (lanes == COLUMNS) for _, col in headings)
     added = laned.row_us or laned.col_us
     assert naive.walk_us(walk, laned) == naive.walk_us(walk, cost) + across * added
-    assert laned.seconds == cost
+    assert laned.without_prices == cost
 
 
 def test_in_a_single_column_each_step_is_along_it():
     ground = CoverageLattice.from_free(np.ones((4, 1), bool))
-    for lanes, added_s in ((ROWS, ACROSS), (COLUMNS, 0.0)):
+    for lanes, added_s in ((ROWS, PRICE_ACROSS), (COLUMNS, 0.0)):
         problem = CoverageProblem.of(ground, (0, 0), cost=CoverageCost().along(lanes))
         flat = np.arange(4, dtype=np.int32)
         framed = FramedGround.of(problem).framed(flat)

@@ -34,7 +34,7 @@ from tests.support.rooms import UNKNOWN, WALL, fill, map_bytes, pose_bytes, room
 CONFIG = {"robot": {"tool_width_m": 0.3, "radius_m": 0.18}, "planner": {"line": "thorough"}}
 KEEP_OUT = [[2.6, 0.4], [3.4, 0.4], [3.4, 1.0], [2.6, 1.0]]
 ZONE = [[0.1, 0.1], [3.9, 0.1], [3.9, 2.3], [0.1, 2.3]]
-# Of a standing zone, by its name: the status has its polygon.
+# Of a configured zone, by its name: the status has its polygon.
 ORDER = {"zones": [{"name": "a"}], "keep_out": [KEEP_OUT], "return_home": True}
 Y = 0.45
 

@@ -181,7 +181,7 @@ def order_both(tab: Tab, outsider: Outsider) -> None:
     assert tab.js("find('roomsnow').textContent") == "Sweep bath, then kitchen"
     assert tab.js("find('roomnow').hidden && find('start').hidden")
     assert tab.js("find('chose').innerText").startswith("You chose or drew bath, kitchen: ")
-    # By number: a standing zone of that name would come first.
+    # By number: a configured zone of that name would come first.
     by_number = "order().zones.every((zone) => roomOf(zone.room).name === zone.name)"
     assert tab.js(f"chosen.size === 2 && {by_number}")
     tab.click("roomsnow")

@@ -190,7 +190,7 @@ def ticks_until(pace, begin_s, end_s, cost_s):
     now_s, count = begin_s, 0
     while now_s < end_s:
         if pace.behind_s(now_s) >= 0.0:
-            pace.ticked(now_s)
+            pace.note_tick(now_s)
             now_s += cost_s
             count += 1
         else:

@@ -15,8 +15,8 @@ from fasaco_edge.simulation.robot import (
     DriveState,
     SimulationConfig,
     corners,
+    corners_to_end,
     driven,
-    joined,
     moved_by,
     passed_waypoints,
     stopping_point,
@@ -136,7 +136,7 @@ def points(*cells):
 
 
 def route(path, came, is_clear=clear):
-    found = joined(path, came, is_clear)
+    found = corners_to_end(path, came, is_clear)
     return None if found is None else np.round(found, 6).tolist()
 
 

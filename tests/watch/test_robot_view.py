@@ -38,17 +38,17 @@ def test_the_path_ahead_begins_at_the_robot():
 def test_progress_on_a_long_piece_is_between_its_points():
     """As of a way home, whose end is nearer to the robot than its next corner."""
     walk = WatchedPath([(0.0, 0.0), (0.0, 5.0), (1.0, 5.0), (1.0, 2.0), (0.6, 2.0)])
-    walk.passed(Pose2D(0.05, 1.5))
+    walk.note_position(Pose2D(0.05, 1.5))
     assert (walk.at, walk.beyond_m) == (0, 1.5)
-    walk.passed(Pose2D(0.05, 4.0))
+    walk.note_position(Pose2D(0.05, 4.0))
     assert (walk.at, walk.beyond_m) == (0, 4.0)
-    walk.passed(Pose2D(1.0, 5.0))
+    walk.note_position(Pose2D(1.0, 5.0))
     assert (walk.at, walk.beyond_m) == (2, 0.0)
     # A path that passes a place again is not cut there.
     out = [(float(step), 0.0) for step in range(20)]
     again = WatchedPath(np.array(out + out[::-1]))
     for x, _ in out[:6]:
-        again.passed(Pose2D(x, 0.1))
+        again.note_position(Pose2D(x, 0.1))
     assert again.at == 5
     later = WatchedPath(walk.xy)
     later.join(Pose2D(1.0, 3.0))

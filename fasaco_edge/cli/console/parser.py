@@ -28,7 +28,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
-        """Return the arguments, and unknown words; ``parser``: parser of the innermost command."""
+        """Return the arguments, with the innermost command's ``parser``; and unknown words."""
         self._given = sys.argv[1:] if args is None else args
         found, unknown = super().parse_known_args(args, namespace)
         if not hasattr(found, "parser"):
@@ -36,14 +36,14 @@ class Parser(argparse.ArgumentParser):
         return found, unknown
 
     def error(self, message: str) -> NoReturn:
-        """Print an error, and exit; a misspelt option comes before a missing argument."""
+        """Print an error, and exit; a misspelt option is reported before a missing argument."""
         lacks_command = message.endswith("required: COMMAND")
         if "arguments are required" in message:
             options = tuple(self._option_string_actions)
             for word in self._given:
                 name = word.partition("=")[0]
                 is_known = any(each.startswith(name) for each in options)
-                # It may be an option of the missing command.
+                # An unknown option may be one of the missing command.
                 is_misspelt = not lacks_command or suggestion(name, options)
                 if name.startswith("--") and not is_known and is_misspelt:
                     self._given = ()
@@ -67,7 +67,7 @@ class Parser(argparse.ArgumentParser):
         except argparse.ArgumentError as error:
             if re.fullmatch(r"-?\d*,\d+", arg_string):
                 point = arg_string.replace(",", ".")
-                # Not if that is no value, either, as of an option that takes whole numbers.
+                # No suggestion where the point is wrong, too, as an option takes whole numbers.
                 with suppress(argparse.ArgumentError):
                     super()._get_value(action, point)
                     error.message += f"; did you mean {point}?"

@@ -36,10 +36,10 @@ from fasaco_edge.wire.documents.replies import CoverageReport
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Truth:
-    """The building, the robots' trails (n, 2) [m], and the floor swept by all, and by each."""
+    """The building, the robots' tracks (n, 2) [m], and the floor swept by all, and by each."""
 
     grid: OccupancyGrid
-    trails: list[NDArray[np.float64]]
+    tracks: list[NDArray[np.float64]]
     floor: JudgedFloor
     floors: list[JudgedFloor]
 
@@ -194,18 +194,18 @@ def _time(summary: DemoSummary) -> str:
 
 
 def _truth(args: argparse.Namespace, robots: Sequence[DemoRobot]) -> _Truth:
-    grid, trails = read_map(find_map(args.map)), [_trail(robot) for robot in robots]
-    x, y = trails[0][0].tolist()
+    grid, tracks = read_map(find_map(args.map)), [_track(robot) for robot in robots]
+    x, y = tracks[0][0].tolist()
     sweeper = SweepingRobot(args.cell, args.robot_radius)
-    floors = [judge_floor(grid, trail, sweeper, stands_at=(x, y)) for trail in trails]
-    # The segments from the end of one trail to the start of the next are not driven.
-    driven = np.ones(sum(map(len, trails)) - 1, np.bool_)
-    driven[np.cumsum([len(trail) for trail in trails])[:-1] - 1] = False
-    floor = judge_floor(grid, np.vstack(trails), sweeper, driven=driven, stands_at=(x, y))
-    return _Truth(grid, trails, floor, floors)
+    floors = [judge_floor(grid, track, sweeper, stands_at=(x, y)) for track in tracks]
+    # The segments from the end of one track to the start of the next are not driven.
+    driven = np.ones(sum(map(len, tracks)) - 1, np.bool_)
+    driven[np.cumsum([len(track) for track in tracks])[:-1] - 1] = False
+    floor = judge_floor(grid, np.vstack(tracks), sweeper, driven=driven, stands_at=(x, y))
+    return _Truth(grid, tracks, floor, floors)
 
 
-def _trail(robot: DemoRobot) -> NDArray[np.float64]:
+def _track(robot: DemoRobot) -> NDArray[np.float64]:
     if not robot.trail.exists():
         raise ProcessEnded("the robot never drove", hint=f"see {robot.folder / 'robot.log'}")
     return np.loadtxt(robot.trail, delimiter=",", skiprows=1, ndmin=2)
@@ -221,12 +221,12 @@ def _draw(args: argparse.Namespace, truth: _Truth, summary: DemoSummary) -> None
     geometry = truth.floor.geometry
     lattice = CoverageLattice.from_map(truth.grid, Footprint(args.cell, args.robot_radius))
     unswept = MapLayer(geometry, truth.floor.unswept)
-    if len(truth.trails) > 1:
+    if len(truth.tracks) > 1:
         from fasaco_edge.cli.fleet_wing import draw_fleet_mission
 
         swept = [MapLayer(geometry, floor.swept) for floor in truth.floors]
         names = [robot.name for robot in summary.robots]
-        tracks = dict(zip(names, truth.trails, strict=True))
+        tracks = dict(zip(names, truth.tracks, strict=True))
         title += f" by {len(names)} robots"
         recording = [Path(file) for file in summary.fleet_recording]
         picture = draw_fleet_mission(
@@ -236,7 +236,7 @@ def _draw(args: argparse.Namespace, truth: _Truth, summary: DemoSummary) -> None
         picture = draw_mission(
             truth.grid,
             lattice,
-            truth.trails[0],
+            truth.tracks[0],
             title=title,
             lines=lines,
             swept=MapLayer(geometry, truth.floor.swept),

@@ -107,7 +107,7 @@ class LedgerKeeper:
         return not self._writer.disk.is_behind() or now - self._kept_at > MOST_WAIT_S
 
     def report(self, now: float) -> LedgerReport:
-        """Return this part of the status; ``now`` is monotonic time [s]."""
+        """Return the ledger's part of the status; ``now`` is monotonic time [s]."""
         return self._writer.report(now)
 
     def take_faults(self) -> list[FasacoError]:
@@ -243,7 +243,7 @@ class LedgerWriter:
         self.disk.put(_Pending((why,), None))
 
     def report(self, now: float) -> LedgerReport:
-        """Return this part of the status; ``now`` is monotonic time [s]."""
+        """Return the ledger's part of the status; ``now`` is monotonic time [s]."""
         written_at = self._written_at
         return LedgerReport(
             path=str(self._file.path),

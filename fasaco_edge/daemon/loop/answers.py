@@ -200,7 +200,7 @@ class Commands:
         return command
 
     @property
-    def are_asked(self) -> bool:
+    def has_open_queries(self) -> bool:
         """Whether a query waits for its reply."""
         return bool(self._open or self._status_questions)
 

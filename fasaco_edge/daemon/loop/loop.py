@@ -194,13 +194,13 @@ class Loop:
     ) -> None:
         """Let another mission continue from the ledger, as after a restart of the daemon.
 
-        The turn log ends with ``why``. ``held``: the first events; None for the present map and
-        pose.
+        The turn log ends with ``why``. ``newest_inputs``: the first events; None for the present
+        map and pose.
         """
         self._ports.turns.end(why)
         if config is not None:
             self._status.show(config)
-        held = self._runner.held() if held is None else held
+        held = self._runner.newest_inputs() if held is None else held
         self._runner.restart(config or self.config, held, why)
         self._send_path()
         self._latency = MapLatency()
@@ -295,7 +295,7 @@ class Loop:
         now, failed_at = time.monotonic(), self._failed_at
         self._failed_at = now
         self._status.waits = f"{fault}: waits for another map"
-        held = self._runner.held() if now - failed_at > SOON_S else []
+        held = self._runner.newest_inputs() if now - failed_at > SOON_S else []
         self._restart(str(fault), held=held)
         return Decision(answers=tuple(Answer(asked.number, fault) for asked in commands))
 
@@ -320,7 +320,7 @@ class Loop:
         """Reply to queries; to commands once the ledger has their changes."""
         commands, runner = self._ports.commands, self._runner
         commands.note(answers, now)
-        if commands.are_asked:
+        if commands.has_open_queries:
             report = self._status.reply(runner, now)
             now = time.monotonic()
             is_kept = self._keeper.is_kept(now) and self._rooms.is_kept(now)

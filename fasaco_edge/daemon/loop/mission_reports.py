@@ -173,9 +173,9 @@ def rounded(value: float | None) -> float | None:
 
 
 def mission_report(
-    mission: Mission | None, order_state: OrderState, standing: int = 0
+    mission: Mission | None, order_state: OrderState, configured: int = 0
 ) -> MissionReport:
-    """Return the order and its progress; ``standing``: keep-out zones in force for all orders."""
+    """Return the order and its progress; ``configured``: number of configured keep-outs."""
     order, zone = order_state.order, order_state.current_zone
     home = mission.orders.goal() if mission else order_state.home
     keep_outs = tuple(_keep_outs(order_state))
@@ -188,7 +188,7 @@ def mission_report(
         passes=None if zone is None else zone.passes,
         pass_kind=(zone.kind(order_state.pass_number).name or None) if zone else None,
         zones=tuple(_zones(mission, order_state)),
-        keep_out=len(keep_outs) + standing,
+        keep_out=len(keep_outs) + configured,
         return_home=bool(order and order.return_home),
         home=None if home is None or mission is None else _place(mission, home),
         tries=order_state.tries,
@@ -225,7 +225,7 @@ def _zones(mission: Mission | None, order_state: OrderState) -> Iterator[ZoneRep
             yield ZoneReport(zone.name, zone.passes, polygon=corners)
         return
     for done, (_, corners) in zip(zone_progress(mission), zones, strict=True):
-        counts = done.begun, done.cells, done.covered
+        counts = done.newest_pass, done.cells, done.covered
         yield ZoneReport(done.name, done.passes, *counts, polygon=corners)
 
 

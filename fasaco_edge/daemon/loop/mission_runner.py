@@ -32,8 +32,8 @@ from fasaco_edge.mission.events import (
     PriorityReceived,
     in_runs,
 )
+from fasaco_edge.mission.map.configured_places import ConfiguredPlaces
 from fasaco_edge.mission.map.placing import is_named
-from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.rooms.room_book import RoomBook
 from fasaco_edge.mission.rooms.room_commands import carry_out, check_before_map
 from fasaco_edge.mission.work.order_state import OrderState
@@ -138,7 +138,7 @@ class MissionRunner:
                 carry_out(self.rooms, asked.command, asked.room)
                 return None
             before = self.order_state
-            places = StandingPlaces(self.config.mission, self.config.mission)
+            places = ConfiguredPlaces(self.config.mission, self.config.mission)
             places.restore(before.places)
             if before.frame:
                 places.enter(before.frame)
@@ -159,9 +159,9 @@ class MissionRunner:
             self._keeper.forget()
         return None
 
-    def held(self) -> list[Event]:
+    def newest_inputs(self) -> list[Event]:
         """Return the newest map and pose as events for a new mission."""
-        return self._held.events if self.mission is None else self.mission.held()
+        return self._held.events if self.mission is None else self.mission.newest_inputs()
 
     def step(self, mission: Mission, events: Sequence[Event], now: float) -> Decision:
         """Step the mission, and take over its path for publication."""

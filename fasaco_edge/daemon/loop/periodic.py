@@ -112,7 +112,7 @@ class FloorPublisher:
         if grid is None or not self._due.is_due(key, now, repeats=True):
             return
         self._due.note(key, now, FLOOR_PERIOD_S)
-        shown = floor.snapshot().shown(MOST_SQUARES, grid.frame, grid.stamp_ns)
+        shown = floor.snapshot().as_grid(MOST_SQUARES, grid.frame, grid.stamp_ns)
         if shown is not None:
             shown = replace(shown, geometry=mission.rotation.geometry(shown.geometry))
             self._outbox.put(FLOOR, encode_occupancy_grid(shown))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fasaco_edge.grid.geometry import GridGeometry
     from fasaco_edge.mission.core.mission import Mission
 
-# Limit on the squares of floor that are counted, which bounds the time that this takes the loop.
+# Limit on the squares of floor that are counted: it bounds the time that counting takes.
 MOST_SQUARES = 250_000
 
 
@@ -27,7 +27,7 @@ class RoomShares:
     def of(self, mission: Mission) -> dict[int, float]:
         """Return the swept share of the ordered floor in each room, by the room's number.
 
-        Rooms without such floor are left out: all, where only cells are counted, and in a fleet, as
+        Rooms without such floor are left out. Empty if only cells are counted; and in a fleet, as
         the floor that others sweep is not known.
         """
         sheet, floor = mission.rooms.sheet, mission.line.asked_floor(MOST_SQUARES)

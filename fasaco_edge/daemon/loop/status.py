@@ -100,7 +100,9 @@ class StatusBoard:
         """Show this configuration as the one in force."""
         self._shown_config = config_document(config)
         self._cost = config.robot.cost()
-        self._standing = len(config.mission.keep_out) + bool(config.mission.keep_out_mask)
+        self._configured_keep_outs = len(config.mission.keep_out) + bool(
+            config.mission.keep_out_mask
+        )
 
     def due(self, runner: MissionRunner, now: float) -> Status | None:
         """Return the status if it changed or a second has passed, else None.
@@ -146,7 +148,7 @@ class StatusBoard:
             cpu_s=round(time.process_time(), 3),
             threads=thread_count(),
             config=self._shown_config,
-            mission=mission_report(mission, order_state, self._standing),
+            mission=mission_report(mission, order_state, self._configured_keep_outs),
             fleet=report_of(self._config, mission, now),
             troubles=troubles,
         )
@@ -160,7 +162,7 @@ class StatusBoard:
             reason=reason,
             coverage=coverage_report(runner.mission),
             floor=floor_report(runner.mission),
-            mission=mission_report(runner.mission, runner.order_state, self._standing),
+            mission=mission_report(runner.mission, runner.order_state, self._configured_keep_outs),
             troubles=self._troubles(runner, now),
         )
 
@@ -218,7 +220,7 @@ class StatusBoard:
 
 
 def path_report(path: PublishedPath | None, mission: Mission | None) -> PathReport | None:
-    """Return this part of the status; None before the first path of a mission."""
+    """Return the path's part of the status; None before the first path of a mission."""
     if path is None or not path.revision or mission is None:
         return None
     line = mission.line.ahead()

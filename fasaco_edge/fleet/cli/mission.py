@@ -54,7 +54,7 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
     On a terminal, it asks once for consent for all robots that would forget covered cells.
 
     Args:
-        args: of the command line.
+        args: arguments of the command line.
         asked: the command as a document.
         shown: returns the text to show of an answer; None to show the reason of the robot's state.
 

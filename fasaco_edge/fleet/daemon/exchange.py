@@ -71,7 +71,7 @@ class FleetArrivals:
     this fleet and other publishers are tracked separately, each up to a limited number.
 
     Args:
-        keys: of this robot.
+        keys: keys of this robot.
         fleet: name of its fleet.
     """
 
@@ -224,7 +224,7 @@ class FleetSender:
     """Publisher of this robot's message: once a second, on change, and more often near a robot.
 
     Args:
-        publisher: of the robot's own key.
+        publisher: publisher of the robot's own key.
         config: with a block ``fleet``.
     """
 

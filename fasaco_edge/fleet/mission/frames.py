@@ -141,7 +141,7 @@ class FleetFrames:
 
         Args:
             message: the message in the robot's own frames.
-            map_frame, lattice_deg: of the other robot, see ``FleetFrames``.
+            map_frame, lattice_deg: those of the other robot, see ``FleetFrames``.
         """
         frame = seen_from(map_frame, self._map_frame)
         lattice = seen_from(turned(map_frame, lattice_deg), self._lattice)

@@ -261,7 +261,7 @@ class FleetLayer(Company):
         cells = np.bincount(owners[left], minlength=len(division.parts))
         if not cells[division.names.index(self._robot)]:
             # After a division without a part for this robot, the same cells give it no part again.
-            is_other = self._remainder.had_part or cells.sum() > self._remainder.divided
+            is_other = self._remainder.had_part or cells.sum() > self._remainder.cells_divided
             is_other |= now - self._divided_at >= EVEN_S
             return "own part is done" if left.any() and is_other else ""
         # This robot knows the cells left to each robot only if it can reach all of them.

@@ -24,7 +24,7 @@ class MemberCells:
     """Cells swept by one robot: tiles of bits, and the bits that are disregarded.
 
     Attributes:
-        epoch: of the tiles.
+        epoch: epoch of the tiles.
         lattice: pose of its lattice in this robot's lattice when the tiles arrived [m].
         is_doubtful: whether all cells of this epoch are disregarded: some were disregarded when the
             sender's lattice moved, and their new places are unknown.

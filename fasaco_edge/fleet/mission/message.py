@@ -22,7 +22,7 @@ class Messages:
 
     Args:
         robot: its name.
-        radius_m: of its disc [m].
+        radius_m: radius of its disc [m].
     """
 
     def __init__(self, robot: str, radius_m: float) -> None:
@@ -33,7 +33,7 @@ class Messages:
         """Return the next message; None before the mission has a map and a pose.
 
         Args:
-            mission: of the robot.
+            mission: mission of the robot.
             most: largest number of tiles of progress, and also of tiles of ground.
             most_anew: the same for the first message of an epoch.
         """
@@ -45,7 +45,8 @@ class Messages:
             mission.covered.current.snapshot().tiles,
         )
         if layer.others.shared.epoch != self._epoch:
-            # All tiles are sent again. After a restart, the cells swept before are unknown.
+            # A new epoch sends all tiles again. In the first, the cells swept before it are
+            # unknown.
             before = tiles if self._epoch else None
             self._epoch, self._swept, most = (
                 layer.others.shared.epoch,

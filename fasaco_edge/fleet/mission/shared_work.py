@@ -29,12 +29,12 @@ class Remainder:
         others_go_on: whether only parts of other robots are left, and these robots make progress.
             Once they have swept nothing for STUCK_S, they are stuck until this robot has a part.
         had_part: whether the last division gave this robot a part.
-        divided: number of cells left when that division was made.
+        cells_divided: number of cells left when that division was made.
     """
 
     def __init__(self) -> None:
         self.others_go_on = self.had_part = False
-        self.divided = 0
+        self.cells_divided = 0
         # Largest number of swept cells since this robot had a part, and when that was reached; None
         # while it has a part. The number of cells left is no measure: others also find new cells.
         self._most: tuple[int, float] | None = None
@@ -64,7 +64,7 @@ class Remainder:
 
     def note_division(self, cells: int, own: int, swept: int, now: float) -> None:
         """Take in the same numbers for a new division."""
-        self.had_part, self.divided = own > 0, cells
+        self.had_part, self.cells_divided = own > 0, cells
         self.note(cells, own, swept, now)
 
 
@@ -142,8 +142,8 @@ class DivisionNumbers:
         """Return the robots of the last division that take part, but are not in reach.
 
         This robot's map shows no way to them, or their messages no longer arrive, but the author of
-        the division still reaches them. Robots that are left out would divide again, and leave out
-        the robots that they do not reach.
+        the division still reaches them. If they were left out, they would make a division of their
+        own, without the robots that they do not receive.
         """
         found, seen = [], {robot.name for robot in robots}
         for part in () if division is None else division.parts:

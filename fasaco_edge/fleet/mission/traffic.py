@@ -119,7 +119,7 @@ NEARER_M farther than the other, or about as far and the second | waits |
 
     Args:
         name: its name.
-        radius_m: of its disc [m].
+        radius_m: radius of its disc [m].
         pace_s_m: its time per metre [s/m].
         line: points every SPACING_M from its place along its path, float64 (n, 2), n >= 1.
         neighbours: the other robots, by name.

@@ -55,7 +55,7 @@ class FleetInbox:
     """Samples of robots, each within a share of ``capacity_bytes``.
 
     Args:
-        capacity_bytes: of all robots.
+        capacity_bytes: capacity of all robots together.
         stamp: returns a sample with its time of arrival.
     """
 
@@ -136,7 +136,7 @@ class FleetSubscriptions:
 
     Args:
         bus: the session.
-        keys: of any robot on it.
+        keys: keys of any robot on the bus.
         topics: subscribed to for each robot that has joined.
         post: called with robot, topic and sample, on a thread of Zenoh's.
     """

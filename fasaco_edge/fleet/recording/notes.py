@@ -37,14 +37,14 @@ COMPONENT = f"{entities.INPUTS_ARCHETYPE}:{entities.INPUTS_COMPONENT}"
 # Longest distance between two poses that counts as driven [m]; largest numbers of cells and of
 # plans in a note.
 MOST_STEP_M = 2.0
-MOST_PASSES, MOST_PLANS = 2_000, 200
+MOST_ENTERED, MOST_PLANS = 2_000, 200
 
 Text = Annotated[str, Meta(max_length=256)]
 Count = Annotated[int, Meta(ge=0, le=2**62)]
 
 
 class EnteredCell(msgspec.Struct, frozen=True, array_like=True):
-    """A cell that a robot entered, and the time of that since the recording began [ms]."""
+    """A cell that a robot entered, ``at_ms`` after the recording began."""
 
     at_ms: int
     row: int
@@ -57,7 +57,7 @@ class Note(msgspec.Struct, array_like=True):
     Attributes:
         robot: its number in ``NoteBatch.robots``.
         at_ms: time since the recording began [ms].
-        state: of its mission; "gone" once it is silent.
+        state: state of its mission; "gone" once it is silent.
         x, y: its position in its map frame [m].
         waits_for: name of the robot that it waits for; "" for none.
         division: number of its division.
@@ -65,9 +65,9 @@ class Note(msgspec.Struct, array_like=True):
         messages, bytes: number and bytes of its messages to the fleet.
         driven_m: distance driven [m].
         plans_ms: time of each plan reported [ms].
-        passes: cells that it entered.
-        swept, ground: whole tiles that have changed; all tiles if ``in_force``.
-        in_force: whether this note repeats the content of earlier parts.
+        entered: cells that it entered.
+        swept, ground: whole tiles that have changed; all tiles if ``is_repeated``.
+        is_repeated: whether this note repeats the content of earlier parts.
         stamp_ms: stamp of its newest pose [ms]; 0 without a stamp, and in older recordings.
         time_scale: simulated seconds per second, as configured; 1 for a real robot.
     """
@@ -84,16 +84,16 @@ class Note(msgspec.Struct, array_like=True):
     bytes: Count
     driven_m: float
     plans_ms: list[float]
-    passes: list[EnteredCell]
+    entered: list[EnteredCell]
     swept: list[CellTile]
     ground: list[CellTile]
-    in_force: bool = False
+    is_repeated: bool = False
     stamp_ms: Count = 0
     time_scale: float = 1.0
 
 
 class NotedRobot(msgspec.Struct, frozen=True, array_like=True):
-    """A robot of a fleet: its name, its disc [m], and the seat of its cells (``cells.Seat``)."""
+    """A robot of a fleet: its name, radius [m], and the placement of its cells (``cells.Seat``)."""
 
     name: Text
     radius_m: float
@@ -126,7 +126,7 @@ class PendingNote:
     _stamp_ms: int = 0
     _time_scale: float = 1.0
     _cell: Place | None = None
-    _passes: list[EnteredCell] = field(default_factory=list)
+    _entered: list[EnteredCell] = field(default_factory=list)
     _plans_ms: list[float] = field(default_factory=list)
     _plans: int = -1
     _driven_m: float = 0.0
@@ -140,9 +140,9 @@ class PendingNote:
             # A correction of its pose does not count as driven.
             self._driven_m += step_m if step_m < MOST_STEP_M else 0.0
         self._pose = pose
-        if cell != self._cell and len(self._passes) < MOST_PASSES:
+        if cell != self._cell and len(self._entered) < MOST_ENTERED:
             self._cell = cell
-            self._passes.append(EnteredCell(at_ms, *cell))
+            self._entered.append(EnteredCell(at_ms, *cell))
 
     def note_status(self, status: Status) -> None:
         """Take in a status: the time of a plan made since the last status, and the time scale."""
@@ -176,17 +176,17 @@ class PendingNote:
             bytes=traffic[1],
             driven_m=round(self._driven_m, 3),
             plans_ms=[round(ms, 2) for ms in self._plans_ms],
-            passes=self._passes,
+            entered=self._entered,
             swept=member.swept.changed(),
             ground=member.ground.changed(),
             stamp_ms=self._stamp_ms,
             time_scale=self._time_scale,
         )
-        self._driven_m, self._passes, self._plans_ms = 0.0, [], []
+        self._driven_m, self._entered, self._plans_ms = 0.0, [], []
         return note
 
 
-def in_force(member: ObservedRobot, at_ms: int) -> Note:
+def note_of_all_cells(member: ObservedRobot, at_ms: int) -> Note:
     """Return a note of all cells received from a robot up to now."""
     said = member.newest
     return Note(

@@ -26,7 +26,7 @@ from fasaco_edge.fleet.recording.notes import (
     NoteBatch,
     PendingNote,
     encode_notes,
-    in_force,
+    note_of_all_cells,
     noted,
 )
 from fasaco_edge.fleet.recording.scene import FleetScene
@@ -259,7 +259,10 @@ class FleetRecorder(BusRecorder):
         if self._part != self.writer.part_number:
             self._part = self.writer.part_number
             at_ms = self._notes[0].at_ms if self._notes else self._ms(self.writer.wall_ns)
-            self._notes = [*(in_force(member, at_ms) for member in self._members), *self._notes]
+            self._notes = [
+                *(note_of_all_cells(member, at_ms) for member in self._members),
+                *self._notes,
+            ]
         if not self._notes:
             return
         robots = [noted(member) for member in self._members]

@@ -45,9 +45,9 @@ MOST_PIXELS = 2_000_000
 REFRAME = 0.15
 MAP_ORDER, SHARE_ORDER, SWEPT_ORDER, TWICE_ORDER = 0.0, 1.0, 2.0, 3.0
 SHARE_ALPHA, SWEPT_ALPHA, TWICE_COLOUR = 55, 150, (60, 60, 70, 150)
-PATH_Z, TRAIL_Z, LABEL_Z = 0.05, 0.04, 0.1
-TRAIL_SPACING_M = 0.05
-MOST_TRAIL = 4_000
+PATH_Z, TRACK_Z, LABEL_Z = 0.05, 0.04, 0.1
+TRACK_SPACING_M = 0.05
+MOST_TRACK = 4_000
 METRICS = ("swept_m2", "left_cells")
 STATES = {
     **draw.STATES[entities.MISSION_STATE],
@@ -62,7 +62,7 @@ class _RobotDrawings:
 
     state: str = ""
     known: Bounds | None = None
-    trail: list[tuple[float, float]] = field(default_factory=list)
+    track: list[tuple[float, float]] = field(default_factory=list)
     figures: dict[str, float] = field(default_factory=dict)
 
 
@@ -108,7 +108,7 @@ class FleetScene:
         self._show()
 
     def add_pose(self, member: ObservedRobot, pose: Pose2D) -> None:
-        """Move a robot, and add to its trail."""
+        """Move a robot, and add to its track."""
         x, y = self._here(member, pose.x, pose.y)
         placed = Pose2D(x, y, pose.yaw + member.seat.frame.yaw)
 
@@ -118,21 +118,21 @@ class FleetScene:
 
         self._draw(member, "pose", 60, draw_pose)
         drawn = self._drawn[member.name]
-        last = drawn.trail[-1] if drawn.trail else None
-        if last is not None and abs(last[0] - x) + abs(last[1] - y) < TRAIL_SPACING_M:
+        last = drawn.track[-1] if drawn.track else None
+        if last is not None and abs(last[0] - x) + abs(last[1] - y) < TRACK_SPACING_M:
             return
-        drawn.trail.append((x, y))
-        if len(drawn.trail) > MOST_TRAIL:
-            # If the trail has not been drawn for long, every other point is dropped.
-            drawn.trail = drawn.trail[::2]
+        drawn.track.append((x, y))
+        if len(drawn.track) > MOST_TRACK:
+            # If the track has not been drawn for long, every other point is dropped.
+            drawn.track = drawn.track[::2]
 
-        def draw_trail() -> None:
-            piece, drawn.trail = drawn.trail, drawn.trail[-1:]
+        def draw_track() -> None:
+            piece, drawn.track = drawn.track, drawn.track[-1:]
             if len(piece) > 1:
-                line = _line(np.array(piece), TRAIL_Z)
+                line = _line(np.array(piece), TRACK_Z)
                 self._writer.log(_world(member, "trail"), line, size=12 * len(piece))
 
-        self._draw(member, "trail", 24 * len(drawn.trail), draw_trail)
+        self._draw(member, "trail", 24 * len(drawn.track), draw_track)
 
     def add_path(self, member: ObservedRobot, xy: NDArray[np.float64]) -> None:
         """Draw the path ahead of a robot."""

@@ -33,7 +33,7 @@ TRACK_PX = 1.6
 def draw_fleet_mission(
     grid: OccupancyGrid,
     lattice: CoverageLattice,
-    trails: Mapping[str, NDArray[np.float64]],
+    tracks: Mapping[str, NDArray[np.float64]],
     swept: Sequence[MapLayer],
     unswept: MapLayer,
     recording: Sequence[Path],
@@ -46,7 +46,7 @@ def draw_fleet_mission(
     Args:
         grid: the map at the end.
         lattice: the planning grid at the end.
-        trails: driven positions (x, y) of each robot [m], by name, float64 (n, 2), n >= 1.
+        tracks: driven positions (x, y) of each robot [m], by name, float64 (n, 2), n >= 1.
         swept: reachable floor that each robot swept, in the same order, all on one raster.
         unswept: reachable floor that no robot swept.
         recording: files of the fleet's recording, for the robots' colours.
@@ -54,15 +54,15 @@ def draw_fleet_mission(
         lines: caption below it.
     """
     plot = Plot(
-        PlotView.over(bounds_of(grid, lattice, np.vstack(list(trails.values()))), lattice.cell_m)
+        PlotView.over(bounds_of(grid, lattice, np.vstack(list(tracks.values()))), lattice.cell_m)
     )
     plot.ground(grid)
     key = [KeyEntry("disc", palette.START, "start"), KeyEntry("square", palette.END, "end")]
     times = np.zeros(unswept.mask.shape, np.int8)
-    numbers = {name: number for number, name in enumerate(trails)}
+    numbers = {name: number for number, name in enumerate(tracks)}
     with suppress(UnreadableRecording):
         numbers |= numbers_of(recording)
-    for name, layer in zip(trails, swept, strict=True):
+    for name, layer in zip(tracks, swept, strict=True):
         number = numbers[name]
         plot.paint(layer, robot_tint(number))
         times += layer.mask
@@ -73,10 +73,10 @@ def draw_fleet_mission(
     plot.paint(twice, palette.RULE)
     key.append(KeyEntry("tile", palette.RULE, f"by two or more ({twice.area_m2:,.1f} m2)"))
     key += draw_floor(plot, unswept, *UNSWEPT)
-    for name, trail in trails.items():
-        plot.line(trail, _track_colour(numbers[name]), TRACK_PX)
-        plot.end_mark(trail[-1])
-        plot.start_mark(trail[0])
+    for name, track in tracks.items():
+        plot.line(track, _track_colour(numbers[name]), TRACK_PX)
+        plot.end_mark(track[-1])
+        plot.start_mark(track[0])
     return Sheet(title, lines, key, None, plot.view.scale).around(plot.finished())
 
 
@@ -89,7 +89,7 @@ def _track_colour(number: int) -> palette.Colour:
     return palette.robot(number)[1]
 
 
-# Share from which a cell counts as swept again.
+# Share of a robot's steps in a cell that sweep again, from which the cell counts as swept again.
 MOSTLY = 0.5
 
 
@@ -119,7 +119,7 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
         plot.paint(layer(np.array(some, np.int64).reshape(-1, 2)), colour)
         key.append(KeyEntry("tile", colour, f"after another robot {what}, {area_m2:.1f} m2"))
     for track in review.tracks:
-        rows, cols = track.passes[:, 1], track.passes[:, 2]
+        rows, cols = track.entered[:, 1], track.entered[:, 2]
         points = np.array(
             [geometry.to_map(c - window.col0 + 0.5, r - window.row0 + 0.5)
              for r, c in zip(rows.tolist(), cols.tolist(), strict=True)]

@@ -52,8 +52,8 @@ class FleetRobotFigures(msgspec.Struct, frozen=True):
         waits, longest_wait_s: number of waits; the longest wait [s].
         driven_m: distance driven, by its poses [m].
         swept_m2: area of the cells that it swept [m2].
-        through_m2: area of these that another robot had swept, and it only drove through [m2].
-        again_m2: area of these that another robot had swept, and it swept again [m2].
+        through_m2: area of these cells that it only drove through, after another robot [m2].
+        again_m2: area of these cells that it swept again, after another robot [m2].
         messages_s, kb_s: rate of its messages to the fleet [1/s], [kB/s].
         peak_kb_s: the highest rate over five seconds [kB/s].
         plans: number of plans reported.
@@ -116,10 +116,10 @@ class FleetReview:
     """A fleet's recording, read.
 
     Attributes:
-        figures: of the fleet.
-        seat: of the lattice of all cells.
+        figures: figures of the fleet.
+        seat: seat of the lattice of all cells.
         ground: cells that any robot could reach, int64 (n, 2).
-        tracks: of each robot.
+        tracks: the track of each robot.
     """
 
     figures: FleetFigures
@@ -162,7 +162,7 @@ def find_again(tracks: Sequence[RobotTrack], ground: Cells) -> None:
 def _find_again_of(
     track: RobotTrack, others: Sequence[RobotTrack], known: NDArray[np.bool_], window: Window
 ) -> None:
-    steps = [(ms, (row, col)) for ms, row, col in track.passes.tolist()]
+    steps = [(ms, (row, col)) for ms, row, col in track.entered.tolist()]
     foreign = [
         any(other.swept_ms.get(cell, NEVER_MS) < ms for other in others) for ms, cell in steps
     ]

@@ -49,7 +49,7 @@ class RobotTrack:
         number: its number in the order of joining, which decides its colour.
         notes: in order of time.
         swept_ms: the cells that it swept, with the time of their first report [ms].
-        passes: the cells that it entered, in order, int64 (n, 3): time [ms], row, col.
+        entered: the cells that it entered, in order, int64 (n, 3): time [ms], row, col.
         again: the cells of ``swept_ms`` that another robot had swept before, each with the share of
             the robot's steps there that counts as sweeping again.
         clock: conversion of the recorder's time to the robot's seconds since the recording began.
@@ -59,7 +59,7 @@ class RobotTrack:
     number: int = 0
     notes: list[Note] = field(default_factory=list)
     swept_ms: dict[Place, int] = field(default_factory=dict)
-    passes: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    entered: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
     again: dict[Place, float] = field(default_factory=dict)
     clock: RobotClock = field(default_factory=lambda: RobotClock(0))
 
@@ -71,7 +71,7 @@ def seat_of(robot: NotedRobot) -> Seat:
 def tracks_of(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack], Cells]:
     """Return the robots by name, and the cells that any of them could reach."""
     tracks: dict[str, RobotTrack] = {}
-    passes: dict[str, list[NDArray[np.int64]]] = {}
+    entered: dict[str, list[NDArray[np.int64]]] = {}
     ground: list[Cells] = []
     for batch in batches:
         for note in batch.notes:
@@ -81,15 +81,15 @@ def tracks_of(batches: Sequence[NoteBatch], seat: Seat) -> tuple[list[RobotTrack
             for cell in own.carried(cells_of(note.swept), seat).tolist():
                 track.swept_ms.setdefault((cell[0], cell[1]), note.at_ms)
             ground.append(np.unique(own.carried(cells_of(note.ground), seat), axis=0))
-            if note.in_force:
+            if note.is_repeated:
                 continue
             track.notes.append(note)
-            if note.passes:
-                passed = np.array([(p.at_ms, p.row, p.col) for p in note.passes], np.int64)
+            if note.entered:
+                passed = np.array([(p.at_ms, p.row, p.col) for p in note.entered], np.int64)
                 passed[:, 1:] = own.carried(passed[:, 1:], seat)
-                passes.setdefault(robot.name, []).append(passed)
-    for name, pieces in passes.items():
-        tracks[name].passes = np.concatenate(pieces)
+                entered.setdefault(robot.name, []).append(passed)
+    for name, pieces in entered.items():
+        tracks[name].entered = np.concatenate(pieces)
     for track in tracks.values():
         track.clock = _clock(track.notes)
     return sorted(tracks.values(), key=lambda track: track.name), together(ground)

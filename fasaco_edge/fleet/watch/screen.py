@@ -164,9 +164,9 @@ def _stamped(topic: str, sample: Sample) -> Arrival:
     return Arrival(topic, sample, at_ns, at_ns)
 
 
-# Longest time to wait for the other robots after the first message; time within which each robot
-# sends a message, as it sends one per second [s].
-REST_S, SENT_S = 4.0, 1.3
+# Longest wait for the other robots after the first message [s]. A robot sends a message per second:
+# within SENT_S [s] each robot has sent one.
+MOST_WAIT_S, SENT_S = 4.0, 1.3
 # Period of printing JSON [s].
 EVERY_S = 1.0
 
@@ -174,7 +174,7 @@ EVERY_S = 1.0
 class FleetWatch(Watched):
     """The watch of a fleet, see ``live.Watched``."""
 
-    rest_s = REST_S
+    most_wait_s = MOST_WAIT_S
     view: FleetView
 
     def __init__(self, feed: FleetFeed, view: FleetView, console: Console) -> None:

@@ -55,8 +55,8 @@ class BatteryGauge:
         self.level: float | None = None
         self.power = ""
         self.received_at = float("-inf")
-        # Time of the last message; time of the last accepted level, before the first that of
-        # ``start_timeout``.
+        # Time of the last message; time of the last accepted level, or before the first level, time
+        # of ``start_timeout``.
         self._noted_at = float("-inf")
         self._accepted_at: float | None = None
         # A level not accepted yet, and the time of its first report.

@@ -196,7 +196,7 @@ class Executive:
         return self._work.wait_for_room(name, self._now) if name else None
 
     def _judge_path(self) -> None:
-        """Want a plan if the path no longer serves the order."""
+        """Ask for a plan if the path no longer serves the order."""
         cell, now = self._cell, self._now
         if self._state in DRIVING:
             self._checks.check(cell, now, is_covering=self._state is State.COVERING)

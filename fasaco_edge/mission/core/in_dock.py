@@ -29,7 +29,7 @@ class InDock:
     def holds(self, *, is_charging: bool) -> bool:
         """Return whether the robot is in its dock.
 
-        Its base may have driven it there, to a cell that is not coverable.
+        The dock may be in a cell that is not coverable, to which the base has driven by itself.
 
         Args:
             is_charging: whether the mission already counts it as docked.

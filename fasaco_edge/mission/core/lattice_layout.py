@@ -135,7 +135,8 @@ class LatticeLayout:
     def restore(self, before: LedgerSnapshot, lay: Laid) -> bool:
         """Keep angle and edge of a ledger's cells; return whether that changes the layout.
 
-        The ledger is from before a restart. Its edge is kept only if the present pass has it, too.
+        The ledger is from before a restart. Its edge of cells is kept only if the present pass has
+        the same.
         """
         was, deg = (self.deg, self.cell_m), before.lattice_deg
         if deg == lay.angle_deg:

@@ -143,7 +143,8 @@ class Mission:
     def continue_from(self, before: Mission) -> None:
         """Take over a predecessor's state of robot and inputs, and its doubt about the building.
 
-        To be called before the first step, which gets the events of the predecessor's ``held``.
+        To be called before the first step, which gets the events of the predecessor's
+        ``newest_inputs``.
         """
         self._executive.continue_from(before._executive)
         if before.rotation != self.rotation or before._layout.cell_m != self._layout.cell_m:
@@ -154,7 +155,7 @@ class Mission:
         if before.is_in_doubt:
             self.map.continue_from(before.map)
 
-    def held(self) -> list[Event]:
+    def newest_inputs(self) -> list[Event]:
         """Return the newest map, pose and priorities as events for a succeeding mission."""
         monitor = self._executive.monitor
         priorities = self.rotation.grid(self.orders.scope.worth.given)
@@ -191,7 +192,7 @@ class Mission:
         if path is not None:
             path = self.rotation.path(path, self.lattice)
             path = replace(path, speed_m_s=self.order_state.speed_m_s)
-        plan = decided.plan and self._trail.posed(decided.plan)
+        plan = decided.plan and self._trail.with_trail(decided.plan)
         return replace(happened, plan=plan, path=path)
 
     def _find_rooms(self, happened: Decision, now: float) -> Decision:
@@ -236,7 +237,7 @@ class Mission:
         before, route, restart = self.snapshot(), self.route, self.covered.before
         order = replace(self.order_state, reached=self.orders.reached)
         is_confirmed = self.covered.is_confirmed and not self.map.building.is_foreign
-        executive, held = self._executive, self.held()
+        executive, held = self._executive, self.newest_inputs()
         # The robot must not drive a path that is no longer checked.
         stop = route.stop(why, now)
         self._lay_cells()

@@ -42,13 +42,13 @@ class OrderChanges:
     # Whether the robot is in no fleet: the robots of a fleet have the same cells.
     is_alone: bool
     # Keep-out polygons that apply to every order.
-    _standing: tuple[Polygon, ...] = field(default=(), init=False)
+    _configured: tuple[Polygon, ...] = field(default=(), init=False)
     # The version of the rooms and the order at the last comparison.
     _followed: tuple[int, MissionOrder | None] = field(default=(-1, None), init=False)
 
     def __post_init__(self) -> None:
         policy = self.config.policy
-        self._standing = policy.keep_out + mask_polygons(policy.keep_out_mask)
+        self._configured = policy.keep_out + mask_polygons(policy.keep_out_mask)
 
     @property
     def lattice_deg(self) -> float:
@@ -68,11 +68,11 @@ class OrderChanges:
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:
             drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
-        self.map.ground.keep_out(self._standing + ordered + drawn, self.map.grid)
+        self.map.ground.keep_out(self._configured + ordered + drawn, self.map.grid)
         self.line.receive_map()
 
     def update_area(self) -> None:
-        """Update the reachable area; want a new plan if it changed."""
+        """Update the reachable area; ask for a new plan if the area has changed."""
         before, route = self.map.area, self.route
         self.map.update_area()
         area = self.map.area
@@ -139,7 +139,7 @@ class OrderChanges:
         return update
 
     def follow_rooms(self) -> None:
-        """Let zones of the order follow their rooms; want a plan if the cells to cover change."""
+        """Let zones of the order follow their rooms; ask for a plan if cells to cover change."""
         book, state = self.rooms.book, self.orders.order_state
         if self._followed == (book.version, state.order) or state.order is None:
             return
@@ -183,7 +183,7 @@ class OrderChanges:
         return None
 
     def _replan(self) -> int:
-        """Want a full new plan; return its number, or raise CommandError if none can be made."""
+        """Ask for a full new plan; return its number, or raise CommandError if none can be made."""
         if self.map.ground.lattice is None:
             raise CommandError("nothing to plan: there is no map yet", hint="publish a map first")
         if self.map.pose is None:

@@ -23,7 +23,7 @@ class PathChecks:
         self._ledger, self._monitor, self._orders = parts.ledger, parts.monitor, parts.orders
         self._route, self._line, self._standing = parts.route, parts.line, parts.standing
         self._company = parts.company
-        self._orders.ask_for_floor(self._sum_up)
+        self._orders.describe_floor_by(self._sum_up)
         self._worth_at = self._timed_at = float("-inf")
         # Number of covered cells and its time [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None
@@ -37,7 +37,7 @@ class PathChecks:
             check(cell, now)
 
     def _check_deviation(self, cell: Cell, now: float) -> None:
-        """Want a new plan for a robot that is off its path or at its end."""
+        """Ask for a new plan for a robot that is off its path or at its end."""
         route, monitor, path = self._route, self._monitor, self._route.path
         waited = self._standing.has_waited
         if self._drives_in_vain(now):
@@ -92,7 +92,7 @@ class PathChecks:
         return f"{floor}; {FAR_APART}, and what lies between them does not count"
 
     def _check_worth(self, _: Cell, now: float) -> None:
-        """Want a new plan for a fleet's robot if others have swept all cells ahead."""
+        """Ask for a new plan for a robot of a fleet if others have swept all cells ahead."""
         route = self._route
         is_due = self._company.has_members and now - self._worth_at >= WORTH_S
         if not is_due or len(route.path.ahead) <= 1:
@@ -102,12 +102,12 @@ class PathChecks:
             route.requests.want("others have swept what lay ahead")
 
     def _check_room(self, cell: Cell, _: float) -> None:
-        """Want a new plan if new rooms show that the robot has another room to finish first."""
+        """Ask for a new plan if new rooms show that the robot has another room to finish first."""
         if self._orders.scope.is_in_other_room(cell):
             self._route.requests.want("rooms have changed: another one first")
 
     def _check_time(self, _: Cell, now: float) -> None:
-        """Want a new plan with the most worthwhile floor first if time or battery do not suffice
+        """Ask for a new plan with the most worthwhile floor first if time or battery do not suffice
         for all."""
         orders, route = self._orders, self._route
         is_limited = orders.scope.worth.may_work_s < float("inf")

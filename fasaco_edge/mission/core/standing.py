@@ -86,7 +86,7 @@ class Standing:
     def is_at(self, last: Cell | None) -> bool:
         """Return whether the robot stands in the last cell of a path that it did not complete.
 
-        Its index on the path is lower than the last, as it has missed a cell.
+        The robot's index on the path is then below the last, as it has missed a cell.
         """
         if self._cell != last or last == tuple(self._route.path.ahead[0].tolist()):
             return False

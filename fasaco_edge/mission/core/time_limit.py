@@ -31,7 +31,7 @@ class Lapse:
 
     def __init__(self, map_state: MapState) -> None:
         self._map = map_state
-        # Our time [s] and the pose's stamp [ns] at the start, 0 without a pose; None before it.
+        # Our time [s] and the pose's stamp [ns] at the start; the stamp is 0 without a pose.
         self._since: tuple[float, int] | None = None
 
     @property
@@ -95,7 +95,7 @@ class TimeLimit:
 
     @property
     def left_s(self) -> float | None:
-        """Time at the last look until the robot has to be home; None without a limit [s]."""
+        """Time until the robot has to be home, at the last estimate [s]; None without a limit."""
         state = self.orders.order_state
         if not self.minutes or state.stage is Stage.OVER:
             return None

@@ -1,10 +1,10 @@
 """Drive meter: the robot's speed and the durations of its turns, by its poses.
 
-A turn is measured from ``BESIDE_S`` before it to ``BESIDE_S`` after it. Its duration is this time
-minus the time of the distance at full speed. So it includes braking and starting, as
-``robot.quarter_turn_s`` does. Only turns faster than ``TURNS_RAD_S`` between two straight stretches
-count. The results are medians, so waits at a few turns change little. Times are by the poses'
-stamps.
+A turn is measured from ``BESIDE_S`` before it to ``BESIDE_S`` after it. The duration of the turn is
+this time, less the time that the distance takes at full speed. So it includes braking and starting,
+as ``robot.quarter_turn_s`` does. Only turns faster than ``TURNS_RAD_S`` between two straight
+stretches count. The results are medians, so waits at a few turns change little. Times are by the
+poses' stamps.
 """
 
 from __future__ import annotations

@@ -162,7 +162,7 @@ class FloorSnapshot:
         """Return which pixels of ``window`` were swept, bool (rows, cols)."""
         return swept_in(self.tiles, window)
 
-    def shown(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
+    def as_grid(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
         """Return the swept share of each square as a grid, in percent, rounded down.
 
         The squares are as small as possible, but at most ``most``. None if even the largest are too

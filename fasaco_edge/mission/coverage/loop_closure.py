@@ -257,11 +257,11 @@ def closes_cells(change: LatticeChange | None) -> bool:
 
 def small_shift(before: OccupancyGrid, after: OccupancyGrid, footprint: Footprint) -> Motion | None:
     """Return the shift of a map since the previous one; None for none."""
-    rows, cols = np.nonzero(_wall_faces(after.cells, footprint))
-    stride = 1 + len(rows) // MOST_PIXELS
-    rows, cols = rows[::stride], cols[::stride]
-    if not len(rows):
+    faces = np.flatnonzero(_wall_faces(after.cells, footprint))
+    faces = faces[:: 1 + len(faces) // MOST_PIXELS]
+    if not len(faces):
         return None
+    rows, cols = np.divmod(faces, after.cells.shape[1])
     x, y = after.geometry.to_map(cols.astype(np.float64) + 0.5, rows.astype(np.float64) + 0.5)
     occupied, unit = before.cells >= footprint.occupied_at_least, after.geometry.resolution
     steps = range(-FARTHEST_PX, FARTHEST_PX + 1)
@@ -271,7 +271,7 @@ def small_shift(before: OccupancyGrid, after: OccupancyGrid, footprint: Footprin
         at_col, at_row = before.geometry.to_pixels(x - right * unit, y - up * unit)
         row, col = np.floor(at_row).astype(np.int64), np.floor(at_col).astype(np.int64)
         inside = (row >= 0) & (col >= 0) & (row < occupied.shape[0]) & (col < occupied.shape[1])
-        alike[index] = np.count_nonzero(occupied[row[inside], col[inside]]) / len(rows)
+        alike[index] = np.count_nonzero(occupied[row[inside], col[inside]]) / len(faces)
         if alike[0] > 1.0 - BETTER:
             return None
     best = int(np.argmax(alike >= alike.max() - ALIKE))

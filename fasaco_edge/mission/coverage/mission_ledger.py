@@ -69,7 +69,7 @@ class PassedCells:
         self._cells: dict[Cell, None] = {}
 
     def clear(self) -> None:
-        """Forget all of them."""
+        """Forget all passed cells."""
         self._cells.clear()
 
     def add(self, cell: Cell) -> None:

@@ -17,9 +17,10 @@ Inside = Callable[[Cells, Cells], NDArray[np.bool_]]
 class OthersCells:
     """The cells that other robots have swept, a part of the ledger; here none.
 
-    A robot that has left its fleet keeps what the others had swept, in case it joins again. Once it
-    forgets cells of its own, it drops that: it would bring the forgotten cells back as swept. The
-    ledger calls ``record_forgotten`` with ``clear``, ``leave_building`` and ``reset``, too.
+    A robot that has left its fleet keeps the cells that others had swept, in case it joins again.
+    Once it forgets cells of its own, it drops all others, too: else forgotten cells that others had
+    swept would still count. The ledger calls ``record_forgotten`` with ``clear``,
+    ``leave_building`` and ``reset``, too.
 
     Attributes:
         version: counter of changes.

@@ -104,7 +104,7 @@ class Curver:
         Args:
             ahead: the line.
             floor: the floor under it.
-            pose: of the robot.
+            pose: pose of the robot.
         """
         count = len(ahead.line)
         curved = ahead.line.first_below(CURVED)
@@ -140,7 +140,7 @@ class Curver:
 
         Args:
             xy: float64 (n, 2): x, y [m], from the robot on.
-            pose: of the robot.
+            pose: pose of the robot.
         """
         if len(xy) < 2:
             return np.full(len(xy), pose.yaw)

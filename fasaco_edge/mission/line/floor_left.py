@@ -48,9 +48,9 @@ class FloorToSweep(NamedTuple):
     Attributes:
         asked_m2: reachable floor that is asked for, swept or not [m2]; while the robot is shut in,
             all that was reachable since the order began.
-        ahead_m2: the unswept part of it that the line ahead sweeps [m2].
-        left_m2: the unswept part of it that the line ahead does not sweep [m2].
-        passed_m2: the rest of the unswept part: floor that the line has passed, and strips as
+        ahead_m2: unswept part of ``asked_m2`` that the line ahead sweeps [m2].
+        left_m2: unswept part of ``asked_m2`` that the line ahead does not sweep [m2].
+        passed_m2: unswept rest of ``asked_m2``: floor that the line has passed, and strips as
             narrow as a pixel [m2].
         beyond_m2: free floor out of the tool's reach, asked for or not, by reason [m2].
         possible_m2: floor that would be reachable if walls were a pixel thinner than on the map

@@ -235,7 +235,7 @@ class LineAhead:
     def leads_on(self, xy: Points) -> bool:
         """Return whether the robot can drive straight to the first of some points, and along them.
 
-        ``xy``: float64 (n, 2): x, y [m]; False without any.
+        ``xy``: float64 (n, 2): x, y [m]; False for no points.
         """
         points = [np.array(map_to_raster(self._geometry, x, y)) for x, y in xy.tolist()]
         ways = pairwise([self._place.here, *points])

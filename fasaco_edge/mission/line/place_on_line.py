@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Point
 from fasaco_edge.mission.line.polyline import Numbers, Points
 
-# The robot's place is searched this far ahead on its line, or as far as it may have driven [m]:
-# beyond, another lane may be as near.
+# The robot's place on its line is searched for up to this far ahead, or as far as it may have
+# driven [m]: farther ahead, another lane may be as near.
 LOOK_AHEAD_M = 0.8
 # A robot has arrived within ARRIVED_M of the end of its line [m]. A robot beside its line has
 # arrived once its tool covers the end, and STANDING_POSES in a row come no nearer.

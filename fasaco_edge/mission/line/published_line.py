@@ -41,7 +41,7 @@ class PublishedLine:
     """Compares the line with the published one.
 
     Args:
-        speed_m_s: of the robot.
+        speed_m_s: speed of the robot.
     """
 
     def __init__(self, speed_m_s: float) -> None:
@@ -142,7 +142,7 @@ class Publication:
 
     Args:
         route: numbers the paths.
-        speed_m_s: of the robot.
+        speed_m_s: speed of the robot.
     """
 
     def __init__(self, route: Route, speed_m_s: float) -> None:

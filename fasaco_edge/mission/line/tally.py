@@ -100,8 +100,8 @@ class SweepTally:
 
         Args:
             part: window of the raster.
-            wanted: bool (rows, cols) of it, the floor asked for; None for no change.
-            swept: bool (rows, cols) of it, the floor that the robot has swept.
+            wanted: bool (rows, cols) of ``part``, the floor asked for; None for no change.
+            swept: bool (rows, cols) of ``part``, the floor that the robot has swept.
         """
         more_wanted, more_swept, more_open = set_open(
             self.sweeps,

@@ -176,8 +176,8 @@ def way_s(walk: NDArray[np.int32], pose: Pose2D, floor: FloorMap, sweeping: Swee
 
     Args:
         walk: int32 (n, 2), n >= 1, cells (row, col), each a legal step from the previous one.
-        pose: of the robot, in or near the first cell.
-        floor, sweeping: of the mission.
+        pose: pose of the robot, in or near the first cell.
+        floor, sweeping: floor and sweeping of the mission.
     """
     points, _ = floor.stands.line(walk)
     here = np.array(map_to_raster(floor.geometry, pose.x, pose.y))

@@ -58,8 +58,8 @@ class Agreement:
 
     Attributes:
         known: number of cells known to both.
-        blocked: number of these blocked on the first map, and on the second.
-        both: number of these blocked on both.
+        blocked: number of known cells blocked on the first map, and on the second.
+        both: number of known cells blocked on both.
     """
 
     known: int

@@ -34,10 +34,10 @@ from fasaco_edge.mission.coverage.loop_closure import (
 )
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.building_watch import BuildingWatch
+from fasaco_edge.mission.map.configured_places import ConfiguredPlaces
 from fasaco_edge.mission.map.frame_selector import FrameSelector
 from fasaco_edge.mission.map.ground import MissionGround
 from fasaco_edge.mission.map.obstacles import Obstacles
-from fasaco_edge.mission.map.standing_places import StandingPlaces
 from fasaco_edge.mission.orders.order import MissionOrder
 
 # Distance from the dock's pose up to which a robot is in the dock [m].
@@ -80,7 +80,7 @@ class MapState:
         self._shown: CoverageLattice | None = None
         self.frames = FrameSelector()
         self.building = BuildingWatch()
-        self.places = StandingPlaces(config.policy, config.given or config.policy)
+        self.places = ConfiguredPlaces(config.policy, config.given or config.policy)
         self.path_cell: Cell | None = None
         self._patches_lost = False
         # Why the newest map was refused; "" if it was taken in.

@@ -1,4 +1,4 @@
-"""Placing of orders: zones given by name get the polygons of standing zones, or of rooms.
+"""Placing of orders: zones given by name get the polygons of configured zones, or of rooms.
 
 Polygons are in the map frame, except in ``rotated_order``.
 """
@@ -11,7 +11,7 @@ from dataclasses import replace
 from fasaco_edge.errors import OrderError
 from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.rotation import rotated_polygon
-from fasaco_edge.mission.orders.order import MissionOrder, RoomArea, StandingZone, Zone
+from fasaco_edge.mission.orders.order import ConfiguredZone, MissionOrder, RoomArea, Zone
 from fasaco_edge.mission.orders.room_requests import USUAL_PRIORITY
 from fasaco_edge.mission.rooms.room_book import LIKE_NUMBER, Room, RoomBook
 
@@ -22,15 +22,15 @@ def is_named(order: MissionOrder) -> bool:
 
 
 def located(
-    order: MissionOrder, standing: tuple[StandingZone, ...], book: RoomBook
+    order: MissionOrder, configured: tuple[ConfiguredZone, ...], book: RoomBook
 ) -> MissionOrder:
-    """Return an order with its named zones in place: standing zones first, then rooms.
+    """Return an order with its named zones in place: configured zones first, then rooms.
 
     Raises:
         OrderError: a name is unknown, and the order does not wait for a room; or no room has the
             number. An order never waits for a number, as any new room may get it.
     """
-    known = {zone.name: tuple(zone.polygon) for zone in standing}
+    known = {zone.name: tuple(zone.polygon) for zone in configured}
     may_wait = order.unknown == "wait"
     zones = (
         _looked_up(zone, index, known, book, may_wait=may_wait)
@@ -40,13 +40,13 @@ def located(
 
 
 def _looked_up(
-    zone: Zone, index: int, standing: dict[str, Polygon], book: RoomBook, *, may_wait: bool
+    zone: Zone, index: int, configured: dict[str, Polygon], book: RoomBook, *, may_wait: bool
 ) -> Zone:
     """Return a zone with its polygon or its room's number; unchanged if it waits for a room."""
     if not zone.room and zone.polygon != ():
         return zone
-    if not zone.room and zone.name in standing:
-        return replace(zone, polygon=standing[zone.name])
+    if not zone.room and zone.name in configured:
+        return replace(zone, polygon=configured[zone.name])
     room = book.find(zone.room or zone.name)
     if room is not None and (room.outline or zone.polygon or may_wait):
         return replace(zone, room=room.id)
@@ -59,7 +59,7 @@ def _looked_up(
             hint="give the number of one of those, or none",
             key=f"zones[{index}].room",
         )
-    there = f"there are {', '.join(standing)}" if standing else "it has none"
+    there = f"there are {', '.join(configured)}" if configured else "it has none"
     raise OrderError(
         f"no zone {zone.name!r} in mission.zones of the daemon's "
         f"configuration; {there}; nor a room: {book.listed()}",

@@ -52,8 +52,8 @@ class Zone:
     Attributes:
         name: unique in its order.
         polygon: corners (x, y) [m] in the map frame, the last joined to the first; None for
-            everything reachable; () until ``map.placing`` finds the standing zone or room of
-            that name.
+            everything reachable; () until ``map.placing`` finds the configured zone or room of that
+            name.
         passes: number of passes.
         kinds: settings of each pass; () if all passes are usual.
         room: number of the room whose outline it follows; 0 for none.
@@ -165,7 +165,7 @@ class Command(NamedTuple):
     room: RoomRequest | None = None
 
 
-class StandingZone(StrictDocument, frozen=True):
+class ConfiguredZone(StrictDocument, frozen=True):
     """A zone of the configuration, referred to by its name."""
 
     name: PlaceName
@@ -173,7 +173,7 @@ class StandingZone(StrictDocument, frozen=True):
 
 
 class ZoneDocument(StrictDocument, frozen=True):
-    """An area to cover; without a polygon, the standing zone or else the room of that name.
+    """An area to cover; without a polygon, the configured zone or else the room of that name.
 
     Attributes:
         room: number of the room whose outline it follows.
@@ -221,7 +221,7 @@ class OrderDocument(StrictDocument, frozen=True):
 
 
 def place_faults(
-    zones: Sequence[ZoneDocument | StandingZone], keep_out: Sequence[Sequence[Point]]
+    zones: Sequence[ZoneDocument | ConfiguredZone], keep_out: Sequence[Sequence[Point]]
 ) -> Iterator[OrderError]:
     """Yield wrong and equal names of zones, and wrong polygons."""
     polygons = {f"keep_out[{at}]": tuple(each) for at, each in enumerate(keep_out) if each}

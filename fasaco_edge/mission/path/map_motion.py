@@ -1,7 +1,7 @@
-"""Map motion: what lay on the map before it moved, kept until a pose shows how it moved.
+"""Map motion: coverage, reached cells, trail and path move with the map after a loop closure.
 
-After a loop closure the moved map comes first. The new map changes reach, trail and path before the
-first pose on it shows the motion, so they are moved as they were before that map.
+The moved map arrives first, and only the next pose shows how it moved. Until then the state before
+the moved map is kept, as this map itself changes reach, trail and path.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fasaco_edge.planners.living_trail import TrailSnapshot
 
 
 class _Before(NamedTuple):
-    """What lay on the map: the robot's pose, reached cells, trail, and path, int32 (n, 2)."""
+    """The previous map's state: the robot's pose, reached cells, trail, path, int32 (n, 2)."""
 
     pose: Pose2D | None = None
     reached: CellsOn | None = None
@@ -41,12 +41,12 @@ class MapMotion:
     _trail: TrailLayer
     _route: Route
     _before: _Before = field(default=_Before(), init=False)
-    # The motion that the newest pose has shown, the path before it, and the number of cells that it
-    # makes uncertain; None once the path has moved.
+    # The motion that the newest pose has shown, the path before the motion, and the number of cells
+    # whose coverage the motion makes uncertain; None once the path has moved.
     _shown: tuple[Motion, NDArray[np.int32] | None, int] | None = field(default=None, init=False)
 
     def receive_map(self, pose: Pose2D) -> None:
-        """Keep what lay on the map, as the newest one has moved under a robot at ``pose``.
+        """Keep what lay on the previous map: the newest has moved under a robot at ``pose``.
 
         If the map moves again before a pose shows how, the state before the first motion counts.
         """
@@ -74,7 +74,9 @@ class MapMotion:
         return motion
 
     def move_path(self, now: float) -> PathUpdate | None:
-        """Move the path once the reachable area on the moved map is known; want a plan.
+        """Move the path, once the reachable area on the moved map is known.
+
+        Ask for a plan if the motion made coverage uncertain.
 
         Returns:
             The path to publish at ``now`` [s]; None for none.

@@ -23,7 +23,7 @@ SPARE_TIME = "spare time"
 REPAIR_S, SEARCH_S = 0.05, 0.3
 # A better path replaces the path only if it saves this many steps and this share of the rest.
 LEAST_STEPS, LEAST_SHARE = 2, 0.002
-# This share for a walk from a full search, as its line has to be made and polished again.
+# A walk from a full search has to save this share, as its line is made and polished again.
 NEW_WALK_SHARE = 0.01
 # The share of time is halved at most this many times.
 MOST_VAIN = 4
@@ -112,7 +112,7 @@ class Attempt:
             return None  # the map has changed: a repair is due
         return cls(numbering, path.index, joint, problem)
 
-    def joined(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
+    def improved(self, path: PathProgress, better: NDArray[np.int32]) -> NDArray[np.int32] | None:
         """Return the improved cells ahead, int32 (n, 2); None if they save too little.
 
         Args:
@@ -174,25 +174,25 @@ class PlanRequests:
         return self.pending is not None and self.attempt is not None
 
     def want(self, reason: str, changed: Window | None = None) -> None:
-        """Want a plan: because the cells in a window have changed, or for another reason."""
+        """Note that a plan is wanted, as cells in a window have changed, or for another reason."""
         self.wanted = reason
         self.changed = Window.around(self.changed, changed)
         self._is_by_map = changed is not None
 
     def want_instead(self, reason: str, changed: Window | None) -> None:
-        """Want a plan in place of an outdated one, unless one is wanted for another reason."""
+        """Note that a plan is wanted in place of an outdated one; an earlier reason stays."""
         self.changed = Window.around(self.changed, changed)
         if not self.wanted:
             self.want(reason, changed)
 
     def want_full(self, reason: str) -> int:
-        """Want a full search; return its number among the plans."""
+        """Note that a full search is wanted; return its number among the plans."""
         self.wanted = self._full = reason
         self.forget_failure()
         return self.plans + (1 if self.pending is None or self.is_improving else 2)
 
     def want_none(self) -> None:
-        """Want no plan."""
+        """Note that no plan is wanted any more."""
         self.wanted = self._full = ""
         self.changed = None
 
@@ -201,7 +201,7 @@ class PlanRequests:
         self._is_abandoned = self.pending is not None
 
     def abandon(self) -> None:
-        """Want no plan, and discard the pending one: it is for another order."""
+        """Drop the wanted plan, and discard the pending one: they are for another order."""
         self.want_none()
         self.forget_failure()
         self.discard_pending()

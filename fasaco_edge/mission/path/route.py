@@ -126,7 +126,7 @@ class Route:
         return np.ascontiguousarray(cells[::-1]) if is_nearer else cells
 
     def resume(self, now: float) -> PathUpdate | None:
-        """Publish the kept path after a pause; want a plan if it is no longer valid."""
+        """Publish the kept path after a pause; ask for a plan if the path is no longer valid."""
         area, cell, cells = self._map.area, self._map.robot_cell(), self._kept.ahead
         holds = (
             not self.requests.wanted
@@ -141,7 +141,7 @@ class Route:
         return None
 
     def move(self, before: NDArray[np.int32], motion: Motion, now: float) -> PathUpdate | None:
-        """Move the path with the map, and want a plan that repairs it.
+        """Move the path with the map, and ask for a plan that repairs it.
 
         Its drivable part is published at once: the robot must not follow the old position.
         ``before``: int32 (n, 2), n >= 1, ``path_to_keep`` before the map moved.
@@ -217,7 +217,7 @@ class Route:
     ) -> PathUpdate | None:
         if attempt.numbering != self._numberings:
             return None
-        cells = attempt.joined(self.path, event.path.cells)
+        cells = attempt.improved(self.path, event.path.cells)
         if cells is None or area.drivable_prefix(cells) < len(cells):
             return None
         return replace(self.publish(cells, BETTER, now, event), may_wait=True)
@@ -319,7 +319,7 @@ class Route:
         return update
 
     def truncate(self, now: float) -> PathUpdate | None:
-        """Cut the path before a block that a new map shows; want a new plan.
+        """Cut the path before a block that a new map shows; ask for a new plan.
 
         The path becomes empty if the robot's own cell is blocked or off the map.
         """

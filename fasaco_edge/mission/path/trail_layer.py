@@ -39,7 +39,7 @@ class TrailLayer:
         self._follow_map()
         return self.trail.snapshot()
 
-    def posed(self, request: PlanRequest) -> PlanRequest:
+    def with_trail(self, request: PlanRequest) -> PlanRequest:
         """Return a request with the trail from which its ants start."""
         if not self._config.plans_on_trail:
             return request

@@ -72,7 +72,7 @@ def split(book: RoomBook, called: str | int, cut: Cut) -> None:
 def merge(book: RoomBook, called: Sequence[str | int], name: str = "") -> None:
     """Merge rooms that are joined, into the one with the smallest number.
 
-    It gets the name given; without one, the first name among the rooms by number.
+    It gets ``name``; by default the name of the first room, by number, that has one.
 
     Raises:
         OrderError: there is no such room, the rooms are not joined, or the name is taken.

@@ -10,10 +10,10 @@ grows over new floor of its region. Other changes must last:
 
 An update without the change counts twice against it, so that a flickering change never lasts. A
 room that joined another and separates again gets its number back. Rooms that people have named,
-set, split or merged are kept: maps do not join them, and separate from them only parts with new
-floor: more than a fifth of a part, or half of it if the room was split or merged. Two kept rooms in
-one region stay divided as before. Squares that only the newest maps have added do not decide which
-region shows a room. Rooms that the map does not show stay unchanged.
+set, split or merged are kept: maps do not join them. A map separates from them only a part with new
+floor: more than a fifth of the part, or half of it if the room was split or merged. Two kept rooms
+in one region stay divided as before. Squares that only the newest maps have added do not decide
+which region shows a room. Rooms that the map does not show stay unchanged.
 """
 
 from __future__ import annotations

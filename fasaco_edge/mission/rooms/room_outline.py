@@ -133,7 +133,7 @@ def _simplified(corners: NDArray[np.int64], tolerance: float) -> NDArray[np.int6
     return corners[keep[:-1]]
 
 
-def joined(ids: Ids, square_m: float) -> dict[int, tuple[int, ...]]:
+def room_joins(ids: Ids, square_m: float) -> dict[int, tuple[int, ...]]:
     """Return the numbers of the rooms that each room is joined to."""
     shared = Counter[tuple[int, int]]()
     for here, there in ((ids[1:], ids[:-1]), (ids[:, 1:], ids[:, :-1])):
@@ -175,7 +175,7 @@ def refresh(book: RoomBook, changed: Iterable[int]) -> None:
     for room in rooms:
         sheet.stale.pop(room, None)
     square_m = sheet.raster.square_m
-    beside, shapes = joined(sheet.raster.ids, square_m), list[Room]()
+    beside, shapes = room_joins(sheet.raster.ids, square_m), list[Room]()
     for known in book.rooms:
         shape = replace(known, neighbours=beside.get(known.id, ()), encloses=())
         if known.id in rooms:

@@ -35,7 +35,7 @@ class IdlePlaces:
     def __init__(self, config: MissionConfig) -> None:
         policy = config.policy
         self._footprint = config.footprint
-        self._standing: list[_Named] = [
+        self._configured: list[_Named] = [
             (f"mission.keep_out[{index}]", (polygon,))
             for index, polygon in enumerate(policy.keep_out)
         ]
@@ -47,7 +47,7 @@ class IdlePlaces:
         self._blank = ""
         if mask := policy.keep_out_mask:
             polygons = mask_polygons(mask)
-            self._standing += [("keep_out_mask", polygons)] if polygons else []
+            self._configured += [("keep_out_mask", polygons)] if polygons else []
             # A mask received as a message may be blank at first.
             if not polygons and not mask_frame(mask):
                 self._blank = "no pixel of mission.keep_out_mask is occupied"
@@ -76,7 +76,7 @@ class IdlePlaces:
         self._key, self._looked_at = key, now
         if grid.frame != self._frame:
             self._frame, self._used = grid.frame, set()
-        areas = self._standing if is_theirs else []
+        areas = self._configured if is_theirs else []
         areas = areas + [(f"order.keep_out[{index}]", (each,)) for index, each in enumerate(asked)]
         areas += [(f"keep-out {each.name!r}", (each.polygon,)) for each in order.keep_out]
         self._said = "; ".join(self._texts(grid, areas, is_theirs=is_theirs))

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Self
 
-from fasaco_edge.mission.map.standing_places import NO_PLACES, PlacesNote
+from fasaco_edge.mission.map.configured_places import NO_PLACES, PlacesNote
 from fasaco_edge.mission.orders.keep_outs import KeepOuts
 from fasaco_edge.mission.orders.order import Errand, MissionOrder, Zone
 from fasaco_edge.mission.rooms.room_book import MOST_LISTED
@@ -47,7 +47,7 @@ class OrderProgress:
             file, None in a mission.
         spent_s: the robot's time since the order began, if it has a limit [s].
         late: why it ends before all is covered; "" if it does not.
-        last: while there is no order, the one that was cancelled; None for none.
+        last: the order that was cancelled, until another begins; None for none.
     """
 
     order: MissionOrder | None = None

@@ -82,7 +82,7 @@ class OrderReach:
             self._cut_off = window, lost | still
 
     def move(self, before: CellsOn | None, motion: Motion) -> None:
-        """Move the cells with the map; drop what was noted since it moved: the pose was old.
+        """Move the cells with the map; drop cells noted since it moved, as their pose was old.
 
         ``before``: the cells before it moved.
         """

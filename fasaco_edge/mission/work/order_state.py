@@ -13,8 +13,8 @@ from msgspec import Meta
 
 from fasaco_edge.errors import CommandError, OrderError
 from fasaco_edge.host.documents import misfits
+from fasaco_edge.mission.map.configured_places import NO_PLACES, PlacesNote
 from fasaco_edge.mission.map.placing import are_same
-from fasaco_edge.mission.map.standing_places import NO_PLACES, PlacesNote
 from fasaco_edge.mission.orders.keep_outs import (
     MOST_KEEP_OUT,
     KeepOutDocument,

@@ -133,7 +133,7 @@ class PlanScope:
         self._room.begin_pass()
 
     def give_up_first(self) -> bool:
-        """Leave what is planned first until all else is done; return False if all is planned."""
+        """Put off the cells planned now until others are done; return False if all are planned."""
         if self._room.give_up():
             return True
         is_limited = self.worth.least > 0

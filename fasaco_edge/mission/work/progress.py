@@ -76,14 +76,14 @@ class ZoneProgress:
     Attributes:
         name: name of the zone.
         passes: number of passes ordered.
-        begun: number of its newest pass; 0 before the first.
+        newest_pass: its number; 0 before the first.
         cells: number of its reachable cells.
         covered: number of these cells that are covered in that pass.
     """
 
     name: str
     passes: int
-    begun: int
+    newest_pass: int
     cells: int
     covered: int
 

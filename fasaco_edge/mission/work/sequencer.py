@@ -27,8 +27,8 @@ from fasaco_edge.mission.work.present_order import PresentOrder
 from fasaco_edge.mission.work.present_part import PresentPart
 from fasaco_edge.mission.work.reached_cells import ReachedCells
 
-# A robot is shut in if it can reach less than this share of the area that it could ever reach:
-# MOST_SHARE, or HOME_SHARE if home is in reach, as a door to another room may be closed.
+# A robot is shut in if it can reach less than MOST_SHARE of the area that it could ever reach. If
+# home is in reach, the limit is HOME_SHARE: a door to another room may be closed.
 HOME_SHARE, MOST_SHARE = 0.1, 0.5
 CARRIED_OUT = "the order was carried out"
 
@@ -38,7 +38,7 @@ class Sequencer:
 
     Attributes:
         part: the part of the order that is due.
-        cells, scope, reach, uncovered: as of that part.
+        cells, scope, reach, uncovered: members of ``part``.
         ending: how the order ended.
     """
 
@@ -65,7 +65,7 @@ class Sequencer:
         # Cached: a map and ledger, and whether a retry is worthwhile on them.
         self._retry_check: tuple[object, bool] = (None, False)
 
-    def ask_for_floor(self, sum_up: Callable[[], str]) -> None:
+    def describe_floor_by(self, sum_up: Callable[[], str]) -> None:
         """Set the function that returns the swept floor as text for an order's end."""
         self._sum_up = sum_up
 
@@ -112,7 +112,7 @@ class Sequencer:
         self._order.state = state
 
     def move_home(self, motion: Motion) -> None:
-        """Move home with the map, if home is a cell."""
+        """Move the home cell with the map; home may instead be a configured place."""
         if (home := self._order.state.home) is not None:
             cells = np.array([home], np.int32)
             ((row, col),) = moved_cells(cells, motion, self._config.footprint.cell_m).tolist()
@@ -130,7 +130,7 @@ class Sequencer:
         self._left_behind.set_out(None)
 
     def is_shut_in(self, area: ReachableArea) -> bool:
-        """Return whether an area lacks home and most floor, or nearly all floor.
+        """Return whether a robot that can reach only ``area`` is shut in, see ``MOST_SHARE``.
 
         False if all is covered, as the order can end then.
         """
@@ -187,7 +187,7 @@ class Sequencer:
         if state.stage is Stage.RETURNING:
             self._end()
             return
-        # From here on the rest is counted over all zones.
+        # From here on, the cells left of all zones are counted.
         self._order.state = replace(state, stage=Stage.RETRYING)
         if state.tries < self._config.policy.retries and self._is_worth_trying():
             if self._retry_at is None:

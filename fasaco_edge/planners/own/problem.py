@@ -58,7 +58,7 @@ class GridProblem:
         return [(row + up, col + right) for (up, right), is_open in ways if is_open]
 
 
-def posed(problem: CoverageProblem, seed: int) -> GridProblem:
+def grid_problem(problem: CoverageProblem, seed: int) -> GridProblem:
     """Return a problem as the input of a planner of the user's own."""
     lattice, cost = problem.lattice, problem.cost
     bits = lattice.steps[..., np.newaxis] >> np.arange(len(MOVES), dtype=np.uint8)
@@ -96,11 +96,11 @@ class OwnPlanner:
         """Return the code's walk; only ``most_s`` ends it, and ``observe`` is not called.
 
         Raises:
-            PlannerFailed: the code raised, or took longer.
+            PlannerFailed: the code raised, or took longer than ``most_s``.
             IllegalWalk: the result is not a walk, or does not solve the problem.
         """
-        given, began = posed(problem, self.seed), time.perf_counter()
-        cells = walked(self.code, given, self.most_s)
+        given, began = grid_problem(problem, self.seed), time.perf_counter()
+        cells = walk_of(self.code, given, self.most_s)
         taken_s = time.perf_counter() - began
         window = problem.lattice.window
         cells = cells + np.array((window.row0, window.col0), np.int32)
@@ -108,17 +108,17 @@ class OwnPlanner:
         return CoveragePath(cells, self.code.name, self.seed, cost_s=cost_s, first_walk_s=taken_s)
 
 
-def walked(code: UserCode, problem: GridProblem, most_s: float | None = None) -> NDArray[np.int32]:
+def walk_of(code: UserCode, problem: GridProblem, most_s: float | None = None) -> NDArray[np.int32]:
     """Return the walk of a planner of the user's own, int32 (n, 2).
 
     ``most_s`` is the time that the code may take [s]; None for no limit.
 
     Raises:
-        PlannerFailed: the code raised, or took longer.
+        PlannerFailed: the code raised, or took longer than ``most_s``.
         IllegalWalk: the result is not a walk, or does not solve the problem.
     """
     try:
-        # The user's code runs up to here, also inside the returned iterable.
+        # All that runs the user's code: ``_in_bounds`` runs it, too, if it returned a generator.
         with no_longer_than(most_s):
             given = code.walk(problem)
             if not isinstance(given, Iterable) or getattr(given, "shape", None) == ():

@@ -19,7 +19,7 @@ class Cohort:
 
 @dataclass(frozen=True, slots=True)
 class ColonyConfig:
-    """A colony; the defaults are the paper's FaSACO: 1,000 ants, cohorts from 8 down to 1.
+    """A colony; the defaults, and the equations, are those of Carr and Wang 2022.
 
     Attributes:
         ants: number of ants.

@@ -30,7 +30,7 @@ class CurrentWalk:
     """The current walk of a search, its regions and windows, and the best walk so far.
 
     Attributes:
-        cost_us: of the current walk [us].
+        cost_us: cost of the current walk [us].
         best, best_us: the best walk so far, int32 (n,), and its cost [us].
         is_whole: whether one region covers the ground.
         region: the loaded region, or the last one.

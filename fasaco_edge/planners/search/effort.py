@@ -24,7 +24,7 @@ class Effort:
 
     Attributes:
         temperatures_us: temperatures of the first improvement, in order [us].
-        proposals: proposals per visit in it, over all temperatures.
+        proposals: proposals per visit in the first improvement, over all temperatures.
         rules: rules of perturbations.
         patience: perturbations without gain after which a search of one region ends.
     """

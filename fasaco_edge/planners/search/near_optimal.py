@@ -70,7 +70,7 @@ class NearOptimal:
         path = _with_lead(problem, self._plan(problem, stop, observe))
         if not problem.cost.is_priced:
             return path
-        return replace(path, cost_s=problem.cost.seconds.of_walk(path.cells))
+        return replace(path, cost_s=problem.cost.without_prices.of_walk(path.cells))
 
     def _plan(
         self, problem: CoverageProblem, stop: StoppingCriterion, observe: Observer

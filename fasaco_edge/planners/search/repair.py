@@ -53,7 +53,7 @@ def repaired(
 
     Args:
         problem: with a walk ``before``, see ``CoverageProblem.can_repair``.
-        name: of the planner.
+        name: name of the planner.
         config: seed, and constants of the ants.
         stop: stopping criterion.
     """

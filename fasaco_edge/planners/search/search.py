@@ -245,7 +245,7 @@ class ColonySearch:
 
     def show(self) -> None:
         """Show the observer the trail; the search is over."""
-        self._observe(self._trail.seen(self._work.ants, self._walk.best.size - 1))
+        self._observe(self._trail.snapshot(self._work.ants, self._walk.best.size - 1))
 
 
 def _pieces(total: int, largest: int) -> Iterator[int]:

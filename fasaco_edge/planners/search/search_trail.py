@@ -1,7 +1,7 @@
 """Search trail: the pheromone that the ants of a search or a repair read and change.
 
-It begins as the mission's living trail, and is uniform where there is none. A region copies its
-part of the trail, and pastes it back when it is done.
+It begins as the mission's living trail, and is uniform where there is none. For a search in a
+region, its part of the trail is copied, and pasted back at the end.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from fasaco_edge.planners.problem import CoverageProblem
 
 # Number of ants that rebuild a disc (the cheapest result counts); range of the disc's radius.
 ANTS, RADIUS = 16, (3, 6)
-# A move has up to four quarter-turns: two before it, and two at the end of a tunnel.
+# A move has up to four quarter-turns: two before it, and two after a tunnel, which stands for a
+# part of the walk outside of the disc (``kernels.ants.fold``).
 MOST_QUARTERS = 4
 
 
@@ -43,8 +44,8 @@ class SearchTrail:
         self._window: Window | None = None
         self._tau = NO_TRAIL.tau
 
-    def cut(self, box: RegionBox, out: NDArray[np.float64]) -> None:
-        """Copy a region's part into ``out``, float64 (n, 4), one row for each framed cell."""
+    def copy(self, box: RegionBox, out: NDArray[np.float64]) -> None:
+        """Copy a region's part into ``out``, float64 (n, 4): a row per cell, the frame included."""
         _inner(box, out)[:] = self._on(self._window_of(box))
 
     def paste(self, box: RegionBox, trail: NDArray[np.float64]) -> None:
@@ -59,7 +60,7 @@ class SearchTrail:
         """Return the part that ants have walked on, at the end; None if there is none."""
         return None if self._window is None else TrailSnapshot(self._window, self._tau)
 
-    def seen(self, ants: int, steps: int) -> ColonySnapshot:
+    def snapshot(self, ants: int, steps: int) -> ColonySnapshot:
         """Return the observer's view: the trail, the number of ants, the steps of the best walk."""
         lattice = self._problem.lattice
         tau = self._on(lattice.window) * legal(lattice.steps)
@@ -101,9 +102,10 @@ def _rules(problem: CoverageProblem, config: ColonyConfig) -> AntRules:
 
 
 def powers_of_turns(cost: CoverageCost, beta: float) -> NDArray[np.float64]:
-    """Return eta ** beta of equation (5) by the quarter-turns of a move, float64 (5,).
+    """Return eta ** beta of equation (5), Carr and Wang 2022, by the quarter-turns of a move.
 
-    Eta is the duration of a step divided by the duration of the move with its turns.
+    The result is float64 (5,). Eta is the duration of a step divided by that of the move with its
+    turns.
     """
     move_s = cost.step_s + np.arange(MOST_QUARTERS + 1) * cost.quarter_turn_s
     eta = cost.step_s / move_s

@@ -122,7 +122,7 @@ class WalkRegion:
         remember(walk, self._memory)
         self._loaded_us, self._loaded_length = int(walk.counts[COST]), length
         self._whole = ground, cells, box
-        self._trail.cut(box, colony.trail)
+        self._trail.copy(box, colony.trail)
         steps_us = prices.step_us * int(np.count_nonzero(region.needed == 1))
         ants = colony.rules._replace(amount=steps_us / max(self._loaded_us, 1))
         self._search = self._search._replace(colony=colony._replace(rules=ants))

@@ -59,7 +59,7 @@ class DrawnLine:
 
     Attributes:
         at_ns: time by the recorder's clock [ns].
-        revision: of the path in force then; 0 for none.
+        revision: revision of the path in force then; 0 for none.
         xy: float64 (n, 2), its corners in the map frame [m]; n is 0 if the line was removed.
     """
 

@@ -28,7 +28,7 @@ COVERED_COLOUR: Colour = (56, 152, 222)
 REVISITED_COLOUR: Colour = (245, 140, 40)
 SWEPT_COLOUR: Colour = (45, 212, 191)
 LABEL_COLOUR: Colour = (255, 255, 255)
-# Bright colours: the labels have them, too, on a dark background.
+# Bright, as labels have the same colours, on a dark background.
 START_COLOUR: Colour = (74, 222, 128)
 END_COLOUR: Colour = (251, 113, 133)
 

@@ -79,7 +79,7 @@ RATES = {
 # A grid's size in the file is estimated from every n-th row.
 EVERY_ROW = 8
 # Largest ratio of sizes after Rerun's compression (LZ4) and after the fastest deflate.
-LOOSER = 1.5
+LZ4_TO_DEFLATE = 1.5
 
 
 @dataclass(slots=True)
@@ -92,7 +92,7 @@ class _Layer:
 
 
 class Layers:
-    """Decides when each layer is drawn; for the writer's thread and clock only."""
+    """Decides when each layer is drawn; only the writer's thread calls it."""
 
     def __init__(self, rates: Mapping[str, float] = RATES) -> None:
         self._rates = dict(rates)
@@ -147,4 +147,4 @@ def size_in_file(grid: NDArray[np.generic]) -> int:
     """Return the approximate size of a byte grid (rows, cols) in a recording [bytes]."""
     some = np.ascontiguousarray(grid[::EVERY_ROW])
     share = grid.size / max(some.size, 1)
-    return round(LOOSER * share * len(zlib.compress(some.data, 1)))
+    return round(LZ4_TO_DEFLATE * share * len(zlib.compress(some.data, 1)))

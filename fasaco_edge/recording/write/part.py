@@ -155,8 +155,8 @@ class RecordingPart:
     def abandon(self) -> None:
         """Truncate a broken part to its flushed data.
 
-        Frames that Rerun wrote after a partly written frame cannot be told from the rest of that
-        frame. The stream stays open: disconnecting or releasing it may hang (Rerun 0.41).
+        Frames that Rerun wrote after a partly written frame cannot be distinguished from the rest
+        of that frame. The stream stays open: disconnecting or releasing it may hang (Rerun 0.41).
         """
         os.close(self._lock)
         if not self._flushed_bytes:

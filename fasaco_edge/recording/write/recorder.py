@@ -112,7 +112,7 @@ class RobotRecorder(BusRecorder):
     def step(self, timeout_s: float) -> None:
         """Write samples that arrive within ``timeout_s`` [s], check the writer, report."""
         arrivals = deque(self._queue.take(timeout_s))
-        heard_ns = arrivals[-1].at_ns if arrivals else time.monotonic_ns()
+        newest_ns = arrivals[-1].at_ns if arrivals else time.monotonic_ns()
         while arrivals:  # popleft frees the memory of written samples
             self._write(arrivals.popleft())
             self._sync()
@@ -122,7 +122,7 @@ class RobotRecorder(BusRecorder):
         self.writer.at(self._clock.now_ns())
         self._sync()
         self._scene.catch_up()
-        self._watch_planner(heard_ns)
+        self._watch_daemon(newest_ns)
         self._report_writing()
 
     def end(self) -> bool:
@@ -190,10 +190,10 @@ class RobotRecorder(BusRecorder):
         about = decode_tolerant(sample.attachment, PathAttachment)
         self._scene.add_path(decode_path(sample.payload), about)
 
-    def _watch_planner(self, heard_ns: int) -> None:
-        """Report a planner that has been silent for too long at ``heard_ns`` [ns]."""
+    def _watch_daemon(self, newest_ns: int) -> None:
+        """Report the daemon as silent if its last status is too old at ``newest_ns`` [ns]."""
         last = self._last_status_ns
-        if last is not None and heard_ns - last > SILENCE_NS:
+        if last is not None and newest_ns - last > SILENCE_NS:
             self._scene.enter(entities.MISSION_STATE, "silent", SILENT)
 
     def _report_writing(self) -> None:

@@ -61,7 +61,7 @@ def _ending(document: ReviewDocument) -> str:
 def instant_rows(instant: Instant) -> Iterator[tuple[str, str]]:
     """Yield name and text of each known fact about a moment."""
     state, why = instant.state or "not known", plain(instant.state_reason or "")
-    # A reason that names a path, the first one in this state, is left out: the path has its row.
+    # A reason that names a path, as "path 3", is left out: the path has its own row.
     yield "state", f"{state}: {why}" if why and not why.startswith("path ") else state
     if instant.order:
         yield "order", instant.order

@@ -94,9 +94,9 @@ def _cell(value: object) -> object:
 def _write_arrays(review: Review, file: Path) -> None:
     """Write the arrays: row 0 is the lowest, origins are x [m], y [m], yaw [rad].
 
-    The map, int8, and the floor, bool, in pixels that may be finer; for each the origin, and the
-    edge of a pixel [m]. The visits, uint16, of each cell; row and column of the first cell on the
-    lattice, and the edge of a cell [m].
+    There are the map, int8, and the floor, bool, whose pixels may be finer, each with its origin
+    and the edge of a pixel [m]; and the visits to each cell, uint16, with row and column of the
+    first cell on the lattice, and the edge of a cell [m].
     """
     grid, floor, lattice, visits = review.data.grid, review.floor, review.lattice, review.visits
     arrays: dict[str, NDArray[np.generic]] = {}

@@ -31,12 +31,12 @@ class Blocked(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         daemon: Zenoh id of the daemon whose path it is.
-        revision: of the path; 0 where that is not known.
+        revision: revision of the path; 0 if unknown.
         reason: obstacle: something is ahead that the map does not show; stuck: the robot does not
             move as commanded, or its controller has given up; elsewhere: it cannot join the path.
-        detail: the same in words.
-        held_s: for how long [s].
-        frame: of the places.
+        detail: the reason in words.
+        held_s: how long the robot has been kept from driving [s].
+        frame: frame of the places.
         x, y: where the robot is [m].
         points: what is ahead: places x, y [m], the nearest first; none for elsewhere.
     """

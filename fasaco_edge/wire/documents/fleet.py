@@ -57,7 +57,7 @@ class FleetPart(msgspec.Struct, frozen=True, array_like=True):
     Attributes:
         robot: its name.
         row, col: the cell that travel times are counted from.
-        handicap_s: added to them [s].
+        handicap_s: added to the travel times [s].
         step_s: its time to sweep one cell [s].
     """
 
@@ -72,23 +72,23 @@ class FleetMember(Document, frozen=True):
     """A robot of a fleet, described by itself.
 
     Attributes:
-        version: of this document.
+        version: version of the message.
         fleet: name of the fleet.
         cell_m: edge of a cell [m].
-        frame: of the map.
-        state: of the mission, as in the status.
+        frame: frame of the map.
+        state: state of the mission, as in the status.
         x, y: position of the robot [m] in the frame of the map.
         step_s: time it takes to sweep a cell [s].
         epoch: changes whenever the robot drops some of its swept cells.
         division: number of the newest division of the remaining cells known to it.
         open_cells: number of cells known to it that are still to sweep.
         swept: its swept tiles: changed ones first, then all in turn.
-        kept: the cells of these tiles that it swept before this epoch, without empty tiles; null if
-            it does not know.
+        kept: the cells of swept from before this epoch, without empty tiles; null if the robot
+            does not know.
         lattice_deg: the angle of its cells' rows to the x axis of the map frame [deg].
         ground: tiles of cells that it can reach: changed ones first, then all in turn.
-        by: name of the robot that made that division.
-        parts: what that division gives to each robot; none without one.
+        by: name of the robot that made the newest division.
+        parts: the part of each robot in the newest division; none without a division.
         radius_m: radius of the robot's disc [m].
         ahead: points x, y of the path's next metres [m], in the frame of the map.
         origin: where the origin of its map frame lies in the fleet's frame: x, y [m], the angle

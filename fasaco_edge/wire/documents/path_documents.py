@@ -24,7 +24,7 @@ class PlanFigures(Document, frozen=True):
 
     Attributes:
         planner: name of the planner.
-        seed: of all random streams.
+        seed: seed of all random streams.
         ants: ants that walked.
         kicks: perturbations of the local search.
         proposals: moves that the local search tried.
@@ -35,8 +35,8 @@ class PlanFigures(Document, frozen=True):
         gap: planned_cost_s / lower_bound_cost_s - 1.
         saved_by_ants_s: seconds saved on the first walk by ants and by the local search of their
             walks.
-        saved_by_local_search_s: seconds saved by local search on the first walk, or on the one
-            still to drive.
+        saved_by_local_search_s: seconds saved by local search on the first walk, or on the rest of
+            the current walk.
         saved_by_velocity_s: saved_by_ants_s for each cohort, by its velocity in cells per move;
             null if ants saved nothing.
     """
@@ -91,7 +91,7 @@ class PathReport(PlanFigures, frozen=True):
 
     Attributes:
         revision: counts the published paths.
-        steps: as published.
+        steps: number of steps when the path was published.
         remaining_steps: still to drive.
         line_s: seconds that the path ahead takes.
         line_gap: line_s / bound - 1, bound being the least time of any line that sweeps as much
@@ -155,7 +155,7 @@ class TrailAttachment(Document, frozen=True):
     In old recordings a field without an attachment is the pheromone of a cohort of ants.
 
     Attributes:
-        revision: of the path in force.
+        revision: revision of the path in force.
         cells: number of cells that the trail spans: those with a step to another one.
         branching: mean number of directions of a cell that are close to its strongest: 1 if each
             cell has a single one.

@@ -42,7 +42,7 @@ class Point(Document, frozen=True):
 
 
 class CoverageReport(Document, frozen=True):
-    """The coverage in cells; areas are of cells. For swept floor see FloorReport.
+    """The coverage in cells, and the areas of these cells. For swept floor see FloorReport.
 
     Attributes:
         coverable: cells that are reachable, or have been since the order began.
@@ -77,10 +77,10 @@ class FloorReport(Document, frozen=True):
 
     Attributes:
         swept_m2: floor that the tool has passed over, reachable now or not.
-        reachable_m2: known floor that the tool can reach and has to sweep; for a robot that is shut
-            in, floor that it could reach since the order began; null if the robot drives through
-            the centres of cells.
-        left: unswept part of that by reason, the largest first; null if unknown.
+        reachable_m2: known floor that the tool can reach and has to sweep, or could reach since the
+            order began while the robot is shut in; null if the robot drives through the centres of
+            cells.
+        left: unswept part of reachable_m2 by reason, the largest first; null if unknown.
         out_of_reach: free floor on the map that the tool cannot reach, whether part of the order or
             not, by reason, the largest first; null if unknown.
         possible_m2: floor that the tool would reach if walls and furniture were a pixel thinner
@@ -174,9 +174,9 @@ class MissionReport(Document, frozen=True):
         waits_for_room: name of the room that the order waits for; null for none.
         left_out: rooms that the order for everything leaves out, by their settings.
         time_left_s: time until the order ends with the robot at home [s]; null without a limit.
-        first_from: least priority of the floor that is planned now, if time or battery do not
-            suffice for all; null otherwise.
-        last_order: while there is no order, the cancelled one, as it was given; null for none.
+        first_from: floor of this priority or more is planned now, as time or battery do not suffice
+            for all; null if all floor is planned.
+        last_order: the order that was cancelled, as given, while no other has begun; null for none.
     """
 
     ordered: Annotated[str | None, allowed(enum=("command", "itself", None))] = None
@@ -206,7 +206,7 @@ class MissionReport(Document, frozen=True):
 
 
 class TroubleReport(Document, frozen=True):
-    """What is wrong while the mission is in its state.
+    """A fault, reported beside the state of the mission.
 
     Attributes:
         text: what is wrong, for a person.
@@ -236,7 +236,8 @@ class Replan(Document, frozen=True):
     """The reply to an accepted request for a new plan.
 
     Attributes:
-        plan: number of the plan; it is made once plan.plans of the status has reached it.
+        plan: number of the plan, which is made once plan.plans of the status has reached this
+            number.
     """
 
     robot: Name
@@ -248,9 +249,9 @@ class Version(Document, frozen=True):
     """The versions of a daemon.
 
     Attributes:
-        version: of the package.
-        protocol: of these keys.
-        zenoh: of eclipse-zenoh.
+        version: version of the package.
+        protocol: version of the keys.
+        zenoh: version of eclipse-zenoh.
     """
 
     version: str

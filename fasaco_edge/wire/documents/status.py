@@ -137,7 +137,7 @@ class DriveReport(Document, frozen=True):
 
     Attributes:
         planned_quarter_turn_s: value used in planning, from robot.quarter_turn_s or its limits.
-        speed_m_s: in straight driving.
+        speed_m_s: speed in straight driving.
         quarter_turn_s: a turn by about 90 degrees on the spot, with braking and starting.
         half_turn_s: a turn by about 180 degrees.
         turns: number of measured turns.
@@ -259,8 +259,8 @@ class MemberReport(Document, frozen=True):
     """Another robot of the fleet.
 
     Attributes:
-        name: of the robot.
-        state: of its mission, in its last message.
+        name: name of the robot.
+        state: state of its mission, in its last message.
         heard_s: time since that message.
         away: why it gets no part of the remaining cells; null if it gets one.
         swept_cells: cells swept by it that this robot need not sweep.
@@ -277,7 +277,7 @@ class FleetReport(Document, frozen=True):
     """The fleet, as this robot knows it.
 
     Attributes:
-        name: of the fleet.
+        name: name of the fleet.
         division: number of the newest division of the remaining cells.
         part_cells: number of reachable cells assigned to this robot; null if all are.
         members: the other robots, by name.
@@ -293,12 +293,12 @@ class Status(Document, frozen=True):
     """The status of a daemon. Members may be added; readers ignore unknown ones.
 
     Attributes:
-        version: of the package.
+        version: version of the package.
         reason: why it is in that state.
         troubles: the present troubles, at most one of each code.
         rss_mb: memory of the process [MB].
         cpu_s: processor time the process has used [s].
-        threads: of the process.
+        threads: number of threads of the process.
     """
 
     robot: Name = ""

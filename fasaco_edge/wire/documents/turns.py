@@ -44,7 +44,7 @@ class TakenSample(msgspec.Struct, frozen=True, array_like=True):
         topic: its topic.
         checksum: CRC-32 of its payload; 0 if the batch itself holds the sample.
         at: time of arrival of a map or an update [s]; 0 for others, whose time has no effect.
-        told: the sample itself, if it is from before the recorder listened; else None.
+        told: the sample itself, if it arrived before the recorder subscribed; else None.
     """
 
     topic: str
@@ -57,7 +57,7 @@ class PlanTaken(msgspec.Struct, frozen=True, array_like=True):
     """A finished plan.
 
     Attributes:
-        number: of the request.
+        number: number of the request.
         seconds: how long it took.
         stops: numbers, from 1, of the stop checks at which the planner was stopped; a replay stops
             at the same ones. A repair and the search after it may each have been stopped.
@@ -76,7 +76,7 @@ class Decided(msgspec.Struct, frozen=True, omit_defaults=True):
     """Decisions of a cycle that decided something or changed the state.
 
     Attributes:
-        state, reason: of the mission.
+        state, reason: state and reason of the mission.
         asked: number of the requested plan, and why; None for none.
         path: revision of the published path, why, and the CRC-32 of its cells; None for none.
         faults: codes of refused inputs.
@@ -95,7 +95,7 @@ class Cycle(msgspec.Struct, frozen=True, omit_defaults=True):
     """A cycle with any input or decision.
 
     Attributes:
-        number: of the cycle.
+        number: number of the cycle.
         is_begun: whether there is a mission; earlier events are held for it.
         samples: in the order they were taken in.
         patches_lost: map updates that were lost before them.

@@ -115,8 +115,8 @@ class Velocity:
     Attributes:
         speed_m_s: forward [m/s].
         turn_rad_s: counter-clockwise [rad/s].
-        frame: of a TwistStamped, the robot's own; "" for a Twist.
-        stamp_ns: of a TwistStamped [ns]; 0 for a Twist.
+        frame: frame of a TwistStamped, the robot's own; "" for a Twist.
+        stamp_ns: stamp of a TwistStamped [ns]; 0 for a Twist.
     """
 
     speed_m_s: float

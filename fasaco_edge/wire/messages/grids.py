@@ -96,7 +96,7 @@ def read_octets(
 
 
 _FLOAT32 = struct.Struct("<f")
-# A value far beyond any resolution; rounded up, it may overflow float32.
+# Far beyond any resolution; the decimals of larger values may overflow float32.
 _FAR = 1e30
 
 
@@ -126,8 +126,8 @@ class GridOctets:
 
     Attributes:
         geometry: its size and place.
-        octets: row by row, from the south; the values of a map are int8. Their range is not
-            checked.
+        octets: a byte for each cell, row by row, from the south; those of a map are int8, and not
+            checked for their range.
         frame: name of the map frame.
     """
 

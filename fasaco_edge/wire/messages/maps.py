@@ -132,7 +132,7 @@ def _least_and_most(cells: NDArray[np.int8]) -> tuple[int, int]:
         return int(np.minimum.reduce(cells, axis=None)), int(np.maximum.reduce(cells, axis=None))
     if not cells.size:
         return UNKNOWN, OCCUPIED
-    # A reduction of numpy takes a microsecond to start. min and max start faster, but copy
+    # A reduction of numpy takes a microsecond to start. argmin and argmax start faster, but copy
     # read-only data.
     return cells.item(cells.argmin()), cells.item(cells.argmax())
 

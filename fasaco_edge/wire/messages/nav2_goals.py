@@ -58,7 +58,7 @@ class Ending:
     Attributes:
         status: ``UNKNOWN``, ``SUCCEEDED``, ``CANCELED`` or ``ABORTED``.
         code: one of ``ERRORS``, or 0; Humble has none.
-        message: of the server, "" for none; only from Jazzy on.
+        message: message of the server, "" for none; only from Jazzy on.
     """
 
     status: int
@@ -81,8 +81,8 @@ def encode_goal(
     Args:
         goal_id: ``GOAL_ID_BYTES`` unique bytes.
         points: of the path [m], at least two; each pose faces the next one, or away from it.
-        frame: of the points.
-        stamp_ns: of the path [ns]; 0 for the newest transform.
+        frame: frame of the points.
+        stamp_ns: stamp of the path [ns]; 0 for the newest transform.
         plugins: as many names as the server's release has, see ``ros_keys.RELEASES``.
         end_yaw: heading of the last pose [rad]; None for the previous pose's heading.
         is_back: whether poses face away from the next one: the robot drives backward.

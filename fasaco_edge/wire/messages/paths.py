@@ -86,8 +86,8 @@ def decode_path(payload: bytes) -> PathMessage:
     """Return the path in a nav_msgs/Path.
 
     Raises:
-        MalformedMessage: it is no such message, has over ``MAX_PATH_POSES`` poses, or a pose
-            names another frame than the path; a pose without a frame is in the path's.
+        MalformedMessage: it is no such message, has over ``MAX_PATH_POSES`` poses, or a pose names
+            another frame than the path; a pose need not name any.
     """
     reader = CdrReader(payload, PATH)
     frame, stamp_ns = read_header(reader)

@@ -155,7 +155,7 @@ class Link:
     Attributes:
         transform: the transform.
         is_static: whether it is static.
-        came_at: time of arrival [s] of the first transform with its stamp.
+        came_at: time of arrival of the first transform with the same stamp [s].
     """
 
     transform: Transform
@@ -191,8 +191,8 @@ class TransformTree:
     ) -> StampedPose | None:
         """Store transforms; return the robot's pose if it is known and has changed.
 
-        It has the stamp of the moving link nearest to the robot, which is odometry. ``came_at``:
-        the transforms' time of arrival [s].
+        The pose has the stamp of the moving link nearest to the robot, which is odometry.
+        ``came_at``: the transforms' time of arrival [s].
 
         Raises:
             TransformLoop: the frames form a loop; their links are dropped.
@@ -256,7 +256,7 @@ class TransformTree:
 
 
 def _placed(frame: Pose2D, pose: Pose2D) -> Pose2D:
-    """Return ``pose``, given in a frame at ``frame``, in the parent of that frame."""
+    """Return a pose in the parent of its frame; ``frame``: the pose of its frame in the parent."""
     cos, sin = math.cos(frame.yaw), math.sin(frame.yaw)
     return Pose2D(
         frame.x + cos * pose.x - sin * pose.y,

@@ -126,7 +126,7 @@ class NoisyMapper(Mapper):
         self._scans: list[_Scan] = []
         self._at: Pose2D | None = None
 
-    def believed(self, pose: Pose2D) -> Pose2D:
+    def estimated(self, pose: Pose2D) -> Pose2D:
         """Return the estimated pose of a robot at ``pose``."""
         drifted, match = composed(self._frame, pose), self._match
         yaw = math.remainder(drifted.yaw + match.yaw, math.tau)
@@ -145,7 +145,7 @@ class NoisyMapper(Mapper):
         if self._scans and not _is_away(pose, self._scans[-1].pose):
             return None
         self._match = self._drawn_match()
-        scan = _Scan(pose, self.believed(pose), self._ways(pose))
+        scan = _Scan(pose, self.estimated(pose), self._ways(pose))
         self._scans.append(scan)
         changed = self._count(scan, 1)
         if len(self._scans) % LOOP_EVERY == 0 and self._noise.closes_loops:

@@ -166,7 +166,7 @@ class Product:
         reply = StatusBoard(self._config).reply(self._runner, self._stepped_at)
         shown, grid = None, self._mission.grid
         if grid is not None:
-            shown = self._mission.covered.floor.snapshot().shown(
+            shown = self._mission.covered.floor.snapshot().as_grid(
                 MOST_SQUARES, grid.frame, grid.stamp_ns
             )
         if shown is not None:

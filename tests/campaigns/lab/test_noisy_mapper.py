@@ -107,7 +107,7 @@ def far_off(noise, times):
     errors = []
     for pose in rounds(times):
         mapper.scan(pose)
-        there = mapper.believed(pose)
+        there = mapper.estimated(pose)
         errors.append(np.hypot(there.x - pose.x, there.y - pose.y))
         back = mapper.true_place(there.x, there.y)
         assert np.hypot(back[0] - pose.x, back[1] - pose.y) < 1e-9
@@ -167,7 +167,7 @@ def test_the_robot_follows_its_own_map_to_the_end_of_the_path():
     world.follow(np.array([[0.7, 0.7], [3.2, 0.7], [3.2, 2.2], [0.7, 2.2]]))
     for _ in range(4000):
         world.tick()
-    assert np.hypot(world.believed.x - 0.7, world.believed.y - 2.2) < 0.002
+    assert np.hypot(world.estimated_pose.x - 0.7, world.estimated_pose.y - 2.2) < 0.002
     assert np.hypot(world.pose.x - 0.7, world.pose.y - 2.2) > 0.005
     assert world.collisions == world.stops == 0
 

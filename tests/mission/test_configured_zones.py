@@ -1,4 +1,4 @@
-"""Standing zones of the configuration: orders name them, and every mission keeps out."""
+"""Configured zones of the configuration: orders name them, and every mission keeps out."""
 
 import time
 import tracemalloc
@@ -12,7 +12,7 @@ from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.mission.events import MapReceived, State
 from fasaco_edge.mission.map.frame_selector import PATIENCE_S
 from fasaco_edge.mission.orders.mask import inline_grid, inline_mask, mask_polygons
-from fasaco_edge.mission.orders.order import StandingZone, read_order
+from fasaco_edge.mission.orders.order import ConfiguredZone, read_order
 from fasaco_edge.mission.orders.zones import with_kept_out
 from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.world import (
@@ -27,7 +27,7 @@ from tests.mission.world import (
 )
 
 ROOM = (".........",) * 6
-KITCHEN = StandingZone(name="kitchen", polygon=[tuple(at) for at in rectangle(0, 6, 3, 9)])
+KITCHEN = ConfiguredZone(name="kitchen", polygon=[tuple(at) for at in rectangle(0, 6, 3, 9)])
 COLUMN = tuple(tuple(at) for at in rectangle(2, 2, 4, 4))
 
 

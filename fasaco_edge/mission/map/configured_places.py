@@ -1,9 +1,9 @@
 """Configured places: zones, keep-out zones, home and dock, valid on one map.
 
 That map is in the configured frame ``map_frame``, or else in the first frame used with these
-places, which is kept with the ledger. On a map in another frame, or of another building, the places
-are not used; if keep-out zones are configured, the robot does not drive there, as it does not know
-where they are on that map. After a command ``reset`` the places belong to the map in use.
+places; the ledger keeps that frame. On a map in another frame, or of another building, the places
+are not used. If keep-out zones are configured, the robot does not drive on such a map, as their
+place on it is unknown. After a command ``reset`` the places belong to the map in use.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class PlacesNote:
 NO_PLACES = PlacesNote()
 
 
-class StandingPlaces:
+class ConfiguredPlaces:
     """Returns the configured places while the map they belong to is in use.
 
     Attributes:

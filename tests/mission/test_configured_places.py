@@ -8,14 +8,14 @@ from fasaco_edge.errors import PlacesElsewhere
 from fasaco_edge.mission.config import BatteryPolicy, Dock, Place
 from fasaco_edge.mission.events import BatteryReceived, MapReceived, State
 from fasaco_edge.mission.orders.mask import inline_grid
-from fasaco_edge.mission.orders.order import StandingZone
+from fasaco_edge.mission.orders.order import ConfiguredZone
 from fasaco_edge.mission.work.order_state import OrderState
 from tests.mission.test_other_building import FLOOR, OTHER
 from tests.mission.world import CONFIG, Drive, building, pose_at, rectangle, with_policy
 
 HERE = (1, 1)
 KEEP_OUT = (tuple(map(tuple, rectangle(3, 3, 5, 5))),)
-ZONES = (StandingZone(name="kitchen", polygon=tuple(map(tuple, rectangle(1, 1, 4, 4)))),)
+ZONES = (ConfiguredZone(name="kitchen", polygon=tuple(map(tuple, rectangle(1, 1, 4, 4)))),)
 HOME = Place(x_m=2.1, y_m=1.1)
 WITH_ALL = with_policy(CONFIG, keep_out=KEEP_OUT, zones=ZONES, home=HOME)
 WITHOUT_KEEP_OUT = with_policy(CONFIG, zones=ZONES, home=HOME)
