@@ -62,8 +62,8 @@ INDENT = " " * len("assumed:    ")
 HEAD = "# Every key, with its default and what it means: deploy/fasaco-edge.yaml\n"
 EPILOG = """\
 On a terminal it asks for values that no option gives; elsewhere radius or size, tool width and
---map-by are required. The file contains the values that differ from the defaults, and is checked as
-by `check-config`.
+--map-by are required. The file contains size and tool, and what differs from the defaults; it is
+checked as by `check-config`.
 
 examples:
   fasaco-edge init
@@ -174,13 +174,17 @@ def run(args: argparse.Namespace) -> int:
 
 
 def document_of(args: argparse.Namespace) -> dict[str, object]:
-    """Return the settings that differ from the defaults."""
+    """Return the robot's size and tool, and other settings that differ from the defaults."""
     from fasaco_edge.config.robot import RobotConfig
 
     usual = RobotConfig()
     ros = {"domain": args.domain, "namespace": args.namespace}
     parts: dict[str, dict[str, object]] = {
-        "robot": {k: v for k, v in _robot(args).items() if v != getattr(usual, k)},
+        "robot": {
+            k: v
+            for k, v in _robot(args).items()
+            if k in ("radius_m", "tool_width_m") or v != getattr(usual, k)
+        },
         "bus": {},
         "ros2": {},
     }

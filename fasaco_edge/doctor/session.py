@@ -106,7 +106,9 @@ def session(context: CheckContext) -> Finding:
         found = f"no answer at {', '.join(silent)}: the daemon {then}"
         return make(found, "start the router there, or correct bus.connect", details)
     if not is_taken:
-        return ok("the endpoints are free", details)
+        there = ", ".join(endpoint for endpoint in bus.connect if endpoint not in silent)
+        found = "the endpoints are free" if bus.listen else f"{there}: a program listens there"
+        return ok(found, details)
     try:
         with _joined(context) as joined:
             met = " and ".join(joined.met()) or "no other session"
@@ -159,7 +161,7 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
     status = _status(bus, keys.rpc("status")) if keys.of(topics.ALIVE) in alive else None
     for kind, senders in received.items():
         count = senders.total()
-        details.append(f"{kind}: {f'{count} in {listen_s:g} s' if count else 'nothing received'}")
+        details.append(f"{kind}: {count or 'nothing received'} in {listen_s:g} s")
     several = _several(bus, received)
     if keys.of(topics.ALIVE) not in alive:
         found = f"no daemon of robot {keys.robot!r}; {_in_words(received)}"
@@ -185,8 +187,10 @@ def _seen(context: CheckContext, bus: Bus, listen_s: float) -> Finding:
             )
         return warn(found, to_do, details)
     if status.troubles:
-        texts, to_dos = zip(*((each.text, each.do) for each in status.troubles), strict=True)
-        return warn("; ".join((found, *texts)), "; ".join(to_dos), details)
+        # While the robot drives, a trouble is the reason of its state.
+        texts = [each.text for each in status.troubles if each.text != status.reason]
+        to_do = "; ".join(each.do for each in status.troubles)
+        return warn("; ".join((found, *texts)), to_do, details)
     return warn(f"{found}; {several}", ONE_ONLY, details) if several else ok(found, details)
 
 

@@ -119,7 +119,8 @@ class FollowerNode(Node):
         if self._settings.dry_run and now - self._reported_at >= REPORT_EVERY_S:
             self._reported_at, sent = now, command or STAND
             turn = math.degrees(sent.turn_rate)
-            self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {follower.state.value}")
+            why = f"{follower.state.value}{f': {follower.detail}' if follower.detail else ''}"
+            self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {why}")
 
     def _send(self, command: VelocityCommand) -> None:
         """Send a command; send none in a dry run, or while another follower drives."""

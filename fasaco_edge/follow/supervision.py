@@ -127,7 +127,7 @@ class Supervision:
             self._have_none(FollowerState.BAD_PATH, str(error))
             return
         if not points.left:
-            self._have_none(FollowerState.EMPTY_PATH)
+            self._have_none(FollowerState.EMPTY_PATH, "`fasaco-edge mission status` says why")
             return
         self.has_path, self.path_frame = True, points.frame
         self._have(points)

@@ -182,6 +182,11 @@ def _chapter(
     complete: bool | None = None
     if state and (state != "done" or counted):
         complete = state == "done" and bool(covered) and covered == coverable
+    paused_s = sum(
+        max(min(span.end_s, end_s) - max(span.begin_s, begin_s), 0.0)
+        for span in states
+        if span.name == "paused"
+    )
     times = data.times[1:]
     zones = _zones(data, begin_s, until)
     return OrderChapter(
@@ -197,11 +202,7 @@ def _chapter(
         replans=sum(
             begin_s <= path.at_s < until for path in data.paths if path.about.planner is not None
         ),
-        paused_s=sum(
-            max(min(span.end_s, end_s) - max(span.begin_s, begin_s), 0.0)
-            for span in states
-            if span.name == "paused"
-        ),
+        paused_s=round(paused_s, 3),
         driven_m=round(float(data.ways_m[(times >= begin_s) & (times < until)].sum()), 2),
         unreached=list(statuses[-1].mission.unreached.areas) if statuses else [],
     )

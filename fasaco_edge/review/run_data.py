@@ -11,6 +11,7 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from fasaco_edge.bus.arrival import Arrival
@@ -300,4 +301,7 @@ class _SampleReader:
         # Ignore a path published again, and revision 0, which a daemon publishes before a mission.
         if not about.revision or (paths and paths[-1].about.revision == about.revision):
             return
+        planner = known_settings(self.data.config).planner.name
+        if (about.planner, planner) == ("fasaco", "colony-search"):  # see ``renamed``
+            about = structs.replace(about, planner=planner)
         paths.append(PathSample(self._now, about))

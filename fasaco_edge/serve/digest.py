@@ -1,18 +1,23 @@
-"""The page's documents about a robot: state, progress, areas and events."""
+"""The page's documents about a robot: state, progress, areas, rooms and events."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 from itertools import islice
 from typing import Any
 
 from fasaco_edge.client import phrases
 from fasaco_edge.client.phrases import EventLog
 from fasaco_edge.client.robot_state import RobotState
+from fasaco_edge.grid.geometry import Bounds, Polygon
+from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.serve import plain
+from fasaco_edge.serve.last_order import again, order_of, rooms_of
 from fasaco_edge.wire.documents.json_text import Corners
-from fasaco_edge.wire.documents.replies import FloorReport, MissionReport
+from fasaco_edge.wire.documents.replies import FloorReport, MissionReport, ZoneReport
+from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
 from fasaco_edge.wire.documents.settings import KnownSettings
 from fasaco_edge.wire.documents.status import FleetReport, Status
 from fasaco_edge.wire.reasons import plain as plain_words
@@ -54,7 +59,7 @@ def state(
     if mission.last_order is not None:
         order = mission.last_order
     elif order is None and ordered is not None:
-        order = _order_of(view, ordered.mission)
+        order = order_of(view, ordered.mission)
     return found | {
         "state": status.state,
         "word": plain.WORDS.get(status.state, status.state),
@@ -71,8 +76,8 @@ def state(
         "grows": view.grows(now),
         "simulated": phrases.scale_words(view.settings.robot.time_scale),
         "time_scale": view.settings.robot.time_scale,
-        "mission": _mission(mission),
-        "again": _again(order),
+        "mission": _mission(view, status),
+        "again": again(order),
         "battery": battery and {"level": battery.level, "power": battery.power},
         "in_trouble": bool(status.troubles),
         "faults": list(_faults(status)),
@@ -122,7 +127,8 @@ def _to_go_s(view: RobotState, status: Status) -> int | None:
     return None if not left_s or left_s > MOST_TO_GO_S else round(left_s)
 
 
-def _mission(mission: MissionReport) -> Digest:
+def _mission(view: RobotState, status: Status) -> Digest:
+    mission, rooms = status.mission, rooms_of(view)
     return {
         "ordered": mission.ordered,
         "stage": mission.stage,
@@ -137,7 +143,7 @@ def _mission(mission: MissionReport) -> Digest:
                 "name": zone.name,
                 "pass": zone.pass_number,
                 "passes": zone.passes,
-                "share": zone.covered / zone.cells if zone.cells else 0.0,
+                "share": _share(zone, rooms.get(zone.name), status),
             }
             for zone in mission.zones[:MOST_AREAS]
         ],
@@ -146,6 +152,17 @@ def _mission(mission: MissionReport) -> Digest:
         "time_left_s": mission.time_left_s,
         "home": [mission.home.x, mission.home.y] if mission.home else None,
     }
+
+
+def _share(zone: ZoneReport, room: RoomReport | None, status: Status) -> float | None:
+    """Return the share of a zone: of the room's floor, as on the map, else of all the order's floor
+    if it has no other zone, else of cells; None if the zone has none."""
+    if room is not None and room.swept is not None:
+        return room.swept
+    floor = status.floor
+    if len(status.mission.zones) == 1 and floor and floor.reachable_m2 and floor.left is not None:
+        return (floor.reached_m2 or 0.0) / floor.reachable_m2
+    return zone.covered / zone.cells if zone.cells else None
 
 
 def _part(mission: MissionReport) -> str:
@@ -164,54 +181,6 @@ def _comes_more(mission: MissionReport) -> bool:
     is_last_pass = (mission.pass_number or 1) >= mission.passes
     is_last_zone = mission.zone in (None, *(zone.name for zone in mission.zones[-1:]))
     return not (is_last_pass and is_last_zone)
-
-
-def _order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
-    """Return the order in a status, for an order commanded before this server began; else None.
-
-    A zone with the name of a room is that room. The status has the number of passes, not their
-    kinds.
-    """
-    if mission.ordered != "command":
-        return None
-    configured = {zone.name for zone in view.settings.mission.zones}
-    rooms = {room.title: room for room in view.rooms.rooms if room.title not in configured}
-    zones: list[Digest] = []
-    for zone in mission.zones:
-        found: Digest = {"name": zone.name, "passes": zone.passes}
-        if room := rooms.get(zone.name):
-            found["room"], usual = room.id, room.passes or 1
-            if zone.passes == (usual if isinstance(usual, int) else len(usual)):
-                del found["passes"]
-        elif zone.polygon:
-            found["polygon"] = zone.polygon
-        zones.append(found)
-    return {
-        "zones": zones,
-        "keep_out": [each.polygon for each in mission.keep_outs if each.by == "order"],
-        "return_home": mission.return_home,
-    }
-
-
-def _again(order: dict[str, Any] | None) -> Digest | None:
-    """Return the last order by command, which the user can repeat once it is over; else None.
-
-    It is sent from the order's beginning on: the page keeps it if this server restarts before the
-    end. It is empty if it equals the order of the Start button.
-    """
-    if order is None:
-        return None
-    # A room is repeated by its number only, as its outline may have changed since.
-    given = order.get("zones")
-    zones = [
-        {name: value for name, value in zone.items() if name != "polygon" or "room" not in zone}
-        for zone in (given if isinstance(given, list) else ())
-        if isinstance(zone, dict)
-    ]
-    is_usual = order.get("passes") in (None, 1) and not (
-        zones or order.get("keep_out") or order.get("return_home")
-    )
-    return {} if is_usual else order | {"zones": zones, "keep_covered": False}
 
 
 def _faults(status: Status) -> Iterator[str]:
@@ -276,3 +245,77 @@ def lately(events: EventLog) -> list[Digest]:
         {"at_s": round(entry.at_s + offset, 1), "text": entry.text, "tone": entry.tone}
         for entry in reversed(entries)
     ]
+
+
+# Limit on the rooms shown.
+MOST_ROOMS = 250
+# Number of tints in the style sheet; distance up to which two rooms get different tints [m].
+TINTS, NEAR_M = 6, 0.4
+
+
+def rooms(found: Rooms) -> Digest:
+    """Return the document of rooms: outlines, settings, tints, and places of labels.
+
+    Swept shares have a document of their own, as they change while the robot drives.
+    """
+    shown = [each for each in found.outlined[:MOST_ROOMS] if len(each.outline) <= MOST_CORNERS]
+    tints = _tints(shown)
+    return {"rooms": [_room(each, tints[each.id]) for each in shown]}
+
+
+def shares(found: Rooms) -> Digest:
+    """Return the swept share of each room by its number; None if it has no floor to sweep."""
+    share = {
+        str(each.id): None if each.swept is None else round(each.swept, 2)
+        for each in found.rooms[:MOST_ROOMS]
+    }
+    return {"swept": share}
+
+
+def _room(room: RoomReport, tint: int) -> Digest:
+    label = _label(room.outline)
+    return {
+        "id": room.id,
+        "name": room.name,
+        "title": room.title,
+        "outline": [[round(x, 2), round(y, 2)] for x, y in room.outline],
+        "neighbours": room.neighbours,
+        "encloses": room.encloses,
+        "m2": round(room.area_m2, 1),
+        "passes": room.passes,
+        "skip": room.skip,
+        "priority": room.priority,
+        "tint": tint,
+        "label": label and [round(value, 2) for value in label],
+    }
+
+
+# The cache helps because most rooms stay unchanged.
+_label = lru_cache(MOST_ROOMS)(label_place)
+
+
+def _tints(found: Sequence[RoomReport]) -> dict[int, int]:
+    """Return a tint for each room by its number; rooms near to each other differ if possible.
+
+    Rooms are tinted in order of number, so that a new room does not change the tints of others.
+    """
+    bounds = {room.id: _bounds(room.outline) for room in found}
+    tints: dict[int, int] = {}
+    for room in sorted(found, key=lambda room: room.id):
+        near = (other for other in tints if _are_near(bounds[room.id], bounds[other]))
+        taken = {tints[other] for other in near}
+        order = [(room.id - 1 + index) % TINTS for index in range(TINTS)]
+        tints[room.id] = next((tint for tint in order if tint not in taken), order[0])
+    return tints
+
+
+def _bounds(outline: Polygon) -> Bounds:
+    xs, ys = [x for x, _ in outline], [y for _, y in outline]
+    return min(xs), min(ys), max(xs), max(ys)
+
+
+def _are_near(one: Bounds, other: Bounds) -> bool:
+    return all(
+        one[axis] < other[axis + 2] + NEAR_M and other[axis] < one[axis + 2] + NEAR_M
+        for axis in (0, 1)
+    )

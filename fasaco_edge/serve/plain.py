@@ -53,7 +53,8 @@ NEEDS = {
     "stands": "It does not move. Check whether a cable, a carpet or furniture holds it.",
     "beside_line": "It drives beside its path and may leave strips. Call service.",
     "two_publishers": "Two programs send it different maps or places. Call service.",
-    "no_effect": "A keep-out, its home or its dock lies where it has seen no floor. Check the map.",
+    "no_effect": "A keep-out, its home or its dock lies where it has seen no floor yet. If it has "
+    "seen everything, check the map.",
 }
 """What the owner can do about a trouble, by its code."""
 UNSAVED = "It cannot save what it has swept: after a power cut it would start over. Call service."
@@ -162,13 +163,13 @@ class LeftFloor:
 
     Attributes:
         reason: why it is unswept, in the owner's words.
-        m2: its area [m2].
+        m2: its area [m2]; None if that is not known.
         marks: its marks on the map, see ``MARKS``.
         places: points (x, y) in it [m], if it has no marks.
     """
 
     reason: str
-    m2: float = 0.0
+    m2: float | None = 0.0
     marks: int = 0
     places: list[tuple[float, float]] = field(default_factory=list)
 
@@ -176,32 +177,36 @@ class LeftFloor:
 def left(status: Status, ordered: Status | None = None) -> list[LeftFloor]:
     """Return the unswept floor of an order, the largest part first.
 
-    ``ordered``: the newest status with an order, which may be over by now.
+    ``ordered``: the newest status with an order, which may be over by now; None if no such status
+    has come: how much an order left that was cancelled before is not known then.
     """
-    is_ended = status.mission.ordered is None
-    if is_ended and (ordered is None or not (status.floor and status.floor.swept_m2)):
+    is_ended, found = status.mission.ordered is None, dict[str, LeftFloor]()
+    if is_ended and not (status.floor and status.floor.swept_m2):
         return []
+    if is_ended and ordered is None:
+        if status.mission.last_order is None:
+            return []
+        found[ENDED] = LeftFloor(ENDED, None, REST)
     of = ordered if is_ended and ordered is not None else status
-    mission, floor, found = of.mission, of.floor or FloorReport(), dict[str, LeftFloor]()
+    mission, floor = of.mission, of.floor or FloorReport()
     for part in floor.left or ():
         reason, marks = _why_left(part, of)
         if is_ended and mission.stage != "over":
             reason, marks = ENDED, REST
         elif part.reason in TO_COME and mission.stage != "over":
             continue
-        _of(found, reason, marks).m2 += part.m2
+        _add(found, reason, part.m2, marks)
     for part in floor.out_of_reach or ():
         reason = _why_closed(of) if part.reason == CLOSED else LEFT.get(part.reason, OTHERWISE)
-        _of(found, reason, MARKS.get(part.reason, 0)).m2 += part.m2
+        _add(found, reason, part.m2, MARKS.get(part.reason, 0))
     for area in mission.unreached.areas:
         # If the status has figures of floor, only cells outside of them count: none counts twice.
         if floor.left is None or area.reason in NO_FLOOR:
             is_tried = area.reason.startswith(TRIED)
-            kind = _of(found, NOT_REACHED if is_tried else LEFT.get(area.reason, OTHERWISE))
-            kind.places.append((area.x, area.y))
-            kind.m2 += area.m2
-    larger = (kind for kind in found.values() if kind.m2 >= LEAST_M2)
-    return sorted(larger, key=lambda kind: -kind.m2)
+            reason = NOT_REACHED if is_tried else LEFT.get(area.reason, OTHERWISE)
+            _add(found, reason, area.m2).places.append((area.x, area.y))
+    larger = (kind for kind in found.values() if kind.m2 is None or kind.m2 >= LEAST_M2)
+    return sorted(larger, key=lambda kind: -math.inf if kind.m2 is None else -kind.m2)
 
 
 def _why_left(part: FloorLeft, of: Status) -> tuple[str, int]:
@@ -228,7 +233,9 @@ def _why_closed(of: Status) -> str:
     return LEFT[BEHIND] if m2[OBSTACLES] < LEAST_M2 else BEHIND_OR_NO_WAY
 
 
-def _of(found: dict[str, LeftFloor], reason: str, marks: int = 0) -> LeftFloor:
+def _add(found: dict[str, LeftFloor], reason: str, m2: float, marks: int = 0) -> LeftFloor:
     kind = found.setdefault(reason, LeftFloor(reason))
     kind.marks |= marks
+    if kind.m2 is not None:
+        kind.m2 += m2
     return kind

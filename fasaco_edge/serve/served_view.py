@@ -11,7 +11,7 @@ from functools import partial
 from fasaco_edge.bus.arrival import Sample
 from fasaco_edge.client.robot_state import RobotState, WatchedPath
 from fasaco_edge.errors import FasacoError
-from fasaco_edge.serve.digest import areas, lately, state
+from fasaco_edge.serve.digest import areas, lately, rooms, shares, state
 from fasaco_edge.serve.messages import (
     COVERAGE_MARKS,
     FIELD_MARKS,
@@ -22,7 +22,6 @@ from fasaco_edge.serve.messages import (
     map_marks,
     message_text,
 )
-from fasaco_edge.serve.room_digest import rooms, shares
 from fasaco_edge.wire.documents.fleet import decode_member
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.path_documents import PathAttachment

@@ -1,4 +1,4 @@
-"""``init`` writes what differs from the defaults, refuses what is wrong, tells what it heard."""
+"""``init`` writes size, tool and what is no default, refuses faults, and says what it received."""
 
 from __future__ import annotations
 
@@ -21,16 +21,19 @@ def init(file, *words):
     return main(["init", str(file), "--no-try", *words])
 
 
-def test_it_has_nothing_in_it_but_what_differs_from_the_defaults(tmp_path, capsys):
+def test_it_has_size_and_tool_and_else_what_is_no_default(tmp_path, capsys):
     file = tmp_path / "robot.yaml"
     assert init(file, *GIVEN, "--clearance", "0") == 0
-    assert file.read_text().splitlines()[1:] == ["robot:", "  radius_m: 0.2"]
+    described = ["robot:", "  radius_m: 0.2", "  tool_width_m: 0.3"]
+    assert file.read_text().splitlines()[1:] == described
     printed = capsys.readouterr().out
     assert "\n  robot:\n    radius_m: 0.2\n" in printed
     assert f"fasaco-edge run --config {file}" in printed
     default = ["--robot-radius", "0.18", "--tool-width", "0.3", "--map-by", "zenoh"]
     default += ["--clearance", "0"]
     assert init(file, *default, "--force") == 0
+    # What was given is there to be read, also where it is the default.
+    assert "radius_m: 0.18\n" in file.read_text()
     assert load_config(file) == DaemonConfig()
 
 
@@ -56,7 +59,11 @@ def test_ros_and_a_router(tmp_path, capsys):
     assert (config.bus.mode, config.bus.listen) == ("client", ())
     told = json.loads(capsys.readouterr().out)
     assert (told["file"], told["heard"]) == (str(file), None)
-    assert told["config"]["robot"] == {"clearance_m": 0.02, "tool_width_m": 0.4}
+    assert told["config"]["robot"] == {
+        "radius_m": 0.18,
+        "clearance_m": 0.02,
+        "tool_width_m": 0.4,
+    }
 
 
 @pytest.mark.parametrize(

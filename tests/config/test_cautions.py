@@ -37,6 +37,11 @@ def said(**sections):
         ({"robot": {"steered_deg": 5.0}}, "robot.steered_deg has no effect"),
         ({"planner": {"name": "colony-search"}}, ""),
         ({"planner": {"name": "fasaco"}}, "planner.name fasaco is the paper's colony"),
+        (
+            {"planner": {"ants": 300, "visibility": "distance", "threads": 2}},
+            "colony-search: planner.ants, planner.visibility, planner.threads",
+        ),
+        ({"planner": {"name": "aco", "ants": 300}}, ""),
         ({"scan": {"x_m": 0.1}}, ""),
         ({"scan": {"x_m": 3.0, "y_m": 4.0}}, "the lidar is 5 m from the robot's middle"),
         (

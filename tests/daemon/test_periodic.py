@@ -21,6 +21,8 @@ from fasaco_edge.daemon.loop.periodic import (
 )
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.mission.coverage.swept_floor import SweptFloor
+from fasaco_edge.mission.events import CommandReceived, State
+from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.wire.documents.json_text import decode_document
 from fasaco_edge.wire.documents.rooms import Rooms
 from fasaco_edge.wire.messages.maps import decode_occupancy_grid
@@ -95,20 +97,45 @@ def test_the_trail_is_sent_once_there_is_a_subscriber():
 
 def test_the_shares_of_rooms_are_of_floor_and_make_the_whole():
     """By cells they were more: floor along walls did not count."""
-    pixels = np.full((64, 124), 100, np.int8)
-    pixels[2:-2, 2:-2] = 0
-    pixels[:24, 60:64] = pixels[40:, 60:64] = 100
-    robot, sent = LineRobot(pixels, (1.0, 1.0)), Sent()
-    publisher = RoomsPublisher(sent, robot.mission.rooms)
+    robot = LineRobot(two_rooms(), (1.0, 1.0))
     robot.wait(90.0, lambda _: False)
-    publisher.publish(robot.mission, robot.now)
-    west, east = decode_document(sent.messages[-1][1], Rooms).rooms
+    west, east = rooms_of(robot)
     floor = floor_report(robot.mission)
     m2 = west.swept * west.area_m2 + east.swept * east.area_m2
     assert m2 == pytest.approx(floor.reached_m2, rel=0.05)
     by_cells = room_progress(robot.mission)
     m2 = sum(by_cells[room.id].share * room.area_m2 for room in (west, east))
     assert m2 > 1.04 * floor.reached_m2
+
+
+def test_an_order_leaves_the_share_of_other_rooms_as_it_was():
+    """It was of the floor that the tool touches from the room of the order, or of cells: 100 %."""
+    robot = LineRobot(two_rooms(), (1.0, 1.0))
+    assert robot.wait(600.0, lambda robot: robot.mission.state is State.DONE)
+    before = {room.id: room.swept for room in rooms_of(robot)}
+    west, east = before
+    assert 0.9 < before[west] < 0.99
+    order = read_order({"zones": [{"name": f"room {east}"}]})
+    robot.step(CommandReceived(1, "start", order, discard=True))
+    robot.wait(5.0, lambda _: False)
+    shares = {room.id: room.swept for room in rooms_of(robot)}
+    assert shares[west] == pytest.approx(before[west], abs=0.01)
+    assert shares[east] < 0.3
+
+
+def two_rooms():
+    """Return the pixels of two rooms side by side, with a door."""
+    pixels = np.full((64, 124), 100, np.int8)
+    pixels[2:-2, 2:-2] = 0
+    pixels[:24, 60:64] = pixels[40:, 60:64] = 100
+    return pixels
+
+
+def rooms_of(robot):
+    """Return the rooms as they would be published now, the western one first."""
+    sent = Sent()
+    RoomsPublisher(sent, robot.mission.rooms).publish(robot.mission, robot.now)
+    return decode_document(sent.messages[-1][1], Rooms).rooms
 
 
 def test_the_last_shares_of_an_order_do_not_wait():

@@ -334,6 +334,12 @@ def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
         assert "refused" not in status["reason"]
         assert session.peers(context).level is Level.OK
         assert session.peers(context).found.startswith("the daemon runs: covering, path ")
+        client = session.session(at(connect=(daemon.endpoint,), mode="client"))
+        assert client.found == f"{daemon.endpoint}: a program listens there"
+        # What is both reason and trouble is said once.
+        outsider.wait_status(lambda status: status["state"] == "degraded")
+        said = session.peers(context).found.removeprefix("the daemon runs: degraded, ").split("; ")
+        assert len(said) == len(set(said)) > 0
 
 
 def test_publishers_are_found_without_a_daemon(tmp_path):

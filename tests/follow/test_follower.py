@@ -88,7 +88,9 @@ NAN = bytes.fromhex("000000000000f87f")
 @pytest.mark.parametrize(
     ("act", "state", "words"),
     [
-        stops("an empty path", path_of(path_message([])), FollowerState.EMPTY_PATH),
+        stops(
+            "an empty path", path_of(path_message([])), FollowerState.EMPTY_PATH, "mission status"
+        ),
         stops("no path", path_of(b""), FollowerState.BAD_PATH, "encapsulation header"),
         stops("a short path", path_of(path_message(AHEAD)[:-1]), FollowerState.BAD_PATH, "poses"),
         stops(

@@ -12,7 +12,7 @@ from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import Pose2D, Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.reachable_area import AreaChange, ReachableArea, anchor_cell
-from fasaco_edge.mission.work.progress import FAR_CELLS, LOOK_AHEAD, PathProgress
+from fasaco_edge.mission.path.path_progress import FAR_CELLS, LOOK_AHEAD, PathProgress
 from tests import naive
 from tests.support.examples import examples
 from tests.support.grids import lattice, placed, problems, with_passages_closed

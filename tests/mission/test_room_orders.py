@@ -152,6 +152,20 @@ def test_an_equal_order_continues_after_its_room_has_grown():
     assert len(drive.visited) >= covered > 3
 
 
+def test_a_known_room_is_ordered_before_the_map_has_grown_to_it():
+    """As after a restart, with a mapper that begins anew; it was refused as off the map."""
+    drive = settled(*BOTH)
+    name(drive, room_at(drive, *IN_EAST).id, "kitchen")
+    drive.tell(MapReceived(building(*(row[:9] for row in BOTH))))
+    settle(drive)
+    start(drive, "kitchen")
+    assert drive.refused is None
+    drive.tell(MapReceived(building(*BOTH)))
+    settle(drive)
+    drive.finish()
+    assert len(visited(drive, EAST_COLUMNS)) == 90
+
+
 def test_an_order_waits_for_a_room_after_its_other_zones():
     drive = settled(*ONLY_WEST)
     name(drive, 1, "hall")

@@ -19,6 +19,7 @@ from fasaco_edge.config.loading import load_config
 from fasaco_edge.config.reading import renamed
 from fasaco_edge.daemon.ledger.file import LedgerFile
 from fasaco_edge.errors import BadConfiguration
+from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.wire.documents.path_documents import digest
 
 pytest.importorskip("rerun")
@@ -28,6 +29,8 @@ from fasaco_edge.recording.read.run import RecordedSamples
 from fasaco_edge.recording.read.timeline import open_timeline
 from fasaco_edge.replay.replay import RecordedRun, Replay, read_run
 
+SQUARE = {"polygon": [[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]]}
+RUG = [[1.0, 1.0], [1.5, 1.0], [1.5, 1.5]]
 DATA = Path(__file__).parents[1] / "data"
 
 
@@ -88,6 +91,7 @@ def test_a_recording_is_reviewed(recording, capsys):
 def test_moments_and_spots_of_a_recording_are_reviewed(recording, capsys):
     at = printed(capsys, "review", recording, "--at", "0:05")["at"]
     assert (at["state"], at["path"]["revision"]) == ("covering", 25)
+    assert at["plan"]["planner"] == "colony-search"
     assert (at["x"], at["y"]) == pytest.approx((3.15, 1.64), abs=0.01)
     (spot,) = printed(capsys, "review", recording, "--point", "1,1")["points"]
     assert (spot["swept"], spot["why"]) == (None, "not known")
@@ -121,6 +125,19 @@ def test_a_ledger_is_restored(tmp_path):
     assert np.count_nonzero(visits) == 15
     order = json.loads(found.ledger.note)
     assert (order["stage"], order["paused"], order["home"]) == ("covering", False, [2, 2])
+
+
+def test_an_order_paused_in_its_second_pass_is_restored():
+    """From the ledger of a build shortly before 1.0.0, without members that came later."""
+    order = {"zones": [SQUARE | {"name": "hall", "passes": 2}, SQUARE | {"name": "kitchen"}]}
+    order |= {"keep_out": [RUG], "return_home": True, "keep_covered": False}
+    note = {"version": 1, "order": order, "standing": False, "stage": "covering", "zone": 0}
+    note |= {"pass": 2, "begun": True, "tries": 0, "home": [1, 3], "paused": True, "why": ""}
+    state = OrderState.from_json(json.dumps(note))
+    assert (state.stage, state.paused, state.pass_number) == (Stage.COVERING, True, 2)
+    assert (state.begun, state.home, state.order.return_home) == (True, (1, 3), True)
+    assert [(zone.name, zone.passes) for zone in state.order.zones] == [("hall", 2), ("kitchen", 1)]
+    assert [list(map(list, polygon)) for polygon in state.order.keep_out] == [RUG]
 
 
 @pytest.mark.parametrize(

@@ -64,6 +64,11 @@ def test_three_orders_have_three_verdicts():
     ]
 
 
+def test_the_time_of_a_pause_is_rounded():
+    (order,) = told((0, "covering", 0, 9), (0.1, "paused", 0, 9), (0.3, "covering", 0, 9))
+    assert order.paused_s == 0.2
+
+
 def test_an_order_of_zones_is_judged_by_these():
     (order,) = restarted(MissionReport("command", zones=(ZoneReport("kitchen", 2, 1, 9, 9),)))
     assert (order.ordered, order.complete) == ("command", True)

@@ -38,6 +38,15 @@ BROWSER = shutil.which("chromium")
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="needs chromium")
 PHONE, LAPTOP = (390, 844), (1280, 800)
 READY = "Ready to sweep,false"
+# What the page asks if the robot has no map yet, and so counts what it has swept in any place.
+ASKED_WITHOUT_MAP = """(() => {
+  const sent = command, text = "start forgets up to 9 covered cells (0.8 m2)";
+  command = (name, members, { refused }) => refused({ code: "would_forget", text });
+  start({});
+  command = sent;
+  find("loss").close();
+  return find("losstext").textContent;
+})()"""
 # How many of some places all over the map are covered by something else.
 COVERED = """(() => {
   canvas.scrollIntoView();
@@ -304,6 +313,7 @@ def test_a_keep_out_applies_mid_mission_and_a_restart_asks_first(tmp_path):
             press(tab, "Back")
             assert outsider.ask_status()["coverage"]["covered"] == 12
             assert tab.js("drafts.length") == 1
+            assert tab.js(ASKED_WITHOUT_MAP) == "Up to 0.8 m² of it is swept already."
             tab.click("order")
             until(lambda: tab.js("find('loss').open"))
             press(tab, "Keep it, sweep the rest")

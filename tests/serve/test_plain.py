@@ -7,6 +7,7 @@ import re
 import pytest
 
 from fasaco_edge.daemon.loop import mission_reports
+from fasaco_edge.mission.events import State
 from fasaco_edge.mission.line import unswept
 from fasaco_edge.mission.work import uncovered
 from fasaco_edge.serve import plain
@@ -45,6 +46,12 @@ def test_each_state_has_plain_words(state):
     needs = plain.needs(status(state=state, troubles=troubles))
     assert len(set(needs)) == len(TROUBLES)
     assert not [text for text in needs if TECHNICAL.search(text)]
+
+
+@pytest.mark.parametrize("state", [state for state in State if state.is_at_rest])
+def test_a_robot_at_rest_is_not_said_to_sweep(state):
+    mission = FULL["mission"] | {"stage": "covering"}
+    assert not plain.does(status(state=state, mission=mission)).startswith("Sweeps")
 
 
 def test_a_room_that_is_waited_for_is_named():
@@ -105,6 +112,12 @@ def test_floor_left_is_listed_once_with_its_marks():
     canceled = status(floor=floor | {"left": []}, mission=mission | {"ordered": None})
     assert told_left(canceled, underway)[0] == (3.9, plain.ENDED, plain.REST, [])
     assert told_left(canceled) == []
+    # Of one that was cancelled before the page's server began, the map shows where.
+    cancelled = mission | {"ordered": None, "last_order": {}, "unreached": {"areas": []}}
+    assert told_left(status(floor=floor | {"left": []}, mission=cancelled)) == [
+        (None, plain.ENDED, plain.REST, []),
+        (1.5, "no way in: a closed door, or something in the way", 2, []),
+    ]
     forgotten = status(floor={"swept_m2": 0.0}, mission=mission | {"ordered": None})
     assert told_left(forgotten, underway) == []
 
@@ -134,4 +147,4 @@ def test_a_robot_without_a_map_is_shown_so():
 def told_left(of: Status, ordered: Status | None = None) -> list[tuple[object, ...]]:
     """Return the parts of the floor that are left."""
     parts = plain.left(of, ordered)
-    return [(round(part.m2, 3), part.reason, part.marks, part.places) for part in parts]
+    return [(part.m2 and round(part.m2, 3), part.reason, part.marks, part.places) for part in parts]

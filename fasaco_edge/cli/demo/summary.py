@@ -190,7 +190,8 @@ def _swept(summary: DemoSummary) -> str:
 
 
 def _time(summary: DemoSummary) -> str:
-    return f"{summary.wall_s} s, for {age(summary.makespan_s)} of the robot's time"
+    whose = "robot's" if len(summary.robots) == 1 else "robots'"
+    return f"{summary.wall_s} s, for {age(summary.makespan_s)} of the {whose} time"
 
 
 def _truth(args: argparse.Namespace, robots: Sequence[DemoRobot]) -> _Truth:

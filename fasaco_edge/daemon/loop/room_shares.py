@@ -25,17 +25,18 @@ class RoomShares:
         self._rooms = np.zeros((0, 0), np.uint16)
 
     def of(self, mission: Mission) -> dict[int, float]:
-        """Return the swept share of the ordered floor in each room, by the room's number.
+        """Return the swept share of the floor in reach in each room, by the room's number.
 
-        Rooms without such floor are left out. Empty if only cells are counted; and in a fleet, as
-        the floor that others sweep is not known.
+        The share is of the whole room, whatever the order asks for there. Rooms without such floor
+        are left out; so are all rooms if only cells are counted, and in a fleet, as the floor that
+        others sweep is not known.
         """
-        sheet, floor = mission.rooms.sheet, mission.line.asked_floor(MOST_SQUARES)
+        sheet, floor = mission.rooms.sheet, mission.line.floor_in_reach(MOST_SQUARES)
         if sheet is None or floor is None or mission.company.has_members:
             return {}
-        squares, asked, swept = floor
+        squares, within, swept = floor
         rooms = self._on(sheet.raster, mission.rotation.geometry(squares))
-        count = np.bincount(rooms[asked]).tolist()
+        count = np.bincount(rooms[within]).tolist()
         done = np.bincount(rooms[swept], minlength=len(count)).tolist()
         return {room: done[room] / count[room] for room in range(1, len(count)) if count[room]}
 

@@ -56,7 +56,8 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
     Args:
         args: arguments of the command line.
         asked: the command as a document.
-        shown: returns the text to show of an answer; None to show the reason of the robot's state.
+        shown: returns the text to show of an answer; None to show that the command
+            is accepted, and the reason of the robot's state.
 
     Raises:
         NobodyAnswersError: no robot of this fleet answers.
@@ -89,6 +90,9 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
     if args.json:
         print_json({member.robot: member.document for member in members})
     else:
+        # The reason of the state is no answer to a command: it may be that of the path.
+        accepted = "" if asked.get("command") == "status" else "accepted: "
+        shown = shown or (lambda answer: f"{accepted}{plain(answer.reason)}".removesuffix(": "))
         out().print(_table(args.fleet, members, shown))
     return Exit.ERROR if any(member.refused for member in members) else Exit.OK
 
@@ -140,7 +144,7 @@ def _member(robot: str, found: list[QueryReply]) -> _Member:
     return _Member(robot, document, f"refused: {refusal.message}{yes}", is_loss)
 
 
-def _table(fleet: str, members: list[_Member], shown: Shown | None) -> Table:
+def _table(fleet: str, members: list[_Member], shown: Shown) -> Table:
     title = f"Fleet {one_line(fleet)}"
     table = Table("robot", "state", "covered", "answer", title=title, title_justify="left")
     for member in members:
@@ -148,10 +152,9 @@ def _table(fleet: str, members: list[_Member], shown: Shown | None) -> Table:
     return table
 
 
-def _cells(member: _Member, shown: Shown | None) -> tuple[str, str, str]:
+def _cells(member: _Member, shown: Shown) -> tuple[str, str, str]:
     if member.refused or member.document is None:
         return "-", "-", one_line(member.refused)
     answer = tolerant(member.document, replies.Reply)
     covered = phrases.covered(answer.coverage) if answer.coverage else "-"
-    said = shown(answer) if shown else plain(answer.reason)
-    return one_line(answer.state), covered, one_line(said)
+    return one_line(answer.state), covered, one_line(shown(answer))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import GridGeometry, Pose2D, Window
+from fasaco_edge.kernels.floor.bits import unpacked
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.events import PathUpdate
@@ -204,10 +205,10 @@ class LineLayer:
             return None
         return floor.geometry, self._ahead.tally.unswept()
 
-    def asked_floor(
+    def floor_in_reach(
         self, most: int
     ) -> tuple[GridGeometry, NDArray[np.bool_], NDArray[np.bool_]] | None:
-        """Return which squares of the floor are asked for, and which of these are swept, bool.
+        """Return which squares of the floor the tool can reach, and which of these are swept, bool.
 
         None without a floor. ``most``: limit on the number of squares; where pixels are more,
         squares are wider, and count as the pixel in their middle.
@@ -217,10 +218,12 @@ class LineLayer:
             return None
         whole = floor.geometry
         step = math.ceil(math.sqrt(max(whole.rows * whole.cols / most, 1.0)))
-        asked, swept = self._ahead.tally.sampled(step)
-        rows, cols = asked.shape
+        within, swept = self._ahead.tally.sampled(step)
+        blocked = unpacked(floor.blocked[step // 2 :: step], whole.cols)
+        within &= ~blocked[:, step // 2 :: step]
+        rows, cols = within.shape
         square_m = whole.resolution * step
-        return replace(whole, rows=rows, cols=cols, resolution=square_m), asked, swept
+        return replace(whole, rows=rows, cols=cols, resolution=square_m), within, swept & within
 
     def ahead(self) -> AheadFigures | None:
         """Return figures of the line ahead; None without a line."""

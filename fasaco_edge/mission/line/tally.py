@@ -164,9 +164,12 @@ class SweepTally:
         return causes
 
     def sampled(self, step: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return which of every ``step``-th pixels are asked for, and which of these are swept."""
+        """Return which of every ``step``-th pixels are not out of reach, and which are swept.
+
+        Pixels that are not free are not out of reach, either.
+        """
         state = self._state[step // 2 :: step, step // 2 :: step]
-        return state & WANTED != 0, state & (WANTED | SWEPT) == WANTED | SWEPT
+        return state & CAUSE == 0, state & SWEPT != 0
 
     def open_in_m2(self, part: Window) -> float:
         """Return the open area in a window, whether the line ahead sweeps it or not [m2]."""

@@ -316,6 +316,8 @@ class MapState:
     def check_zones(self, order: MissionOrder) -> None:
         """Check that part of each zone, in the map frame, lies on the map, if there is one.
 
+        Rooms lie where they were found: a map that begins anew grows to them.
+
         Raises:
             OrderError: a zone lies off the map.
         """
@@ -324,7 +326,8 @@ class MapState:
         geometry = rotated_geometry(self.grid.geometry, self._config.lattice_deg or 0.0)
         west, south, east, north = whole = geometry.bounds()
         for index, zone in enumerate(order.as_given.zones):
-            x0, y0, x1, y1 = polygon_bounds(zone.polygon) if zone.polygon else whole
+            polygon = zone.polygon if not zone.room else None
+            x0, y0, x1, y1 = polygon_bounds(polygon) if polygon else whole
             if x1 <= west or x0 >= east or y1 <= south or y0 >= north:
                 raise OrderError(
                     f"zone {zone.name!r} lies outside of the map, "

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import FasacoError
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.mission.events import PlanBroken, PlanRequest
-from fasaco_edge.mission.work.progress import PathProgress
+from fasaco_edge.mission.path.path_progress import PathProgress
 from fasaco_edge.mission.work.sequencer import Sequencer
 from fasaco_edge.planners.problem import CoverageProblem
 from fasaco_edge.planners.walk_before import HELD_CELLS

@@ -15,8 +15,8 @@ from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.coverage.loop_closure import Motion, moved_cells
 from fasaco_edge.mission.events import BETTER, PathUpdate, PlanBroken, PlanReady, PlanRequest
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.path.path_progress import PathProgress
 from fasaco_edge.mission.path.plan_requests import BROKEN_S, Attempt, PlanRequests, SpareTime
-from fasaco_edge.mission.work.progress import PathProgress
 from fasaco_edge.mission.work.sequencer import Sequencer
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)

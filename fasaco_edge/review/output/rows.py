@@ -156,7 +156,11 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("driven", amount(document.driven_m, "m")),
         ("stood", _stood(document)),
         ("replans", replans),
-        ("refused", f"{document.faults} messages; lost {count(document.recorder_lost, '')}"),
+        (
+            "refused",
+            f"{document.faults} message{'s' * (document.faults != 1)}; "
+            f"lost {count(document.recorder_lost, '')}",
+        ),
         ("processor", _processor(document)),
     ]
     return [(name, text) for name, text in found if text]
@@ -271,7 +275,7 @@ def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
             clock(charge.at_s),
             clock(charge.seconds),
             " to ".join(
-                NOT_KNOWN if level is None else f"{level:.0%}"
+                NOT_KNOWN if level is None else f"{100 * level:.0f} %"
                 for level in (charge.level_from, charge.level_to)
             ),
         )

@@ -61,8 +61,10 @@ function start(what, discard = false) {
     refused: (answer) => {
       if (answer.code !== "would_forget") return;
       refused = what;
-      const swept = answer.text.match(/\(([\d.]+) m2\)/);
-      find("losstext").textContent = `${swept ? `${swept[1]} m² of it` : "Some of it"} is swept already.`;
+      // Before there is a map, the robot counts all that it has swept, here or elsewhere.
+      const swept = answer.text.match(/forgets (up to )?.*\(([\d.]+) m2\)/);
+      const most = swept && swept[1] ? "Up to " : "";
+      find("losstext").textContent = `${swept ? `${most}${swept[2]} m² of it` : "Some of it"} is swept already.`;
       say("", "");
       find("loss").showModal();
     },

@@ -89,9 +89,10 @@ function showLeft(state) {
   const parts = state.left, isOver = ["over", null].includes(state.mission.stage);
   find("left").hidden = !parts.length;
   find("left-what").textContent = isOver ? "Not swept" : "Left out so far";
-  find("left-m2").textContent = squares(parts.reduce((sum, part) => sum + part.m2, 0));
+  const isKnown = parts.every((part) => part.m2 !== null);
+  find("left-m2").textContent = isKnown ? `: ${squares(parts.reduce((sum, part) => sum + part.m2, 0))}` : "";
   find("left").querySelector("ul").replaceChildren(...parts.map((part) => {
-    const line = item(["span", "m2", squares(part.m2)], part.reason);
+    const line = item(["span", "m2", part.m2 === null ? "" : squares(part.m2)], part.reason);
     // A recording has no places of unswept floor, except of areas with a point.
     if (model.recording && !part.places.length) return line;
     const show = action("", () => showOnMap(part));
@@ -133,7 +134,7 @@ function showProgress(state) {
   const lines = state.mission.zones.map((zone) => {
     const pass = zone.passes > 1 ? `, pass ${zone.pass} of ${zone.passes}` : "";
     // The figures above refer to the current one.
-    const share = zone.name === state.mission.zone ? "now" : percent(zone.share);
+    const share = zone.name === state.mission.zone ? "now" : zone.share === null ? "–" : percent(zone.share);
     return item(["span", "", zone.name], ["span", "quiet", zone.pass ? `${share}${pass}` : "to come"]);
   });
   if (!lines.length && state.mission.passes > 1) lines.push(item(["span", "", "everything"], ["span", "quiet", `pass ${state.mission.pass} of ${state.mission.passes}`]));

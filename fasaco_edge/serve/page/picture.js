@@ -114,9 +114,10 @@ function drawArea(context, polygon, colour, name, dashed, opacity = 0.14) {
   context.stroke();
   context.setLineDash([]);
   if (!name) return;
-  const x = polygon.reduce((sum, p) => sum + p[0], 0) / polygon.length;
-  const y = polygon.reduce((sum, p) => sum + p[1], 0) / polygon.length;
-  drawLabel(context, name, ...toScreen(x, y), colour);
+  // Below its upper edge, as rooms have their names in the middle.
+  const corners = polygon.map(([x, y]) => toScreen(x, y));
+  const middle = corners.reduce((sum, [px]) => sum + px, 0) / corners.length;
+  drawLabel(context, name, middle, Math.min(...corners.map(([, py]) => py)) + 11, colour);
 }
 
 const LABEL_FONT = "600 13px system-ui, sans-serif";

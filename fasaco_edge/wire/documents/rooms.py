@@ -24,9 +24,9 @@ class RoomReport(Document, frozen=True):
         outline: corners x, y [m] in the frame of the map, without holes.
         neighbours: numbers of the rooms that it has a passage to.
         encloses: numbers of the rooms that lie within its outline without being part of it.
-        swept: swept share of the room's reachable floor in the order, in the present pass. If the
-            order contains no floor of the room, share of the reachable cells; null if none is
-            reachable.
+        swept: swept share of the room's reachable floor, in the present pass of an order that asks
+            for it, else of what was swept before. In a fleet, and where only cells are counted,
+            share of the reachable cells. Null if none is reachable.
         to_go_s: driving time of the path ahead within the room [s]; null without a path.
         passes: its passes in an order that names the room without passes, as in `mission.json`;
             null for as many as other zones get.

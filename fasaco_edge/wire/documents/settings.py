@@ -26,8 +26,9 @@ class RobotSettings(Document, frozen=True):
 
 
 class PlannerSettings(Document, frozen=True):
-    """The form of the published path."""
+    """Name of the planner; the form of the published path."""
 
+    name: str = ""
     line: str = "cells"
 
 

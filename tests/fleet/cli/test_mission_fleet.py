@@ -66,7 +66,10 @@ def test_each_robot_of_the_fleet_takes_it(router, capsys):
     told = capsys.readouterr().out
     assert "Fleet hall" in told
     assert "covering" in told
+    assert told.count("accepted: path ") >= 1
     assert "r3" not in told
+    assert command(router, "status", "--fleet", "hall") == 0
+    assert "accepted" not in capsys.readouterr().out
 
 
 def test_a_refusal_is_shown_for_each(router, capsys):

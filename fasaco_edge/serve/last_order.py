@@ -1,0 +1,61 @@
+"""The last order given by command, which a page offers to give again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fasaco_edge.client.robot_state import RobotState
+from fasaco_edge.wire.documents.replies import MissionReport
+from fasaco_edge.wire.documents.rooms import RoomReport
+
+
+def rooms_of(view: RobotState) -> dict[str, RoomReport]:
+    """Return the rooms that zones of an order may be, by their titles."""
+    standing = {zone.name for zone in view.settings.mission.zones}
+    return {room.title: room for room in view.rooms.rooms if room.title not in standing}
+
+
+def order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
+    """Return the order in a status, for an order commanded before this server began; else None.
+
+    A zone with the name of a room is that room. The status has the number of passes, not their
+    kinds.
+    """
+    if mission.ordered != "command":
+        return None
+    rooms, zones = rooms_of(view), list[dict[str, object]]()
+    for zone in mission.zones:
+        found: dict[str, object] = {"name": zone.name, "passes": zone.passes}
+        if room := rooms.get(zone.name):
+            found["room"], usual = room.id, room.passes or 1
+            if zone.passes == (usual if isinstance(usual, int) else len(usual)):
+                del found["passes"]
+        elif zone.polygon:
+            found["polygon"] = zone.polygon
+        zones.append(found)
+    return {
+        "zones": zones,
+        "keep_out": [each.polygon for each in mission.keep_outs if each.by == "order"],
+        "return_home": mission.return_home,
+    }
+
+
+def again(order: dict[str, Any] | None) -> dict[str, object] | None:
+    """Return the last order by command, which the user can repeat once it is over; else None.
+
+    It is sent from the order's beginning on: the page keeps it if this server restarts before the
+    end. It is empty if it equals the order of the Start button.
+    """
+    if order is None:
+        return None
+    # A room is repeated by its number only, as its outline may have changed since.
+    given = order.get("zones")
+    zones = [
+        {name: value for name, value in zone.items() if name != "polygon" or "room" not in zone}
+        for zone in (given if isinstance(given, list) else ())
+        if isinstance(zone, dict)
+    ]
+    is_usual = order.get("passes") in (None, 1) and not (
+        zones or order.get("keep_out") or order.get("return_home")
+    )
+    return {} if is_usual else order | {"zones": zones, "keep_covered": False}
