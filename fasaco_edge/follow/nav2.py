@@ -28,13 +28,7 @@ from fasaco_edge.follow.pieces import (
 from fasaco_edge.follow.standstill import Tries, floor_ahead
 from fasaco_edge.follow.supervision import FollowerState, Patience, Reason, Supervision
 from fasaco_edge.grid.geometry import Point, Pose2D
-from fasaco_edge.wire.messages.nav2_goals import (
-    ABORTED,
-    CANCELED,
-    ERRORS,
-    SUCCEEDED,
-    Ending,
-)
+from fasaco_edge.wire.messages.nav2_goals import ABORTED, CANCELED, ERRORS, SUCCEEDED, Ending
 from fasaco_edge.wire.messages.path_points import PathPoints
 
 # The next goal begins at most this far before the end of the last one [m], plus the distance driven

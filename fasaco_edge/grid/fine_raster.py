@@ -257,7 +257,7 @@ class Reach:
             math.ceil(max(ys)) + margin,
             math.ceil(max(xs)) + margin,
         )
-        return box.intersection(Window(0, 0, geometry.rows, geometry.cols))
+        return box.intersection(geometry.window)
 
     def pixels_of(
         self, cells: NDArray[np.bool_], window: Window, geometry: GridGeometry

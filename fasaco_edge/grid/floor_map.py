@@ -184,7 +184,7 @@ class FloorMap:
         radius = self.discs.radius_m / self.geometry.resolution
         tool = self.discs.tool_m / 2 / self.geometry.resolution
         margin = int(max(tool, min(radius, tool) + tool_steps(radius, tool))) + 1
-        whole = Window(0, 0, self.geometry.rows, self.geometry.cols)
+        whole = self.geometry.window
         around = Window(
             part.row0 - margin, part.col0 - margin, part.row1 + margin, part.col1 + margin
         ).intersection(whole)
@@ -236,8 +236,8 @@ class FloorMap:
 
     def _move(self, geometry: GridGeometry, by: tuple[int, int]) -> bool:
         """Move the bits to a larger raster, shifted by rows and columns; False if impossible."""
-        (rows, cols), whole = self.blocked.shape, Window(0, 0, geometry.rows, geometry.cols)
-        before, self.geometry = Window(0, 0, self.geometry.rows, self.geometry.cols), geometry
+        (rows, cols), whole = self.blocked.shape, geometry.window
+        before, self.geometry = self.geometry.window, geometry
         if by[1] % WORD or not whole.contains(before.moved(*by)):
             return False
         old = Window(0, 0, rows, cols).moved(by[0], by[1] // WORD)

@@ -207,6 +207,11 @@ class GridGeometry:
         corner = Pose2D(window.col0 * cell_m, window.row0 * cell_m)
         return cls(window.rows, window.cols, cell_m, corner)
 
+    @property
+    def window(self) -> Window:
+        """The window of all pixels."""
+        return Window(0, 0, self.rows, self.cols)
+
     def to_pixels(self, x: _Coordinate, y: _Coordinate) -> tuple[_Coordinate, _Coordinate]:
         """Return the pixel coordinates (column, row), not rounded, of one or many points [m]."""
         dx, dy = x - self.origin.x, y - self.origin.y

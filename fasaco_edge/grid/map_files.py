@@ -336,9 +336,7 @@ def _read_keys(path: Path) -> tuple[MapKeys, Path]:
     text = read_written(path, MapFileError, missing=_MISSING_HINT, broken=_YAML_HINT)
     values = {} if text.values is None else text.values
     if isinstance(values, dict):
-        values = {
-            key: _unquoted(value) if key in NUMBERS else value for key, value in values.items()
-        }
+        values = values | {key: _unquoted(values[key]) for key in NUMBERS if key in values}
     keys, faults = inspected(MapKeys, values, MapFileError)
     image = path
     if keys and keys.image:

@@ -55,14 +55,16 @@ class Company:
         """
         return ""
 
-    def mine(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_]:
-        """Return which cells are this robot's to sweep."""
-        return cells
-
-    def mine_to_sweep(
-        self, cells: NDArray[np.bool_], unvisited: NDArray[np.bool_], area: ReachableArea
+    def mine(
+        self,
+        cells: NDArray[np.bool_],
+        area: ReachableArea,
+        unvisited: NDArray[np.bool_] | None = None,
     ) -> NDArray[np.bool_]:
-        """Return the cells on which this robot sweeps the floor, visited or not."""
+        """Return which cells are this robot's to visit.
+
+        Given the ``unvisited`` ones among them: those on which it sweeps the floor, visited or not.
+        """
         return cells
 
     def give_up(self, cells: NDArray[np.bool_], area: ReachableArea) -> NDArray[np.bool_] | None:
@@ -84,7 +86,7 @@ class Company:
     def try_again(self) -> None:
         """Clear the list of cells given up."""
 
-    def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
+    def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return an area as a robot in ``cell`` can drive it: around robots in the way."""
         return area
 

@@ -15,12 +15,7 @@ from fasaco_edge.errors import FasacoError, PlanFailed
 from fasaco_edge.grid.geometry import Pose2D, StampedPose, Window
 from fasaco_edge.grid.occupancy import MapPatch, OccupancyGrid
 from fasaco_edge.mission.orders.keep_outs import KeepOut
-from fasaco_edge.mission.orders.order import (
-    EVERYTHING_ONCE,
-    Command,
-    CommandName,
-    MissionOrder,
-)
+from fasaco_edge.mission.orders.order import EVERYTHING_ONCE, Command, CommandName, MissionOrder
 from fasaco_edge.mission.orders.room_requests import RoomRequest
 
 if TYPE_CHECKING:

@@ -109,6 +109,7 @@ def _take_changes_in(room: TinyRoom) -> None:
     change = LatticeChange.between((room.grid, grown), room.lattice, room.footprint)
     steps, reachable = change.after.steps, np.ones((4, 5), np.bool_)
     update_reach(steps, steps, change.cells.copy(), reachable, 0, 0)
+    ways_from(steps, 0)
     raster, _ = room.grid.geometry.on_raster()
     place = placement_on(raster, room.footprint.cell_m)
     count_free_beside(pixels_of(grown), 25, place, reachable, 0, 0)
@@ -150,7 +151,6 @@ def _take_shares(room: TinyRoom) -> None:
     steps, cols = room.lattice.steps.ravel().copy(), room.lattice.steps.shape[1]
     offsets, cells = np.array([1, cols, -1, -cols], np.int64), np.arange(2, dtype=np.int64)
     walk_parts(steps, offsets, cells, cells, cells)
-    ways_from(room.lattice.steps, 0)
 
 
 def _take_repair(room: TinyRoom) -> None:

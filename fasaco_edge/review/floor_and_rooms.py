@@ -187,7 +187,7 @@ def labels_of(geometry: GridGeometry, outlines: Sequence[Polygon]) -> NDArray[np
 
     A pixel within several outlines gets the number of the last one.
     """
-    whole = Window(0, 0, geometry.rows, geometry.cols)
+    whole = geometry.window
     labels = np.zeros((geometry.rows, geometry.cols), np.int16)
     for number, outline in enumerate(outlines, 1):
         corners = tuple(geometry.to_pixels(x, y) for x, y in outline)

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from fasaco_edge.bench.benchmark import Benchmark, MeasuredGoal, Report, Say, positive
@@ -99,10 +100,11 @@ class Replan:
         return sum(self.ms.values())
 
 
-def _timed_parts() -> tuple[tuple[str, type, str], ...]:
-    """Return the methods that are timed: name of the part, class, name of the method."""
+def _timed_parts() -> tuple[tuple[str, type | ModuleType, str], ...]:
+    """Return the methods that are timed: name of the part, class or module, name of the method."""
     from fasaco_edge.grid.reachable_area import ReachableArea
     from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
+    from fasaco_edge.mission.line import layer
     from fasaco_edge.mission.line.floor_left import UnsweptTally
     from fasaco_edge.mission.line.layer import LineLayer
     from fasaco_edge.mission.line.line_ahead import LineAhead
@@ -131,8 +133,8 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
         ("trail", TrailLayer, "with_trail"),
         ("open floor", UnsweptTally, "update"),
         ("follow", LineLayer, "receive_map"),
-        ("laying", LineAhead, "lay"),
-        ("laying", LineAhead, "check"),
+        ("laying", layer, "lay"),
+        ("laying", layer, "lay_blocked"),
         ("counting", SweepTally, "exchange"),
         ("polish", Polisher, "polish"),
         ("publishing", LineAhead, "xy"),
@@ -140,7 +142,7 @@ def _timed_parts() -> tuple[tuple[str, type, str], ...]:
 
 
 @contextmanager
-def _charged(parts: Parts, name: str, owner: type, method: str) -> Iterator[None]:
+def _charged(parts: Parts, name: str, owner: type | ModuleType, method: str) -> Iterator[None]:
     before: Callable[..., Any] | None = owner.__dict__.get(method)
     if before is None:
         yield

@@ -265,7 +265,7 @@ class MissionTrial:
             self.counts["paths"] += 1
         if lattice is not None and self._turns % FRESH_EVERY == 0:
             geometry = GridGeometry.of_cells(lattice.window, lattice.cell_m)
-            values = coverage_values(lattice.states, mission.ledger.visits(lattice.window))
+            values = coverage_values(lattice.states, mission.covered.current.visits(lattice.window))
             covered = OccupancyGrid(geometry, values, grid.frame, grid.stamp_ns)
             self._say("coverage", lambda: encode_occupancy_grid(covered))
             self._say("floor", lambda: self._floor(grid))
@@ -351,7 +351,7 @@ class MissionTrial:
             _hold(np.array_equal(now, anew), f"{name} over {geometry}")
         if fresh.floor is not None:
             for name in ("blocked", "places"):
-                now, anew = getattr(mission.map.floor, name), getattr(fresh.floor, name)
+                now, anew = getattr(mission.map.ground.floor, name), getattr(fresh.floor, name)
                 _hold(np.array_equal(now, anew), f"{name} over {geometry}")
             check_tally(mission)
         self.counts["lattices made afresh"] += 1

@@ -217,9 +217,9 @@ def test_floor_swept_between_two_cells_is_written_once_a_second(tmp_path):
 
     keeper.keep(drive.mission, 0.0)
     until(lambda: is_written() and not writer.disk.is_behind())
-    visits = drive.mission.ledger.total
+    visits = drive.mission.covered.current.total
     drive.tell(pose_at(0, 0.2))
-    assert drive.mission.ledger.total == visits
+    assert drive.mission.covered.current.total == visits
     keeper.keep(drive.mission, PERIOD_S)
     assert not writer.disk.is_behind()
     assert not is_written()

@@ -68,7 +68,7 @@ def test_a_map_that_has_moved_meanwhile_moves_what_is_swept():
     assert stand(drive, 8.0, BLANK["#"]) == []
     drive.cell = (1, 5)
     assert stand(drive, 10.0, MapReceived(building(*FLOOR, at=(0, 4)))) == []
-    assert drive.mission.home == (1, 5)
+    assert drive.mission.orders.goal() == (1, 5)
     assert len(drive.visited) >= 20
     assert all(col >= 4 for _, col in drive.visited)
 

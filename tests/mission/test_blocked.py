@@ -147,11 +147,11 @@ def test_a_path_that_cannot_be_joined_is_rebuilt_from_the_robot():
 def test_a_report_of_another_path_or_frame_closes_nothing():
     robot = LineRobot(room(), START)
     ahead = ((1.0, 1.0),)
-    maps = robot.mission.map_revision
+    maps = robot.mission.map.map_revision
     robot.step(FollowerBlocked(999, "obstacle ahead", 5.0, "map", robot.x, robot.y, ahead))
     revision = robot.mission.route.revision
     robot.step(FollowerBlocked(revision, "obstacle ahead", 5.0, "odom", robot.x, robot.y, ahead))
-    assert robot.mission.map_revision == maps
+    assert robot.mission.map.map_revision == maps
     assert not robot.mission.troubles
 
 

@@ -10,7 +10,7 @@ from fasaco_edge.grid.rooms import find_rooms
 from fasaco_edge.grid.rotation import rotated_geometry
 from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.rooms.room_watch import RoomWatch, update
-from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.work.plan_scope import with_rooms
 from fasaco_edge.mission.work.progress import seconds_in
 from fasaco_edge.planners.cost import CoverageCost
 from fasaco_edge.planners.problem import CoverageProblem
@@ -42,7 +42,7 @@ def problem_at(lattice_deg):
 @pytest.mark.parametrize("lattice_deg", [0.0, 17.0])
 def test_cells_are_in_the_rooms_that_they_lie_in(watch, lattice_deg):
     problem, geometry = problem_at(lattice_deg)
-    priced = RoomPrice("auto", RoomCells(watch, lattice_deg)).added_to(problem)
+    priced = with_rooms(problem, RoomCells(watch, lattice_deg), "auto")
     assert priced.cost == replace(problem.cost, room_s=54.0)
     own = np.argwhere(problem.to_cover)
     corner = np.array((problem.lattice.window.row0, problem.lattice.window.col0), np.int32)
@@ -58,8 +58,8 @@ def test_cells_are_in_the_rooms_that_they_lie_in(watch, lattice_deg):
 
 def test_without_rooms_a_problem_does_not_change(watch):
     problem, _ = problem_at(0.0)
-    assert RoomPrice("never", RoomCells(watch, 0.0)).added_to(problem) is problem
-    assert RoomPrice("auto", RoomCells(RoomWatch(), 0.0)).added_to(problem) is problem
+    assert with_rooms(problem, RoomCells(watch, 0.0), "never") is problem
+    assert with_rooms(problem, RoomCells(RoomWatch(), 0.0), "auto") is problem
 
 
 def test_a_way_takes_its_time_in_the_rooms_it_leads_through():

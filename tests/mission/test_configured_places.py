@@ -72,7 +72,7 @@ def test_back_on_their_floor_the_places_count_again():
     drive, _ = on_another_floor()
     stand(drive, "map_1", 14)
     assert drive.mission.state is not State.BLOCKED
-    assert drive.mission.home == (4, 8)
+    assert drive.mission.orders.goal() == (4, 8)
 
 
 def test_the_floor_of_the_places_survives_a_restart():
@@ -94,7 +94,7 @@ def test_places_changed_in_the_configuration_fit_the_current_map():
     again = restarted(drive, with_policy(WITH_ALL, home=Place(x_m=0.4, y_m=0.4)))
     assert codes(stand(again, "map_2", 2)) == []
     assert again.mission.state is not State.BLOCKED
-    assert again.mission.home == HERE
+    assert again.mission.orders.goal() == HERE
 
 
 def test_a_reset_takes_the_places_for_those_of_the_map_in_use():
@@ -103,14 +103,14 @@ def test_a_reset_takes_the_places_for_those_of_the_map_in_use():
     drive.command("start")
     assert codes(stand(drive, "map_2", 2)) == []
     assert drive.mission.state is not State.BLOCKED
-    assert drive.mission.home == (4, 8)
+    assert drive.mission.orders.goal() == (4, 8)
 
 
 def test_zones_and_home_of_another_floor_are_not_used_there():
     drive, faults = on_another_floor(WITHOUT_KEEP_OUT)
     assert codes(faults) == ["ledger_mismatch", "places_elsewhere"]
     assert drive.mission.state in (State.PLANNING, State.COVERING)
-    assert drive.mission.home == HERE, "where the order began here"
+    assert drive.mission.orders.goal() == HERE, "where the order began here"
     drive.command("start", {"zones": [{"name": "kitchen"}]})
     assert drive.refused.code == "bad_order"
     assert "given for the map in frame 'map_1'" in str(drive.refused)
@@ -161,7 +161,7 @@ def test_a_mask_of_the_previous_building_is_not_used():
     again = restarted(drive, with_policy(config, keep_out_mask=other))
     stand(again, "map", 2, OTHER)
     assert again.mission.state is not State.BLOCKED
-    assert again.mission.home == HERE, "and not that of the configuration"
+    assert again.mission.orders.goal() == HERE, "and not that of the configuration"
 
 
 def test_without_places_none_are_reported():

@@ -118,12 +118,12 @@ def laid(line_xy):
     run = CurvedMission(ROOM, START)
     run._step([MapReceived(ROOM)])
     run._step([])
-    ahead, floor = run.mission.line._ahead, run.mission.map.floor
+    ahead, floor = run.mission.line._ahead, run.mission.map.ground.floor
     points = np.array([map_to_raster(floor.geometry, x, y) for x, y in line_xy])
     numbers, state = np.zeros(len(points), np.int64), np.full(len(points), POLISHED, np.uint8)
     ahead.tally.exchange(edges_between(ahead.line.points), edges_between(points))
-    ahead._whole = Polyline(points, numbers, state)
-    ahead._see(Pose2D(*line_xy[0]))
+    ahead.whole = Polyline(points, numbers, state)
+    ahead.see(Pose2D(*line_xy[0]))
     return ahead, floor
 
 

@@ -111,7 +111,7 @@ def test_the_verdict_follows_the_measured_agreement():
 
 def after(drive):
     """The ledger of a robot that drove, as its successor gets it."""
-    return drive.mission.ledger.snapshot()
+    return drive.mission.covered.current.snapshot()
 
 
 def resumed(before, cell, *events):
@@ -128,7 +128,7 @@ def test_a_mission_continues_where_it_stopped():
         first.go()
     again = resumed(after(first), first.cell, MapReceived(building(*HALL)), pose_at(*first.cell))
     assert again.visited == first.visited
-    assert again.mission.ledger.total == first.mission.ledger.total
+    assert again.mission.covered.current.total == first.mission.covered.current.total
     assert again.request.reason == "first plan, 61 cells were covered before"
     assert again.request.problem.cells == 120 - 61
     again.plan()
@@ -155,7 +155,7 @@ def test_a_restarted_mapper_keeps_the_ledger():
     again.plan() if again.request else None
     decision = again.tell(MapReceived(building(*HALL)))
     assert decision.faults == ()
-    assert again.mission.ledger.snapshot().cells == 61
+    assert again.mission.covered.current.snapshot().cells == 61
 
 
 def test_another_building_is_reported_and_covered_from_zero():
@@ -171,6 +171,6 @@ def test_another_building_is_reported_and_covered_from_zero():
     assert again.visited == {(1, 1)}
     again.plan()
     again.finish()
-    assert again.mission.ledger.frame == "map"
+    assert again.mission.covered.current.frame == "map"
     # It is asked once.
     assert again.tell(MapReceived(building(*HALL))).faults == ()

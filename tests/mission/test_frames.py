@@ -48,7 +48,7 @@ def test_a_single_map_in_another_frame_changes_nothing(driven):
     decision = again.tell(MAP, HERE)
     assert decision.faults == ()
     assert again.visited == driven.visited
-    assert again.mission.ledger.frame == "map"
+    assert again.mission.covered.current.frame == "map"
 
 
 def test_updates_of_another_map_are_laid_over_that_one(driven):
@@ -106,7 +106,7 @@ def test_progress_is_set_aside_only_once_it_is_certain(driven):
         f"the ledger of {cells} covered cells lies in frame 'map', the map in 'odom'"
     ]
     assert again.visited == {(1, 1)}
-    assert again.mission.ledger.frame == "odom"
+    assert again.mission.covered.current.frame == "odom"
     assert again.request is not None
 
 
@@ -138,7 +138,7 @@ def test_a_mapper_restarted_in_another_frame_takes_over(driven):
     told_for(driven, PATIENCE_S + 2.0, ODOM, THERE)
     assert any(not len(update.cells) for update in driven.updates)
     assert driven.mission.grid.frame == "odom"
-    assert driven.mission.ledger.frame == "odom"
+    assert driven.mission.covered.current.frame == "odom"
     driven.cell = (1, 1)
     driven.plan()
     driven.finish()
@@ -191,7 +191,7 @@ def test_an_order_for_all_survives_a_frame_with_nothing_covered():
     drive.command("start")
     faults = drive.tell(MAP, HERE).faults
     assert [fault for fault in faults if not isinstance(fault, WrongFrame)] == []
-    assert drive.mission.ledger.frame == "map"
+    assert drive.mission.covered.current.frame == "map"
     drive.tell(HERE, after=2.0)  # a robot that had to stop stands a moment
     assert drive.request is not None, drive.mission.reason
 

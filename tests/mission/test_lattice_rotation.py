@@ -122,7 +122,7 @@ def test_a_way_home_ends_at_place_and_heading_in_the_map_frame():
     assert decision.path is not None
     assert math.dist(decision.path.xy[-1], (2.6, 3.0)) < CELL_M
     assert decision.path.end_yaw == pytest.approx(math.radians(80.0))
-    assert math.dist(mission.rotation.centre(mission.home, CELL_M), (2.6, 3.0)) < CELL_M
+    assert math.dist(mission.rotation.centre(mission.orders.goal(), CELL_M), (2.6, 3.0)) < CELL_M
     assert mission.pose == replace(at, pose=mission.pose.pose)
 
 

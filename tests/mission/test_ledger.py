@@ -138,7 +138,7 @@ def test_the_robots_cell_counts_in_either_order_of_map_and_pose(order):
     standing = Drive((0, 2), *first[::order])
     assert standing.visited == {(0, 2)}
     standing.tell(pose_at(0, 2), MapReceived(building(".....")))
-    assert standing.mission.ledger.total == 1, "it has stood there all the time"
+    assert standing.mission.covered.current.total == 1, "it has stood there all the time"
 
 
 def same(one, other):

@@ -112,10 +112,10 @@ def check_tally(mission):
     ahead = mission.line._ahead
     if ahead is None:
         return
-    fresh = SweepTally(ahead._floor)
-    swept = mission.covered.floor.swept_on(ahead._floor.geometry)
+    fresh = SweepTally(ahead.floor)
+    swept = mission.covered.floor.swept_on(ahead.floor.geometry)
     whole = Window(0, 0, *swept.shape)
-    state, points = ahead.tally._state, ahead._whole.points  # beyond a cut, too
+    state, points = ahead.tally._state, ahead.whole.points  # beyond a cut, too
     # Without a reachable area no floor is asked for, and all is looked at once there is one.
     assert mission.line.left._asked is None or (((state & SWEPT) > 0) == swept).all()
     fresh._state |= state & PASSED
@@ -462,7 +462,7 @@ def test_a_plan_continues_from_the_cell_nearest_to_the_robot():
     for _ in range(60):
         robot.drive()
         path = robot.mission.route.path
-        stand = robot.mission.map.place_of(tuple(path.cells[path.index].tolist()))
+        stand = robot.mission.map.ground.place_of(tuple(path.cells[path.index].tolist()))
         assert math.dist(stand, robot.at) < 0.65 * CELL_M
 
 
@@ -476,7 +476,7 @@ def test_the_current_cell_stays_near_a_robot_on_a_polished_line():
     for _ in range(600):
         robot.drive(is_checked=False)
         path = robot.mission.route.path
-        stand = robot.mission.map.place_of(tuple(path.cells[path.index].tolist()))
+        stand = robot.mission.map.ground.place_of(tuple(path.cells[path.index].tolist()))
         apart.append(math.dist(stand, robot.at))
     assert np.median(apart) < 0.5 * CELL_M
     assert max(apart) < 4.0 * CELL_M
@@ -719,7 +719,7 @@ def test_forgotten_floor_is_swept_again(poses_a_step):
     for first in range(0, 32, poses_a_step):
         robot.now += 0.1
         mission.step(events[first : first + poses_a_step], robot.now)
-    tally, floor = mission.line._ahead.tally, mission.map.floor
+    tally, floor = mission.line._ahead.tally, mission.map.ground.floor
     whole = Window(0, 0, *tally.shape)
     is_left = (tally._state & WANTED > 0) & ~mission.covered.floor.swept_on(floor.geometry, whole)
     # The two rasters differ along the rims of what was driven, by a few pixels.

@@ -20,6 +20,7 @@ from fasaco_edge.kernels.floor.sweeps import NEVER
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.mission import Mission
 from fasaco_edge.mission.events import CommandReceived, MapReceived, State
+from fasaco_edge.mission.line.laying import lay, lay_blocked
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import NO_EDGES, POLISHED, edges_between
 from fasaco_edge.mission.orders.keep_outs import KeepOut
@@ -155,11 +156,11 @@ def test_a_robot_beside_a_long_line_gets_a_line_that_leaves_it():
     plain = CoverageLattice.from_map(grid, footprint)
     ahead = LineAhead(FloorMap(grid, plain, footprint, RobotDiscs(0.12, 0.27), 10_000_000))
     straight = [(2, col) for col in range(2, 20)]
-    ahead.lay(np.array(straight, np.int32), Pose2D(0.625, 0.625), keeps=False)
+    lay(ahead, np.array(straight, np.int32), Pose2D(0.625, 0.625), keeps=False)
     aside = Pose2D(0.9, 3.0)
     ahead.drive(aside)
     turns_off = [*straight[:15], *((row, 16) for row in range(3, 9))]
-    ahead.lay(np.array(turns_off, np.int32), aside)
+    lay(ahead, np.array(turns_off, np.int32), aside)
     assert ahead.xy()[0].tolist() == pytest.approx([aside.x, aside.y])
     assert ahead.xy()[-1].tolist() == pytest.approx([16.5 * 0.25, 8.5 * 0.25], abs=0.03)
 
@@ -174,7 +175,7 @@ def polished_line(grid):
     plain = CoverageLattice.from_map(grid, footprint)
     floor = FloorMap(grid, plain, footprint, RobotDiscs(0.12, 0.27), 10_000_000)
     ahead = LineAhead(floor)
-    ahead.lay(np.array(LANES, np.int32), Pose2D(0.625, 0.625))
+    lay(ahead, np.array(LANES, np.int32), Pose2D(0.625, 0.625))
     ahead.mark(0, len(ahead.line), POLISHED)
     return ahead, floor
 
@@ -183,14 +184,14 @@ def polished_line(grid):
 def test_the_line_beyond_a_cut_is_kept_for_the_next_plan(until):
     ahead, _ = polished_line(grid_of(np.ones((120, 120), bool)))
     whole, here = ahead.line.points.tolist(), Pose2D(0.625, 0.625)
-    ahead.lay(np.array(LANES[:until], np.int32), here, is_cut=True)
+    lay(ahead, np.array(LANES[:until], np.int32), here, is_cut=True)
     assert ahead.is_cut
     assert len(ahead.line) < len(whole)
     assert ahead.line.cells[-1] < until
     last, behind = LANES[until - 1], LANES[until + 3]
     (row, _), cols = last, range(last[1], behind[1], 1 if behind[1] > last[1] else -1)
     round_it = [(row - 1, col) for col in [*cols, behind[1]]]
-    ahead.lay(np.array([*LANES[:until], *round_it, *LANES[until + 3 :]], np.int32), here)
+    lay(ahead, np.array([*LANES[:until], *round_it, *LANES[until + 3 :]], np.int32), here)
     assert not ahead.is_cut
     kept = [point for point in whole if point in ahead.line.points.tolist()]
     assert len(kept) >= len(whole) - 2
@@ -199,7 +200,7 @@ def test_the_line_beyond_a_cut_is_kept_for_the_next_plan(until):
 
 def test_a_line_ends_at_a_cut_that_stays():
     ahead, _ = polished_line(grid_of(np.ones((120, 120), bool)))
-    ahead.lay(np.array(LANES[:40], np.int32), Pose2D(0.625, 0.625), is_cut=True)
+    lay(ahead, np.array(LANES[:40], np.int32), Pose2D(0.625, 0.625), is_cut=True)
     ahead.end_at_cut()
     assert not ahead.is_cut
     counts, line = ahead.tally.sweeps.counts.copy(), ahead.line.points
@@ -218,7 +219,7 @@ def test_lanes_between_two_blocked_lanes_are_kept():
     blocked = grid_of(free)
     floor.change((before, blocked), CoverageLattice.from_map(blocked, Footprint(0.25, 0.12)))
     ahead.follow_floor(floor)
-    assert ahead.check(floor.touched)
+    assert lay_blocked(ahead, floor.touched)
     kept = [point for point in whole if point in ahead.line.points.tolist()]
     assert kept == whole
     assert np.count_nonzero(ahead.line.state == POLISHED) >= len(whole) - 6
@@ -233,12 +234,12 @@ def test_a_robot_that_does_not_fit_is_led_out_once_for_all_maps():
     floor = FloorMap(grid, plain, footprint, RobotDiscs(0.12, 0.27), 10_000_000)
     whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
     ahead, beside_wall = LineAhead(floor), Pose2D(0.3, 0.9)
-    ahead.lay(np.array([(row, 1) for row in range(3, 9)], np.int32), beside_wall)
+    lay(ahead, np.array([(row, 1) for row in range(3, 9)], np.int32), beside_wall)
     line = ahead.line.points.tolist()
     for off_m in (0.03, 0.0, 0.03, 0.0):
         # Poses scatter while it stands there.
         ahead.drive(Pose2D(beside_wall.x, beside_wall.y + off_m))
-        assert not ahead.check(whole)
+        assert not lay_blocked(ahead, whole)
     assert ahead.line.points.tolist() == line
 
 

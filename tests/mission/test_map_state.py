@@ -39,7 +39,7 @@ def take_something_in(draw, state, whole, zones):
             state.receive_map(whole)
         case _:
             zones = draw(st.sampled_from([(), (ZONE,)]))
-            state.keep_out(zones, state.grid)
+            state.ground.keep_out(zones, state.grid)
             state.receive_map(replace(state.grid or whole))
     return whole, zones
 
@@ -54,7 +54,7 @@ def test_from_map_to_map_the_state_is_what_its_last_map_says(data, whole):
         whole, zones = take_something_in(data.draw, state, whole, zones)
         free = CoverageLattice.from_map(state.grid, FOOTPRINT)
         driven = without(free, kept_out(zones, free.window, free.cell_m, radius_m))
-        for ours, theirs in ((state.free, free), (state.lattice, driven)):
+        for ours, theirs in ((state.ground.free, free), (state.ground.lattice, driven)):
             assert ours.window == theirs.window
             assert np.array_equal(ours.states, theirs.states)
             assert np.array_equal(ours.steps, theirs.steps)
@@ -77,10 +77,10 @@ def test_a_map_that_says_nothing_new_changes_nothing():
     state.receive_map(first)
     state.receive_pose(StampedPose(Pose2D(1.0, 1.0)))
     state.update_area()
-    lattice, ground = state.lattice, state.area
+    lattice, ground = state.ground.lattice, state.area
     state.receive_map(grid(cells))
     state.update_area()
     assert state.map_revision == 2
     assert state.grid is not first
-    assert state.lattice is lattice
+    assert state.ground.lattice is lattice
     assert state.area is ground

@@ -22,10 +22,10 @@ def all_round(robot):
 def test_a_robot_that_is_crowded_keeps_its_ledger():
     robot = LineRobot(two_rooms(is_open=True), (1.0, 1.0))
     robot.wait(45.0, lambda _: False)
-    covered = robot.mission.ledger.total
+    covered = robot.mission.covered.current.total
     for _ in range(1000):
         robot.step(*([all_round(robot)] if robot.path and round(10 * robot.now) % 10 == 0 else []))
-        assert robot.mission.ledger.total >= covered, robot.mission.reason
+        assert robot.mission.covered.current.total >= covered, robot.mission.reason
         assert "another building" not in robot.mission.reason
     assert robot.wait(900.0, lambda robot: robot.mission.state == "done")
     assert robot.mission.coverage().remaining == 0

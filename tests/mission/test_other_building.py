@@ -58,7 +58,7 @@ def stand(drive, seconds, *events):
 def test_the_floor_at_the_other_end_of_a_lift_is_swept(other):
     drive = swept(*FLOOR)
     assert drive.mission.state is State.DONE
-    cells = drive.mission.ledger.snapshot().cells
+    cells = drive.mission.covered.current.snapshot().cells
     faults = stand(drive, 8.0, MapReceived(building(*other)))
     assert [str(fault) for fault in faults] == [
         f"the ledger of {cells} covered cells is of another building than the map"
@@ -132,33 +132,33 @@ def test_a_loop_closure_keeps_what_moved_with_it(order):
     faults = [fault for events in steps for fault in drive.tell(*events).faults]
     faults += stand(drive, 10.0, moved)
     assert faults == []
-    assert drive.mission.home == (1, 5), "it has moved with the building"
+    assert drive.mission.orders.goal() == (1, 5), "it has moved with the building"
     # Those under the tool wherever the map may have lain in between.
-    assert drive.mission.ledger.snapshot().cells == 20
+    assert drive.mission.covered.current.snapshot().cells == 20
     assert all(col >= 4 for _, col in drive.visited)
     assert drive.mission.state is not State.BLOCKED
 
 
 def test_moved_furniture_keeps_the_ledger():
     drive = swept(*FLOOR)
-    covered = drive.mission.ledger.snapshot().cells
+    covered = drive.mission.covered.current.snapshot().cells
     rows = [list(row) for row in FLOOR]
     for row, col in [(3, 3), (3, 4), (4, 3), (4, 4), (8, 9), (8, 10), (9, 9), (9, 10), (7, 3)]:
         rows[row][col] = "#"
     faults = stand(drive, 10.0, MapReceived(building(*map("".join, rows))))
     assert faults == []
-    assert drive.mission.ledger.snapshot().cells == covered
+    assert drive.mission.covered.current.snapshot().cells == covered
     assert drive.mission.state is State.DONE
 
 
 def test_a_restarted_mapper_keeps_the_ledger_it_agrees_with():
     drive = swept(*FLOOR)
-    covered = drive.mission.ledger.snapshot().cells
+    covered = drive.mission.covered.current.snapshot().cells
     corner = [row[:4] for row in FLOOR[-4:]]
     assert stand(drive, 20.0, MapReceived(building(*corner))) == []
-    assert drive.mission.ledger.snapshot().cells == covered
+    assert drive.mission.covered.current.snapshot().cells == covered
     assert stand(drive, 8.0, OLD) == []
-    assert drive.mission.ledger.snapshot().cells == covered
+    assert drive.mission.covered.current.snapshot().cells == covered
     assert stand(drive, 20.0, MapReceived(building(*(row[:4] for row in OTHER[-4:])))) == []
     faults = stand(drive, 8.0, NEW)
     assert [type(fault) for fault in faults] == [LedgerMismatchError]
@@ -166,14 +166,14 @@ def test_a_restarted_mapper_keeps_the_ledger_it_agrees_with():
 
 def test_a_mapper_flickering_between_two_floors_decides_nothing():
     drive = swept(*FLOOR, ticks=60)
-    covered = drive.mission.ledger.snapshot().cells
+    covered = drive.mission.covered.current.snapshot().cells
     paths, faults, states = len(drive.updates), [], set()
     for _ in range(30):
         for shown in (NEW, OLD):
             faults += stand(drive, 1.0, shown)
             states.add((str(drive.mission.state), drive.mission.reason))
     assert faults == []
-    assert drive.mission.ledger.snapshot().cells == covered
+    assert drive.mission.covered.current.snapshot().cells == covered
     assert {state for state, _ in states} == {"blocked"}
     assert len({reason for _, reason in states}) == 1
     assert len(drive.updates) - paths <= 1, "it is stopped once"
@@ -197,7 +197,7 @@ def test_orders_tied_to_the_previous_floor_end_with_it():
     stand(drive, 8.0, NEW)
     assert drive.mission.state is State.IDLE
     assert drive.mission.reason.endswith("than the map: the order was dropped")
-    assert drive.mission.home is None
+    assert drive.mission.orders.goal() is None
 
 
 def test_the_previous_floors_home_is_forgotten_without_an_order():
@@ -205,9 +205,9 @@ def test_the_previous_floors_home_is_forgotten_without_an_order():
     drive.command("start", {})
     stand(drive, 1.0)
     drive.command("cancel")
-    assert drive.mission.home is not None
+    assert drive.mission.orders.goal() is not None
     stand(drive, 8.0, NEW)
-    assert drive.mission.home is None
+    assert drive.mission.orders.goal() is None
     drive.command("home")
     assert drive.refused.code == "not_now"
 

@@ -92,9 +92,9 @@ def test_a_map_that_touches_no_reachable_cell_changes_nothing():
         patch("....", at=(3, 1)),  # a room beyond the wall: coverable, not reachable
         MapReceived(building("######", "#....#", "######", *ROOM[:2], "######", at=(-1, 0))),
     ):
-        revision = drive.mission.map_revision
+        revision = drive.mission.map.map_revision
         assert drive.tell(event) == Decision()
-        assert drive.mission.map_revision == revision + 1
+        assert drive.mission.map.map_revision == revision + 1
     assert drive.mission.coverage().unreachable == 4
     assert len(drive.updates) == 1
 
@@ -188,7 +188,7 @@ def test_a_map_that_jumps_far_away_takes_no_memory_in_between():
     pose = PoseReceived(StampedPose(Pose2D(500_000.3, 800_000.3)))
     drive.tell(MapReceived(moved), pose, after=PATIENCE_S)
     assert drive.tell(after=2 * PATIENCE_S).faults == ()
-    assert drive.mission.ledger.total >= 2
+    assert drive.mission.covered.current.total >= 2
 
 
 def test_a_plan_that_comes_while_blocked_is_not_published():
@@ -252,13 +252,13 @@ def fault_of(drive, event):
     """Tell the mission an event it cannot use; it must change nothing."""
     mission = drive.mission
     route = mission.route
-    before = (mission.grid, mission.pose, mission.map_revision, route.revision, mission.state)
-    visited, total = drive.visited, mission.ledger.total
+    before = (mission.grid, mission.pose, mission.map.map_revision, route.revision, mission.state)
+    visited, total = drive.visited, mission.covered.current.total
     decision = drive.tell(event)
     assert (decision.plan, decision.path) == (None, None)
-    after = (mission.grid, mission.pose, mission.map_revision, route.revision, mission.state)
+    after = (mission.grid, mission.pose, mission.map.map_revision, route.revision, mission.state)
     assert after == before
-    assert (drive.visited, mission.ledger.total) == (visited, total)
+    assert (drive.visited, mission.covered.current.total) == (visited, total)
     (fault,) = decision.faults
     return fault
 
@@ -282,11 +282,11 @@ def test_updates_of_one_cycle_are_one_change_of_the_map():
     """A flood of small ones on a large map held the loop up for seconds, a copy for each."""
     drive, others = started(*ROOM), started(*ROOM)
     updates = [patch("#", at=(2, col)) for col in (2, 4, 2)] + [patch(".", at=(2, 4))]
-    revision = drive.mission.map_revision
+    revision = drive.mission.map.map_revision
     misfit = patch("#", at=(0, 6))
     faults = drive.tell(*updates[:2], misfit, *updates[2:]).faults
     assert [type(fault) for fault in faults] == [PatchWithoutBase]
-    assert drive.mission.map_revision == revision + 1
+    assert drive.mission.map.map_revision == revision + 1
     for update in updates:
         others.tell(update)
     assert np.array_equal(drive.mission.grid.cells, others.mission.grid.cells)

@@ -172,7 +172,7 @@ def test_a_way_out_that_ends_at_a_border_leads_into_the_cell():
     robot.wait(5.0, lambda robot: False)
     mission, way_out = robot.mission, robot.mission._executive.way_out
     cell = mission.map.cell_at_pose()
-    stand = mission.map.place_of(cell)
+    stand = mission.map.ground.place_of(cell)
     # The track led here from behind a wall that was not there.
     way_out._track.clear()
     way_out._track.extend([(10.0, 10.0), (robot.x + 0.001, robot.y)])

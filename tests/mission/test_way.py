@@ -15,6 +15,7 @@ from fasaco_edge.grid.map_files import find_map, read_map
 from fasaco_edge.grid.reachable_area import ReachableArea, anchor_cell
 from fasaco_edge.mission.config import Sweeping
 from fasaco_edge.mission.core.charging import LINE_FACTOR
+from fasaco_edge.mission.line.laying import lay
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.way import corners_between, is_clear_between, way_s
 from fasaco_edge.planners.line import LineConfig
@@ -51,7 +52,7 @@ def laid(floor, area, cell):
     stand = floor.stands.stand(walk[0])
     pose = Pose2D(*raster_to_map(floor.geometry, stand[None])[0].tolist(), 0.5)
     ahead = LineAhead(floor)
-    ahead.lay(walk, pose, keeps=False)
+    lay(ahead, walk, pose, keeps=False)
     return walk, ahead, pose
 
 

@@ -115,7 +115,7 @@ class Drive:
     def visited(self):
         """The cells the mission holds for covered."""
         window = self.mission.lattice.window
-        visits = self.mission.ledger.visits(window)
+        visits = self.mission.covered.current.visits(window)
         return {
             (row + window.row0, col + window.col0) for row, col in np.argwhere(visits > 0).tolist()
         }

@@ -26,6 +26,7 @@ from fasaco_edge.mission.events import (
     PoseReceived,
     State,
 )
+from fasaco_edge.mission.line.laying import lay
 from fasaco_edge.mission.orders.order import read_order
 from fasaco_edge.planners.compiling import compile_missing, warm_up
 from fasaco_edge.planners.cost import CoverageCost, SearchWork
@@ -111,8 +112,8 @@ def test_a_mission_with_decoded_maps_compiles_nothing_new(turn_s, sweeping):
         walk = mission.route.path.ahead
         better = np.concatenate((walk, walk[-2:-1]))
         better.flags.writeable = False  # as a plan's cells
-        ahead.lay(better, pose.pose.pose)
-        ahead.lay(walk, pose.pose.pose)
+        lay(ahead, better, pose.pose.pose)
+        lay(ahead, walk, pose.pose.pose)
     for event in changes(off_the_bus):
         assert mission.step([event, pose], 1.0).faults == ()
         assert mission.coverage() is not None

@@ -67,8 +67,8 @@ def played(samples: Samples, config: DaemonConfig) -> Story:
     for step in replay.steps(samples):
         if step.is_news:
             news.append(step)
-        if step.decision.path is not None or mission.map_revision != map_revision:
-            map_revision = mission.map_revision
+        if step.decision.path is not None or mission.map.map_revision != map_revision:
+            map_revision = mission.map.map_revision
             assert_legal(mission)
     assert visited(mission) <= under_tool(samples, config.robot.tool_width_m)
     return Story(mission, news)
@@ -83,13 +83,15 @@ def assert_legal(mission: Mission) -> None:
     cells = [lattice.local((row, col)) for row, col in ahead.tolist()]
     assert all(lattice.states[cell] == COVERABLE for cell in cells)
     for here, there in pairwise(cells):
-        assert there in around[here].values(), f"{here} -> {there} at map {mission.map_revision}"
+        assert there in around[here].values(), (
+            f"{here} -> {there} at map {mission.map.map_revision}"
+        )
 
 
 def visited(mission: Mission) -> set[Cell]:
     """Return the cells of the mission's map that it holds for covered."""
     window = mission.lattice.window
-    cells = np.argwhere(mission.ledger.visits(window) > 0)
+    cells = np.argwhere(mission.covered.current.visits(window) > 0)
     return {(row + window.row0, col + window.col0) for row, col in cells.tolist()}
 
 

@@ -90,7 +90,7 @@ class LedgerKeeper:
             )
             state = mission.order_state
             spent = int(state.spent_s // SPENT_PERIOD_S)
-            held = _Kept(mission.ledger.total, *changes, state, spent)
+            held = _Kept(mission.covered.current.total, *changes, state, spent)
         else:
             held = _Kept(self._before.total, self._before.floor.changes, 0, 0, self.order_state)
         if held == self._kept or now - self._kept_at < held.may_wait_s(self._kept):

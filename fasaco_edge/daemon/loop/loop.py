@@ -255,12 +255,12 @@ class Loop:
             # delay the loop by 80 ms.
             gc.freeze()
             self._has_begun = True
-        maps = mission.map_revision
+        maps = mission.map.map_revision
         try:
             decision = self._runner.step(mission, [*events, *commands, *batch.plans], now)
         except Exception as error:
             return self._recover(commands, error)
-        if mission.map_revision > maps:
+        if mission.map.map_revision > maps:
             self._status.ingest_s = time.monotonic() - now
             if decision.plan is not None or mission.route.requests.wanted:
                 self._latency.call_for_plan()

@@ -12,7 +12,7 @@ from fasaco_edge.grid.geometry import Polygon
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.map.placing import left_out
 from fasaco_edge.mission.orders.order import order_document
-from fasaco_edge.mission.work.order_state import OrderState
+from fasaco_edge.mission.work.order_state import OrderState, Stage
 from fasaco_edge.wire.documents.replies import (
     CoverageReport,
     FloorLeft,
@@ -52,7 +52,7 @@ def map_report(mission: Mission | None) -> MapReport | None:
         rows=geometry.rows,
         cols=geometry.cols,
         resolution_m=geometry.resolution,
-        revision=mission.map_revision,
+        revision=mission.map.map_revision,
         stamp_ns=mission.grid.stamp_ns,
         frame=mission.grid.frame,
         lattice_deg=round(mission.rotation.deg, 3),
@@ -126,7 +126,7 @@ def floor_report(mission: Mission | None) -> FloorReport | None:
         return FloorReport(swept_m2)
     # Before the first path no floor is planned; on the way home the line is set aside.
     order = mission.order_state
-    is_planned = mission.route.revision > 0 or mission.orders.is_over
+    is_planned = mission.route.revision > 0 or order.stage is Stage.OVER
     is_aside = bool(order.errand) or (order.paused and not to_sweep.ahead_m2)
     to_come, unplanned = LATER
     comes_later = (is_aside and order.is_open) or mission.orders.scope.is_part
@@ -177,7 +177,7 @@ def mission_report(
 ) -> MissionReport:
     """Return the order and its progress; ``configured``: number of configured keep-outs."""
     order, zone = order_state.order, order_state.current_zone
-    home = mission.home if mission else order_state.home
+    home = mission.orders.goal() if mission else order_state.home
     keep_outs = tuple(_keep_outs(order_state))
     return MissionReport(
         ordered=None if order is None else ("itself" if order_state.automatic else "command"),

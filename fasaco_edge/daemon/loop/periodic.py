@@ -85,7 +85,7 @@ class CoveragePublisher:
     def publish(self, mission: Mission, now: float) -> None:
         """Publish the coverage if that is due."""
         # An order may reset the coverage, and add keep-out cells.
-        key = (mission.covered.version, mission.map_revision, mission.order_state)
+        key = (mission.covered.version, mission.map.map_revision, mission.order_state)
         lattice, grid = mission.lattice, mission.grid
         if lattice is None or grid is None or not self._due.is_due(key, now, repeats=False):
             return
@@ -131,7 +131,7 @@ class UnsweptPublisher:
             return
         if now < self._due.next_at:
             return
-        key = (mission.map_revision, mission.line.left.areas)
+        key = (mission.map.map_revision, mission.line.left.areas)
         if self._due.is_due(key, now, repeats=True) and (shown := unswept(mission)) is not None:
             self._due.note(key, now, max(FLOOR_PERIOD_S, shown.cells.size / PIXELS_PER_S))
             self._outbox.put(UNSWEPT, encode_occupancy_grid(coarser(shown, MOST_SQUARES)))

@@ -275,7 +275,7 @@ class FleetSender:
 
     def _frame_sent(self, mission: Mission) -> str:
         """Return the fleet's frame; the map's own frame while its pose in the fleet is unknown."""
-        frame = mission.ledger.frame
+        frame = mission.covered.current.frame
         if not layer_of(mission).others.shared.why_misplaced(frame):
             return self._frame or frame
         # Other robots must not mistake the map's frame for the fleet's.

@@ -35,6 +35,7 @@ from fasaco_edge.mission.company import Waiting
 from fasaco_edge.mission.events import Doing, PathUpdate, State
 from fasaco_edge.mission.line.way import sees_on
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.orders.order import Errand
 from fasaco_edge.mission.path.route import NO_CELLS, Route
 from fasaco_edge.mission.work.order_state import Stage
@@ -90,10 +91,8 @@ class GivingWay(Waiting):
         self._has_work = True
         # The path to resume after the wait, and the errand of that path.
         self._held, self._errand = NO_CELLS, ""
-        # The robot's place, and since when it has been free to drive on from there.
-        self._place, self._free_since = (math.inf, math.inf), 0.0
-        # Where the robot stays, and since when.
-        self._stays_at, self._stays_since = (math.inf, math.inf), 0.0
+        # Where the robot is free to drive on from; and where it stays.
+        self._free, self._stay = Stay(MOVED_M), Stay(STAYS_M)
         # Reason and time of its last wait.
         self._waited, self._waited_at = "", -math.inf
 
@@ -102,19 +101,21 @@ class GivingWay(Waiting):
         if not isinstance(before, GivingWay):
             return
         self._waited, self._waited_at = before._waited, before._waited_at
-        self._stays_at, self._stays_since = before._stays_at, before._stays_since
+        self._stay = before._stay
 
     def line(self) -> Points:
         """Return the next AHEAD_M from the robot's place, as points (x, y) [m], float64 (n, 2)."""
         pose = self._map.pose
-        if pose is None or self._map.lattice is None:
+        if pose is None or self._map.ground.lattice is None:
             return np.zeros((0, 2))
         count = int(AHEAD_M / self._cell_m) + 2
         # A way to a refuge may begin with a cell beside the robot's own.
         first = 1 if self._refuge is None else 0
         cells = self._cells()[first : count + 1]
         here = np.array([[pose.pose.x, pose.pose.y]])
-        return np.concatenate((here, self._map.lattice.centres(cells))) if len(cells) else here
+        return (
+            np.concatenate((here, self._map.ground.lattice.centres(cells))) if len(cells) else here
+        )
 
     def _cells(self) -> NDArray[np.int32]:
         """Return the path ahead, or the path set aside during a wait."""
@@ -160,7 +161,7 @@ class GivingWay(Waiting):
 
     def why_stuck(self, now: float) -> str:
         """Return why the robot seems permanently stuck, or ""."""
-        is_stuck = now - self._waited_at <= STANDS_S and now - self._stays_since > TOO_LONG_S
+        is_stuck = now - self._waited_at <= STANDS_S and now - self._stay.since > TOO_LONG_S
         return f"{self._waited} for more than a minute" if is_stuck else ""
 
     def _end(self) -> None:
@@ -205,14 +206,15 @@ class GivingWay(Waiting):
 
     def _note_place(self, here: tuple[float, float], now: float) -> None:
         """Note where the robot is, and since when it has been free to drive on from there."""
-        if math.dist(here, self._place) > MOVED_M or len(self._cells()) < 2:
-            self._place, self._free_since = here, now
+        if not self._free.moves(here, now) and len(self._cells()) < 2:
+            self._free.begin(here, now)
         if self.waits_for:
             self._waited, self._waited_at = self._reason, now
         # A moment without an obstruction does not end a wait.
         has_waited = now - self._waited_at <= STANDS_S
-        if math.dist(here, self._stays_at) > STAYS_M or not has_waited:
-            self._stays_at, self._stays_since, self._failed_refuge = here, now, None
+        if self._stay.moves(here, now) or not has_waited:
+            self._stay.begin(here, now)
+            self._failed_refuge = None
 
     def _is_underway(self, here: tuple[float, float], now: float) -> bool:
         """Return whether the robot drives to its refuge, and no robot has come in its way."""
@@ -242,7 +244,7 @@ class GivingWay(Waiting):
 
     def _is_in(self, refuge: Cell, here: tuple[float, float]) -> bool:
         """Return whether the robot is at the centre of its refuge; at the edge it may obstruct."""
-        place = self._map.place_of(refuge)
+        place = self._map.ground.place_of(refuge)
         return place is None or math.dist(here, place) <= ARRIVED_M
 
     def _sees(self, area: ReachableArea, a: Points, b: Points) -> bool:
@@ -250,8 +252,8 @@ class GivingWay(Waiting):
 
         Without a map of the floor, the points must be in one cell, or in two that a step joins.
         """
-        if self._map.floor is not None:
-            return sees_on(self._map.floor, a, b)
+        if self._map.ground.floor is not None:
+            return sees_on(self._map.ground.floor, a, b)
         ends = [area.lattice.cell_at(*point.tolist()) for point in (a, b)]
         return 1 <= len(area.shortest_path(ends[0], ends[1])) <= 2
 
@@ -272,7 +274,7 @@ class GivingWay(Waiting):
 
     def _is_stalled(self, now: float) -> bool:
         """Return whether the robot stands although it has long been free to drive."""
-        return now - self._free_since > PATIENCE_S
+        return now - self._free.since > PATIENCE_S
 
     def _hold(
         self,
@@ -285,7 +287,7 @@ class GivingWay(Waiting):
         route, neighbours = self._route, self._neighbours
         if found.robot != self.waits_for:
             # A wait for another robot at the same place continues the time of this wait.
-            self._since = self._stays_since
+            self._since = self._stay.since
         was_waiting = bool(self.waits_for)
         self.waits_for, self._reason = found.robot, found.reason
         has_path = len(route.path.cells) > 0
@@ -295,14 +297,14 @@ class GivingWay(Waiting):
             self._held = ahead
         is_long = now - self._since > PATIENCE_S or self._is_stalled(now)
         # The robot is not free to drive while it waits.
-        self._free_since = now
+        self._free.count_from(now)
         # Plans also avoid a robot with right of way, as it may be jammed.
-        stands = neighbours[found.robot].stands_s > STANDS_S or now - self._stays_since > LONG_S
+        stands = neighbours[found.robot].stands_s > STANDS_S or now - self._stay.since > LONG_S
         if is_long and stands:
             self._fleet.others.avoid(found.robot)
         if (found.is_on_path or is_long) and now - self._sought_at >= AGAIN_S:
             self._sought_at = now
-            places, sees = self._map.places_of, partial(self._sees, area)
+            places, sees = self._map.ground.places_of, partial(self._sees, area)
             way = refuge(area, cell, here, self._radius_m, neighbours, places, sees)
             to = None if way is None else (int(way[-1, 0]), int(way[-1, 1]))
             if way is not None and to and to != self._failed_refuge and not self._is_in(to, here):

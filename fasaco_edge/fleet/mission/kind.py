@@ -40,8 +40,7 @@ class FleetKind(CompanyKind):
         self, config: MissionConfig, map_state: MapState, ledger: MissionLedger
     ) -> FleetLayer:
         """Return the other robots."""
-        cell_m = config.footprint.cell_m
-        return FleetLayer(self.robot, config.cost, cell_m, map_state, ledger)
+        return FleetLayer(self.robot, config.cost, config.footprint, map_state, ledger)
 
     def waiting(
         self,

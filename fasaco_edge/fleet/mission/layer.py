@@ -20,7 +20,7 @@ from fasaco_edge.fleet.mission.shared_ground import viewpoint
 from fasaco_edge.fleet.mission.shared_work import DivisionNumbers, Remainder
 from fasaco_edge.grid.changes import carried
 from fasaco_edge.grid.geometry import Window
-from fasaco_edge.grid.lattice import Cell
+from fasaco_edge.grid.lattice import Cell, Footprint
 from fasaco_edge.grid.reachable_area import ReachableArea
 from fasaco_edge.mission.company import Company, OpenCells
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
@@ -53,11 +53,12 @@ class FleetLayer(Company):
         self,
         robot: str,
         cost: CoverageCost,
-        cell_m: float,
+        footprint: Footprint,
         map_state: MapState,
         ledger: MissionLedger,
     ) -> None:
-        self.others = Members(robot, ledger, cell_m)
+        self.others = Members(robot, ledger, footprint.cell_m)
+        self._radius_m = footprint.robot_radius_m
         self.numbers = DivisionNumbers(robot, self.others)
         self._robot, self.step_s = robot, cost.step_s
         self._turn_steps = cost.quarter_turn_s / cost.step_s
@@ -87,19 +88,14 @@ class FleetLayer(Company):
         """Forget the ground of others: it belongs to another map."""
         self.others.ground.clear()
 
-    def passable(self, area: ReachableArea, cell: Cell, radius_m: float) -> ReachableArea:
+    def passable(self, area: ReachableArea, cell: Cell) -> ReachableArea:
         """Return the part of an area reachable from ``cell`` around robots in the way."""
-        return self.others.passable(area, cell, radius_m)
+        return self.others.passable(area, cell, self._radius_m)
 
     @property
     def has_members(self) -> bool:
         """Whether messages of other robots have arrived."""
         return bool(self.others.known)
-
-    @property
-    def has_company(self) -> bool:
-        """Whether other robots are at work on the remaining area."""
-        return self._division is not None
 
     def busiest(self, open_cells: OpenCells) -> str:
         """Return the name of the other robot with the most cells left in its part, or ""."""
@@ -144,31 +140,19 @@ class FleetLayer(Company):
         """Whether only parts of other robots are left, and these robots make progress."""
         return self._division is not None and self._remainder.others_go_on
 
-    def mine(self, cells: Mask, area: ReachableArea) -> Mask:
-        """Return which cells are this robot's to sweep.
+    def mine(self, cells: Mask, area: ReachableArea, unvisited: Mask | None = None) -> Mask:
+        """Return which cells are this robot's to visit or, given the unvisited ones, to sweep.
 
-        These are the cells of its part; or all cells, if none of its part is reachable and the
-        others make no progress. Cells that it has given up are left to the others.
+        These are the cells of its part; or all, if no unvisited cell of its part is reachable and
+        the others make no progress. Visits to cells that it has given up are left to the others.
         """
         if self._division is None:
             return cells
-        cells = self.untried(cells, area)
-        part = cells & self._is_own(self._division, area)
-        return part if self.others_go_on or (part & area.reachable).any() else cells
-
-    def mine_to_sweep(self, cells: Mask, unvisited: Mask, area: ReachableArea) -> Mask:
-        """Return the cells on which this robot sweeps the floor, visited or not.
-
-        These are the cells of its part; or all, if its part is visited and the others make no
-        progress. They include all cells of ``mine``.
-        """
-        if self._division is None:
-            return cells
+        if unvisited is None:
+            cells = unvisited = self.untried(cells, area)
         own = self._is_own(self._division, area)
-        if self.others_go_on:
-            return cells & own
-        has_work = (self.untried(unvisited, area) & own & area.reachable).any()
-        return cells & own if has_work else cells
+        goes_on = self.others_go_on or (self.untried(unvisited, area) & own & area.reachable).any()
+        return cells & own if goes_on else cells
 
     def give_up(self, cells: Mask, area: ReachableArea) -> Mask | None:
         """Leave this robot's part of cells to the others; see ``Company.give_up``."""
@@ -191,14 +175,7 @@ class FleetLayer(Company):
         self._shut = None, self._shut[1]
 
     def share(self, open_cells: OpenCells, cell: Cell, now: float, *, at_once: bool = False) -> str:
-        """Divide the remaining area again if worthwhile; return why a plan is wanted, or "".
-
-        Args:
-            open_cells: returns which cells of a window still need a visit, bool (rows, cols).
-            cell: this robot's cell.
-            now: time [s].
-            at_once: whether this robot is out of work.
-        """
+        """Divide the remaining area again if worthwhile, see ``Company.share``."""
         area = self._map.area
         if silent := self.others.forget_silent(now):
             return f"{silent} is silent: only the map shows whether it stands in the way"

@@ -37,9 +37,13 @@ class Messages:
             most: largest number of tiles of progress, and also of tiles of ground.
             most_anew: the same for the first message of an epoch.
         """
-        if mission.pose is None or not mission.ledger.frame:
+        if mission.pose is None or not mission.covered.current.frame:
             return None
-        layer, pose, tiles = layer_of(mission), mission.pose.pose, mission.ledger.snapshot().tiles
+        layer, pose, tiles = (
+            layer_of(mission),
+            mission.pose.pose,
+            mission.covered.current.snapshot().tiles,
+        )
         if layer.others.shared.epoch != self._epoch:
             # A new epoch sends all tiles again. In the first, the cells swept before it are
             # unknown.
@@ -52,7 +56,7 @@ class Messages:
         swept = self._swept.next(tiles, most)
         return MemberReceived(
             robot=self._robot,
-            frame=mission.ledger.frame,
+            frame=mission.covered.current.frame,
             state=str(mission.state),
             x=round(pose.x, 3),
             y=round(pose.y, 3),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,40 +20,23 @@ PLACES: dict[Errand, str] = {"home": "home", "charge": "to the dock"}
 
 
 class Errands:
-    """Begins, drives and ends errands."""
+    """Drives and ends errands."""
 
     def __init__(self, parts: MissionParts) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
         self.route, self.charging, self.way_out = parts.route, parts.charging, parts.way_out
-        self.standing = parts.standing
+        self.standing, self.company = parts.standing, parts.company
 
-    def consider_charging(self, state: State, now: float) -> None:
-        """Begin to charge if due, and end charging if the battery suffices."""
-        orders, charging = self.orders, self.charging
-        charging.update(now)
-        errand, docked = orders.order_state.errand, state is State.CHARGING
-        if errand == "charge" and charging.is_enough(now, docked=docked):
-            orders.set_state(replace(orders.order_state, errand=""))
-        elif not errand and charging.is_due(now):
-            charging.begin_errand()
-            orders.set_state(replace(orders.order_state, errand="charge"))
-
-    def run(self, cell: Cell, update: PathUpdate | None, now: float) -> Doing | None:
-        """Drive on to the destination of the errand; None if the errand ends here, at home.
-
-        Args:
-            cell: the robot's cell.
-            update: the path that this step has made so far.
-            now: time [s].
-        """
+    def run(self, cell: Cell, now: float) -> Doing | None:
+        """Drive on to the destination of the errand; None if it ends in ``cell``, at home."""
         route, orders, area, path = self.route, self.orders, self.map.area, self.route.path
-        errand = orders.order_state.errand
+        errand, update = orders.order_state.errand, None
         is_new = route.set_aside()
         route.requests.want_none()
         goal = orders.goal(errand)
         if cell == goal and not is_new and self.standing.in_cell_s >= ARRIVAL_S:
             if errand == "charge":
-                return Doing(State.CHARGING, self.charging.why(now), update)
+                return Doing(State.CHARGING, self.charging.why(now))
             orders.set_state(orders.order_state.arrived())
             return None
         is_off = path.finished or path.is_far(cell) or bool(self.monitor.doubt)
@@ -67,9 +48,9 @@ class Errands:
         if is_new or is_lost or not len(path.cells) or tuple(path.cells[-1].tolist()) != goal:
             self.monitor.clear_doubt()
             if goal is None:
-                return Doing(State.BLOCKED, NO_WAY.format(to), update)
+                return Doing(State.BLOCKED, NO_WAY.format(to))
             if area is None or not area.contains(goal):
-                return self.way_out.lead_out(NO_WAY.format(to), update, now, goal)
+                return self.way_out.lead_out(NO_WAY.format(to), now, goal)
             here = self.map.cell_at_pose() or cell
             why = self.charging.why_due() if errand == "charge" else ""
             update = self.lead(self.way(area, here, goal), f"drives {to}{why}", errand, now)
@@ -77,7 +58,7 @@ class Errands:
 
     def way(self, area: ReachableArea, cell: Cell, goal: Cell) -> NDArray[np.int32]:
         """Return the shortest path, if possible around robots that stand in the way."""
-        around = self.orders.scope.passable(area, cell)
+        around = self.company.passable(area, cell)
         path = around.shortest_path(cell, goal) if around.contains(goal) else NO_CELLS
         return path if len(path) else area.shortest_path(cell, goal)
 

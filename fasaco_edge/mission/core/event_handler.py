@@ -136,7 +136,7 @@ class EventHandler:
 
     def _map_changed(self, at: float | None = None) -> None:
         """Follow a new map; raise LedgerMismatchError if it shows another building."""
-        assert self.map.free is not None
+        assert self.map.ground.free is not None
         assert self.map.grid is not None
         self.monitor.receive_map(self._now if at is None else at)
         self.line.receive_map()
@@ -149,19 +149,19 @@ class EventHandler:
             self._record_again()  # the pose may have come before the map
             if self.map.shift is not None:
                 self.orders.shift_reached(self.map.shift)
-        free, frame = self.map.without_obstacles(self.map.free), self.map.grid.frame
+        free, frame = self.map.without_obstacles(self.map.ground.free), self.map.grid.frame
         shows_floor = self.map.shows_floor
         self._change_building(self.ledger.check(free, frame) if shows_floor else None)
 
     def _compare_buildings(self) -> Pose2D | None:
         """Compare the newest map with earlier ones; return the robot's pose on the earlier ones."""
-        if self.map.plain is None or self.map.free is None:
+        if self.map.ground.plain is None or self.map.ground.free is None:
             return None
         pose = None if self.map.pose is None else self.map.pose.pose
         if not self.map.shows_floor:
             self.map.building.receive_blank_map()
             return pose
-        plain, free = map(self.map.without_obstacles, (self.map.plain, self.map.free))
+        plain, free = map(self.map.without_obstacles, (self.map.ground.plain, self.map.ground.free))
         contradicts = partial(self.ledger.contradicts, free)
         return self.map.building.receive_map(plain, pose, self._now, contradicts)
 
@@ -284,13 +284,13 @@ class EventHandler:
 
     def _record(self, driven: Driven) -> None:
         """Record floor swept on the way to a pose; a pose far outside the map is ignored."""
-        lattice, pose = self.map.lattice, driven.pose
+        lattice, pose = self.map.ground.lattice, driven.pose
         if lattice is None:
             return
         if not driven.is_joined:
             self.ledger.break_track()
         if lattice.contains(lattice.cell_at(pose.x, pose.y)):
-            full = self.ledger.record(pose, self.map.place_of, driven.farthest_m)
+            full = self.ledger.record(pose, self.map.ground.place_of, driven.farthest_m)
             if full is not None:
                 self._faults.append(full)
 

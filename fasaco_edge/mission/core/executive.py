@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.errands import Errands
@@ -18,24 +19,42 @@ STOPPED = frozenset((State.PAUSED, State.IDLE, State.DONE, State.CHARGING))
 
 
 class Executive:
-    """Decides by ``RULES``; owns the mission's state.
+    """Decides by ``rules``; owns the mission's state.
 
     Attributes:
-        mask_frame: the frame of the map that the keep-out mask belongs to; "" for any.
         troubles: current troubles; read-only.
     """
 
-    def __init__(self, parts: MissionParts, mask_frame: str) -> None:
+    @property
+    def rules(self) -> tuple[Callable[[], Doing | None], ...]:
+        """The rules, in order; each returns the mission's activity, or None to let the next one
+        decide."""
+        return (
+            self._charge_in_time,
+            self._end_in_time,
+            self._give_way,
+            self._rest,
+            self._find_place,
+            self._run_errand,
+            self._wait_for_room,
+            self._judge_path,
+            self._plan,
+            self._end_order,
+            self._drive,
+        )
+
+    def __init__(self, parts: MissionParts) -> None:
         self.map, self.monitor, self.orders = parts.map, parts.monitor, parts.orders
-        self.route, self.company, self.charging = parts.route, parts.company, parts.charging
+        self.route, self.charging = parts.route, parts.charging
         self.time_limit, self.giving_way, self.dock = parts.time_limit, parts.giving_way, parts.dock
-        self.way_out, self.blocked, self.mask_frame = parts.way_out, parts.blocked, mask_frame
+        self.way_out, self.blocked = parts.way_out, parts.blocked
         self._standing, self._checks = parts.standing, PathChecks(parts)
         self._errands = Errands(parts)
         self._work = OrderWork(parts, self._errands)
         self.troubles = Troubles(parts)
         self._state, self._reason = State.WAITING_FOR_MAP, "no map yet"
-        # State of this step: the time [s], the robot's cell once known, the path made so far.
+        # State of this step: the time [s], the robot's cell once known, and the path made so far,
+        # which is published unless a rule returns another one.
         self._now = 0.0
         self._cell: Cell = 0, 0
         self._update: PathUpdate | None = None
@@ -65,14 +84,21 @@ class Executive:
         """Return the decision at ``now`` [s]: that of the first rule that returns an activity."""
         self._now, self._update = now, None
         self.way_out.forget_why()
-        doing = next(doing for rule in RULES if (doing := rule(self)) is not None)
+        doing = next(doing for rule in self.rules if (doing := rule()) is not None)
         self._state, self._reason = doing.state, doing.reason
         self.troubles.update(self.doing, now)
-        return Decision(plan=doing.plan, path=doing.path)
+        return Decision(plan=doing.plan, path=doing.path or self._update)
 
     def _charge_in_time(self) -> None:
-        """Begin or end an errand of charging, by the battery."""
-        self._errands.consider_charging(self._state, self._now)
+        """Begin to charge if due, and end charging if the battery suffices."""
+        orders, charging, now = self.orders, self.charging, self._now
+        charging.update(now)
+        errand, docked = orders.order_state.errand, self._state is State.CHARGING
+        if errand == "charge" and charging.is_enough(now, docked=docked):
+            orders.set_state(replace(orders.order_state, errand=""))
+        elif not errand and charging.is_due(now):
+            charging.begin_errand()
+            orders.set_state(replace(orders.order_state, errand="charge"))
 
     def _end_in_time(self) -> None:
         """End the order if the robot has to turn home to be there in time."""
@@ -101,7 +127,7 @@ class Executive:
             return None
         if resting[0] in STOPPED:
             self._standing.reset()
-        return Doing(*resting, self._update)
+        return Doing(*resting)
 
     def _why_rest(self) -> tuple[State, str] | None:
         """Return state and reason of a robot that has to rest; else None."""
@@ -113,7 +139,7 @@ class Executive:
             return docked
         if not order.errand and not order.is_open:
             return (State.DONE, self.orders.ending) if order.order else (State.IDLE, order.why)
-        if self.map.lattice is None:
+        if self.map.ground.lattice is None:
             return State.WAITING_FOR_MAP, self.map.why_no_map()
         if self.map.pose is None:
             return State.WAITING_FOR_POSE, self.map.why_no_pose()
@@ -124,11 +150,11 @@ class Executive:
         """Return why the keep-out zones of this map are missing; "" if they are known."""
         if why := self.map.places.why_no_keep_out:
             return why
-        grid = self.map.grid
-        if grid is None or self.mask_frame in ("", grid.frame):
+        grid, mask_frame = self.map.grid, self.map.places.mask_frame
+        if grid is None or mask_frame in ("", grid.frame):
             return ""
         return (
-            f"the keep-out mask is in frame {self.mask_frame!r}, the map in {grid.frame!r}: "
+            f"the keep-out mask is in frame {mask_frame!r}, the map in {grid.frame!r}: "
             f"waits for a mask in {grid.frame!r}"
         )
 
@@ -149,7 +175,7 @@ class Executive:
         route, cell = self.route, self.map.robot_cell()
         if cell is None or self.map.area is None:
             self.map.forget_area()
-            return self.way_out.lead_out(self.map.why_misplaced(), None, self._now)
+            return self.way_out.lead_out(self.map.why_misplaced(), self._now)
         self._cell = cell
         self._standing.update(cell, self._now)
         if not len(route.path.cells):
@@ -160,25 +186,20 @@ class Executive:
     def _run_errand(self) -> Doing | None:
         """Drive home or to the dock; rest on arrival, and resume the path afterwards."""
         if self.orders.order_state.errand:
-            return self._errands.run(self._cell, self._update, self._now) or self._rest()
+            return self._errands.run(self._cell, self._now) or self._rest()
         self._update = self.route.take_up("goes on", self._now) or self._update
         return None
 
     def _wait_for_room(self) -> Doing | None:
         """Wait for a room that the order names, after all its other zones."""
         name = self.orders.order_state.waits_for
-        return self._work.wait_for_room(name, self._update, self._now) if name else None
+        return self._work.wait_for_room(name, self._now) if name else None
 
     def _judge_path(self) -> None:
         """Ask for a plan if the path no longer serves the order."""
         cell, now = self._cell, self._now
         if self._state in DRIVING:
-            self._checks.check_deviation(cell, now)
-        if self._state is State.COVERING and self.company.has_members:
-            self._checks.check_worth(now)
-        if self._state is State.COVERING:
-            self._checks.check_time(now)
-            self._checks.check_room(cell)
+            self._checks.check(cell, now, is_covering=self._state is State.COVERING)
         if reason := self.orders.begin_stage(cell, now):
             self.route.requests.want(reason)
         if reason := self._work.share(cell, now):
@@ -189,11 +210,11 @@ class Executive:
         if not route.requests.wanted or route.requests.pending is not None:
             return None
         if why := route.requests.why_not_yet(self._now):
-            return Doing(State.BLOCKED, why, self._update)
+            return Doing(State.BLOCKED, why)
         # Wait a moment after the robot was stopped.
         if state is State.BLOCKED and not self._standing.has_waited:
-            return Doing(state, self._reason, self._update)
-        return self._work.plan(self._cell, self._update, state, self._now)
+            return Doing(state, self._reason)
+        return self._work.plan(self._cell, state, self._now)
 
     def _end_order(self) -> Doing | None:
         """Stop if the order is over, or if its last cells wait for a retry."""
@@ -202,7 +223,7 @@ class Executive:
             orders.advance(self._now)
         waits = orders.is_waiting and route.path.finished and route.requests.pending is None
         if waits or orders.order_state.stage is Stage.OVER:
-            return self._work.settle(self._update, self._now)
+            return self._work.settle(self._now)
         return None
 
     def _drive(self) -> Doing:
@@ -223,19 +244,3 @@ class Executive:
             state is State.COVERING and route.requests.pending is None and not route.requests.wanted
         )
         return Doing(state, reason, update, route.request_improvement(now) if is_free else None)
-
-
-# The rules, in order. A rule returns the mission's activity, or None to let the next rule decide.
-RULES: tuple[Callable[[Executive], Doing | None], ...] = (
-    Executive._charge_in_time,
-    Executive._end_in_time,
-    Executive._give_way,
-    Executive._rest,
-    Executive._find_place,
-    Executive._run_errand,
-    Executive._wait_for_room,
-    Executive._judge_path,
-    Executive._plan,
-    Executive._end_order,
-    Executive._drive,
-)

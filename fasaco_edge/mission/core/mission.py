@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from fasaco_edge.errors import LedgerMismatchError, NotPublished
 from fasaco_edge.grid.geometry import StampedPose
-from fasaco_edge.grid.lattice import Cell, CoverageLattice
+from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.core.charging import BatteryGauge
@@ -24,7 +24,7 @@ from fasaco_edge.mission.core.parts import Lasting, laid_parts
 from fasaco_edge.mission.core.trouble import Trouble
 from fasaco_edge.mission.coverage.counts import Coverage
 from fasaco_edge.mission.coverage.drive_meter import DriveMeter
-from fasaco_edge.mission.coverage.ledger import CoverageLedger, LedgerSnapshot
+from fasaco_edge.mission.coverage.ledger import LedgerSnapshot
 from fasaco_edge.mission.coverage.relaid_ledger import relaid_ledger
 from fasaco_edge.mission.events import (
     Decision,
@@ -36,7 +36,6 @@ from fasaco_edge.mission.events import (
     State,
 )
 from fasaco_edge.mission.map.placing import restored
-from fasaco_edge.mission.orders.mask import mask_frame
 from fasaco_edge.mission.rooms.room_book import RoomBook
 from fasaco_edge.mission.rooms.room_watch import RoomWatch
 from fasaco_edge.mission.work.idle_places import IdlePlaces
@@ -88,8 +87,7 @@ class Mission:
         self.giving_way, self.room_cells = parts.giving_way, parts.room_cells
         self._trail, self._changes = parts.trail, parts.changes
         self._handler = EventHandler(parts)
-        mask = mask_frame(self._config.policy.keep_out_mask)
-        self._executive = Executive(parts, mask)
+        self._executive = Executive(parts)
 
     def restore(
         self,
@@ -270,11 +268,11 @@ class Mission:
             return ""
         is_theirs = not self.map.places.why
         order = self.orders.order_state
-        return self._idle.find(self.grid, self.map_revision, order, now, is_theirs=is_theirs)
+        return self._idle.find(self.grid, self.map.map_revision, order, now, is_theirs=is_theirs)
 
     def coverage(self) -> Coverage | None:
         """Return the counts of coverage; None before there is a map."""
-        if (lattice := self.map.lattice) is None:
+        if (lattice := self.map.ground.lattice) is None:
             return None
         return self.map.coverage(self.covered, self.orders.reach.known(lattice))
 
@@ -297,22 +295,12 @@ class Mission:
         return state if state.places == places else replace(state, places=places)
 
     @property
-    def home(self) -> Cell | None:
-        """The cell (row, col) to which the robot returns; None for none."""
-        return self.orders.goal()
-
-    @property
     def grid(self) -> OccupancyGrid | None:
         """The newest map; None before there is one."""
         if self.map.given is not self._laid_grid:
             given = self.map.given
             self._laid_grid, self._given_grid = given, self.rotation.grid(given)
         return self._given_grid
-
-    @property
-    def map_revision(self) -> int:
-        """Counter of map states; 0 before the first."""
-        return self.map.map_revision
 
     @property
     def pose(self) -> StampedPose | None:
@@ -322,12 +310,7 @@ class Mission:
     @property
     def lattice(self) -> CoverageLattice | None:
         """The lattice over the newest map, in its own frame; None before there is a map."""
-        return self.map.lattice
-
-    @property
-    def ledger(self) -> CoverageLedger:
-        """The covered cells."""
-        return self.covered.current
+        return self.map.ground.lattice
 
     @property
     def trail(self) -> LivingTrail:

@@ -68,7 +68,7 @@ class OrderChanges:
         drawn = tuple(keep_out.polygon for keep_out in order.keep_out)
         if self.lattice_deg:
             drawn = tuple(rotated_polygon(polygon, -self.lattice_deg) for polygon in drawn)
-        self.map.keep_out(self._configured + ordered + drawn, self.map.grid)
+        self.map.ground.keep_out(self._configured + ordered + drawn, self.map.grid)
         self.line.receive_map()
 
     def update_area(self) -> None:
@@ -150,7 +150,7 @@ class OrderChanges:
         if given is not before:
             order = rotated_order(given, -self.lattice_deg)
             self.orders.set_state(replace(state, order=order))
-            lattice, zone = self.map.lattice, self.orders.order_state.current_zone
+            lattice, zone = self.map.ground.lattice, self.orders.order_state.current_zone
             if lattice is not None and zone is not None and state.begun:
                 zones = (state.current_zone or zone,), (zone,)
                 then, now = (in_zones(each, lattice.window, lattice.cell_m) for each in zones)
@@ -184,7 +184,7 @@ class OrderChanges:
 
     def _replan(self) -> int:
         """Ask for a full new plan; return its number, or raise CommandError if none can be made."""
-        if self.map.lattice is None:
+        if self.map.ground.lattice is None:
             raise CommandError("nothing to plan: there is no map yet", hint="publish a map first")
         if self.map.pose is None:
             raise CommandError("nothing to plan: there is no pose yet", hint="publish a pose first")

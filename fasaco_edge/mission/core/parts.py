@@ -24,7 +24,6 @@ from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.path.trail_layer import TrailLayer
 from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.rooms.room_watch import RoomWatch
-from fasaco_edge.mission.work.by_room import RoomPrice
 from fasaco_edge.mission.work.sequencer import Sequencer
 
 
@@ -108,9 +107,8 @@ def laid_parts(
     ledger = MissionLedger(cell_m, tool_m, ahead_m, kind.cells(), sight)
     company = kind.company(config, map_state, ledger)
     room_cells = RoomCells(lasting.rooms, lattice_deg)
-    room_price = RoomPrice(config.policy.by_room, room_cells)
-    orders = Sequencer(config, map_state, ledger, company, room_price)
-    route = Route(config.spare_share, map_state, orders)
+    orders = Sequencer(config, map_state, ledger, company, room_cells)
+    route = Route(config.spare_share, map_state, orders, company)
     line = LineLayer(sweeping, map_state, ledger, orders, route)
     trail = TrailLayer(config, map_state, route)
     motion = MapMotion(ledger, orders, trail, route)

@@ -6,7 +6,7 @@ from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.standing import PATIENCE_S
 
-# Period of ``check_worth`` and ``check_time`` [s].
+# Period of ``_check_worth`` and ``_check_time`` [s].
 WORTH_S = 1.0
 # While poses are too far apart, a path ends after this long without a newly covered cell [s].
 VAIN_S = 60.0
@@ -22,17 +22,24 @@ class PathChecks:
     def __init__(self, parts: MissionParts) -> None:
         self._ledger, self._monitor, self._orders = parts.ledger, parts.monitor, parts.orders
         self._route, self._line, self._standing = parts.route, parts.line, parts.standing
+        self._company = parts.company
         self._orders.describe_floor_by(self._sum_up)
         self._worth_at = self._timed_at = float("-inf")
         # Number of covered cells and its time [s], while poses are too far apart.
         self._progress: tuple[int, float] | None = None
 
-    def check_deviation(self, cell: Cell, now: float) -> None:
-        """Ask for a new plan for a robot in ``cell`` that is off its path or at its end."""
+    def check(self, cell: Cell, now: float, *, is_covering: bool) -> None:
+        """Check the path of a robot in ``cell``."""
+        while_covering = (self._check_worth, self._check_time, self._check_room)
+        for check in (self._check_deviation, *(while_covering if is_covering else ())):
+            if self._route.requests.pending is not None or self._route.requests.wanted:
+                return
+            check(cell, now)
+
+    def _check_deviation(self, cell: Cell, now: float) -> None:
+        """Ask for a new plan for a robot that is off its path or at its end."""
         route, monitor, path = self._route, self._monitor, self._route.path
         waited = self._standing.has_waited
-        if self._has_plan_due:
-            return
         if self._drives_in_vain(now):
             self._end_path(now, FAR_APART)
             return
@@ -84,35 +91,31 @@ class PathChecks:
             return floor
         return f"{floor}; {FAR_APART}, and what lies between them does not count"
 
-    def check_worth(self, now: float) -> None:
+    def _check_worth(self, _: Cell, now: float) -> None:
         """Ask for a new plan for a robot of a fleet if others have swept all cells ahead."""
         route = self._route
-        is_due = now - self._worth_at >= WORTH_S
-        if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
+        is_due = self._company.has_members and now - self._worth_at >= WORTH_S
+        if not is_due or len(route.path.ahead) <= 1:
             return
         self._worth_at = now
         if not self._line.left.is_worth_driving and not self._orders.scope.is_any_planned_left:
             route.requests.want("others have swept what lay ahead")
 
-    def check_room(self, cell: Cell) -> None:
+    def _check_room(self, cell: Cell, _: float) -> None:
         """Ask for a new plan if new rooms show that the robot has another room to finish first."""
-        if not self._has_plan_due and self._orders.scope.is_in_other_room(cell):
+        if self._orders.scope.is_in_other_room(cell):
             self._route.requests.want("rooms have changed: another one first")
 
-    def check_time(self, now: float) -> None:
+    def _check_time(self, _: Cell, now: float) -> None:
         """Ask for a new plan with the most worthwhile floor first if time or battery do not suffice
         for all."""
         orders, route = self._orders, self._route
         is_limited = orders.scope.worth.may_work_s < float("inf")
         is_due = is_limited and now - self._timed_at >= WORTH_S
-        if not is_due or self._has_plan_due or len(route.path.ahead) <= 1:
+        if not is_due or len(route.path.ahead) <= 1:
             return
         self._timed_at = now
         figures = self._line.ahead()
         ahead_s = orders.scope.walk_s(route.path.ahead) if figures is None else figures.seconds
         if orders.scope.puts_other_first(ahead_s):
             route.requests.want("not all can be done in time: the most worthwhile floor first")
-
-    @property
-    def _has_plan_due(self) -> bool:
-        return self._route.requests.pending is not None or bool(self._route.requests.wanted)

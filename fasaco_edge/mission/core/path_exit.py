@@ -81,7 +81,7 @@ class PublishedPath:
             end_yaw=update.end_yaw,
             yaw=update.yaw,
             map_stamp_ns=grid.stamp_ns,
-            map_revision=mission.map_revision,
+            map_revision=mission.map.map_revision,
             plan=update.plan,
             plan_s=update.plan_s,
             changed=changed,

@@ -13,6 +13,7 @@ from fasaco_edge.errors import WrongFrame
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.mission.events import FollowerBlocked
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 
 # Minimum time between new plans for a robot that left its path or stands still at its end: a
@@ -40,11 +41,9 @@ class Standing:
         self._now = 0.0
         self._cell: Cell | None = None
         self._entered_at = 0.0
-        # The robot's position, to within STANDING_M.
-        self._place = math.inf, math.inf
-        # When it got a path at this place, by our clock, and by the robot's [ns]. A time without a
-        # path is added to it.
-        self._since = 0.0, 0
+        # The robot's place, and since when it has had a path there, by our clock, and by the
+        # robot's [ns]. A time without a path is added to it.
+        self._stay, self._since_ns = Stay(STANDING_M), 0
         # The last time that it had a path to drive there, by both clocks.
         self._had_path = 0.0, 0
         # Number of times that it got its path again there.
@@ -54,12 +53,12 @@ class Standing:
 
     def continue_from(self, before: Standing) -> None:
         """Take over a predecessor's count of the time and of the tries."""
-        self._place, self._since, self._tries = before._place, before._since, before._tries
+        self._stay, self._since_ns, self._tries = before._stay, before._since_ns, before._tries
         self._had_path = before._had_path
 
     def reset(self) -> None:
         """Forget the place: the robot rests, and must not drive."""
-        self._place = math.inf, math.inf
+        self._stay.forget()
 
     def update(self, cell: Cell, now: float) -> None:
         """Update the robot's cell and place; to be called in each step."""
@@ -110,7 +109,8 @@ class Standing:
         """Record that the robot gets its path again."""
         assert self._map.pose is not None
         self._tries += 1
-        self._since = self._now, self._map.pose.stamp_ns
+        self._stay.count_from(self._now)
+        self._since_ns = self._map.pose.stamp_ns
 
     @property
     def why_stuck(self) -> str:
@@ -118,7 +118,7 @@ class Standing:
         stamped = self._map.pose
         if stamped is None or not self._has_path or self._tries < TRIES:
             return ""
-        if math.dist((stamped.pose.x, stamped.pose.y), self._place) > STANDING_M:
+        if self._stay.has_left((stamped.pose.x, stamped.pose.y)):
             return ""
         return f"the robot stands: it got a path {self._tries + 1} times"
 
@@ -131,14 +131,14 @@ class Standing:
         assert self._map.pose is not None
         stamped = self._map.pose
         here, at = (stamped.pose.x, stamped.pose.y), (self._now, stamped.stamp_ns)
-        if math.dist(here, self._place) > STANDING_M:
-            self._place, self._since, self._had_path, self._tries = here, at, at, 0
+        if self._stay.moves(here, self._now):
+            self._since_ns, self._had_path, self._tries = stamped.stamp_ns, at, 0
         elif not self._has_path:
             return
         elif (begun_at := self._route.begun_at) > self._had_path[0]:
-            since, since_ns = self._since
             had_at, had_ns = self._had_path
-            self._since = since + begun_at - had_at, since_ns + at[1] - had_ns
+            self._stay.count_from(self._stay.since + begun_at - had_at)
+            self._since_ns += stamped.stamp_ns - had_ns
         self._had_path = at
 
     def _update_yaw(self) -> None:
@@ -153,8 +153,8 @@ class Standing:
         It is the longer of the times by our clock and by the robot's, as stamps may stand still.
         """
         assert self._map.pose is not None
-        since, since_ns = self._since
-        return max(self._now - since, (self._map.pose.stamp_ns - since_ns) * 1e-9)
+        theirs_s = (self._map.pose.stamp_ns - self._since_ns) * 1e-9
+        return max(self._now - self._stay.since, theirs_s)
 
 
 # A report is valid for this long, as the follower repeats it once a second.

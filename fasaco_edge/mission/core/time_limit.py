@@ -64,7 +64,7 @@ def seconds_back(
     cell, goal, area = map_state.cell_at_pose(), orders.goal(errand), map_state.area
     if cell is None or goal is None or area is None:
         return 0.0
-    walk, sweeping, floor = area.shortest_path(cell, goal), config.sweeping, map_state.floor
+    walk, sweeping, floor = area.shortest_path(cell, goal), config.sweeping, map_state.ground.floor
     if sweeping is None or floor is None or not len(walk):
         return config.cost.of_walk(walk)
     assert map_state.pose is not None

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fasaco_edge.mission.config import MissionPolicy
 from fasaco_edge.mission.core.in_dock import DockCurrent
 from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.path_checks import FAR_APART
@@ -69,16 +68,11 @@ class Troubles:
         self.map, self.monitor, self.charging = parts.map, parts.monitor, parts.charging
         self.giving_way, self.standing, self.dock = parts.giving_way, parts.standing, parts.dock
         self.way_out, self.blocked = parts.way_out, parts.blocked
-        self.offset = parts.line.offset
+        self.offset, self.policy = parts.line.offset, parts.charging.config.policy
         self.found: tuple[Trouble, ...] = ()
         self._current = DockCurrent(parts.lasting.battery)
         # The last time that the robot was at a possible place, or at rest [s].
         self._possible_at = math.inf
-
-    @property
-    def policy(self) -> MissionPolicy:
-        """The limits after which troubles are reported."""
-        return self.charging.config.policy
 
     def continue_from(self, before: Troubles) -> None:
         """Take over the findings and counts of a predecessor, so that no timeout starts again."""
@@ -121,7 +115,7 @@ class Troubles:
 
     def no_map(self, _: State, now: float) -> str:
         """Return why there is no current map."""
-        if self.map.lattice is None:
+        if self.map.ground.lattice is None:
             return self.map.why_no_map() if self.monitor.map_silent_s(now) > REST_S else ""
         if not self.monitor.is_map_stale(now):
             return ""

@@ -20,9 +20,10 @@ from fasaco_edge.grid.floor_map import FloorMap
 from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
-from fasaco_edge.mission.events import Doing, PathUpdate, State
+from fasaco_edge.mission.events import Doing, State
 from fasaco_edge.mission.line.way import LEAST_SHARE, fitting_radius, is_clear_between
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.work.sequencer import Sequencer
 
@@ -55,10 +56,8 @@ class WayOut:
         # Where the way out leads to, and the floor on which it was found.
         self._to: Point | None = None
         self._seen: tuple[FloorMap | None, int] = None, 0
-        # Where the robot stands, since when [s], and the number of ways that it could not drive.
-        self._place: Point = math.inf, math.inf
-        self._since = -math.inf
-        self._tries = 0
+        # Where the robot stands, and the number of ways from there that it could not drive.
+        self._stay, self._tries = Stay(STANDING_M), 0
 
     def receive_pose(self, pose: Pose2D) -> None:
         """Add the robot's place to the track."""
@@ -78,9 +77,7 @@ class WayOut:
         """Forget the track: the robot was carried, or drove it on another map."""
         self._track.clear()
 
-    def lead_out(
-        self, why: str, update: PathUpdate | None, now: float, goal: Cell | None = None
-    ) -> Doing:
+    def lead_out(self, why: str, now: float, goal: Cell | None = None) -> Doing:
         """Lead the robot back along its track, to a place where it can continue, or to a goal.
 
         A robot in a keep-out zone stays, as a person has drawn the zone. To be called in each step
@@ -88,21 +85,19 @@ class WayOut:
 
         Args:
             why: what shuts it in.
-            update: the path that this step has made so far; returned if there is no new one.
             now: time [s].
             goal: destination; None for the nearest work.
         """
         if self._map.is_kept_out:
-            return Doing(State.BLOCKED, why, update)
+            return Doing(State.BLOCKED, why)
 
         def leads_on(area: ReachableArea) -> bool:
             return area.contains(goal) if goal else not self._orders.is_shut_in(area)
 
-        way = self._lead(leads_on, why, now)
+        way, update = self._lead(leads_on, why, now), None
         back = f"{why}: drives back along its track"
         if way is not None:
-            reason = back if len(way) else why
-            update = self._route.publish_way_out(way, reason, now) or update
+            update = self._route.publish_way_out(way, back if len(way) else why, now)
         if self._route.is_way_out:
             return Doing(State.COVERING, back, update)
         return Doing(State.BLOCKED, why, update)
@@ -119,16 +114,17 @@ class WayOut:
     ) -> NDArray[np.float64] | None:
         """Return the way to publish, float64 (n, 2): x, y [m]; None to continue as before."""
         self.why = why
-        floor, stamped, drives = self._map.floor, self._map.pose, self._route.is_way_out
+        floor, stamped, drives = self._map.ground.floor, self._map.pose, self._route.is_way_out
         assert stamped is not None
         here = stamped.pose.x, stamped.pose.y
-        has_moved = math.dist(here, self._place) > STANDING_M
+        has_moved = self._stay.moves(here, now)
         if has_moved:
-            self._place, self._since, self._tries = here, now, 0
-        waits_s = now - self._since
+            self._tries = 0
+        waits_s = now - self._stay.since
         seen, self._seen = self._seen, (floor, floor.revision if floor else 0)
         if drives and waits_s > STANDING_S:
-            self._since, self._tries = now, self._tries + 1
+            self._stay.count_from(now)
+            self._tries += 1
             return NO_WAY
         if self._tries and not drives and waits_s <= STANDING_S * 2 ** (self._tries - 1):
             return None
@@ -140,7 +136,7 @@ class WayOut:
         to, self._to = self._to, tuple(way[-1].tolist()) if len(way) else None
         if drives:
             return None if to == self._to else way
-        self._since = now
+        self._stay.count_from(now)
         return way
 
     def _find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
@@ -148,7 +144,7 @@ class WayOut:
 
         It is empty, (0, 2), if there is none, or if only cells are counted.
         """
-        floor, lattice, stamped = self._map.floor, self._map.lattice, self._map.pose
+        floor, lattice, stamped = self._map.ground.floor, self._map.ground.lattice, self._map.pose
         if floor is None or lattice is None or stamped is None or self._map.grid is None:
             return NO_WAY
         here = stamped.pose.x, stamped.pose.y
@@ -187,7 +183,7 @@ class WayOut:
 
         A way that ends at the border of that cell may be too short to be driven.
         """
-        floor, stand = self._map.floor, self._map.place_of(cell)
+        floor, stand = self._map.ground.floor, self._map.ground.place_of(cell)
         if floor is None or stand is None:
             return way
         a, b = (np.array(map_to_raster(floor.geometry, *at)) for at in (way[-1].tolist(), stand))

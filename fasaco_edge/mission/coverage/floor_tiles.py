@@ -52,17 +52,10 @@ class SharedTiles(dict[TileKey, NDArray[Scalar]]):
         most: limit on the number of tiles.
         dropped: number of tiles dropped at once at the limit.
         blank: an empty tile.
-        tiles: initial tiles.
     """
 
-    def __init__(
-        self,
-        most: int,
-        dropped: int,
-        blank: NDArray[Scalar],
-        tiles: Mapping[TileKey, NDArray[Scalar]] = MappingProxyType({}),
-    ) -> None:
-        super().__init__(tiles)
+    def __init__(self, most: int, dropped: int, blank: NDArray[Scalar]) -> None:
+        super().__init__()
         self._most, self._dropped, self._blank = most, dropped, blank
         # Tiles that no snapshot shares.
         self._own: set[TileKey] = set()

@@ -11,12 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fasaco_edge.grid.geometry import Point, Pose2D, Window
-from fasaco_edge.mission.coverage.floor_tiles import (
-    NO_FLOOR,
-    FloorSnapshot,
-    SharedTiles,
-    assembled,
-)
+from fasaco_edge.mission.coverage.floor_tiles import NO_FLOOR, FloorSnapshot, SharedTiles, assembled
 from fasaco_edge.planners.living_trail import NO_TRAIL, TrailSnapshot
 
 if TYPE_CHECKING:

@@ -21,14 +21,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.changes import LatticeChange
 from fasaco_edge.grid.geometry import MAX_LATTICE_CELLS, Pose2D, Window
-from fasaco_edge.grid.lattice import (
-    BLOCKED,
-    COVERABLE,
-    UNKNOWN,
-    CoverageLattice,
-    Footprint,
-    beside,
-)
+from fasaco_edge.grid.lattice import BLOCKED, COVERABLE, UNKNOWN, CoverageLattice, Footprint, beside
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.kernels.floor import certain as kernels
 from fasaco_edge.kernels.floor.certain import FloorTiles, Whereabouts

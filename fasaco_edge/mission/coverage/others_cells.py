@@ -19,7 +19,8 @@ class OthersCells:
 
     A robot that has left its fleet keeps the cells that others had swept, in case it joins again.
     Once it forgets cells of its own, it drops all others, too: else forgotten cells that others had
-    swept would still count.
+    swept would still count. The ledger calls ``record_forgotten`` with ``clear``,
+    ``leave_building`` and ``reset``, too.
 
     Attributes:
         version: counter of changes.
@@ -47,18 +48,15 @@ class OthersCells:
 
     def clear(self) -> None:
         """Forget all that others reported: it belongs to another frame or building."""
-        self._kept = b""
 
     def enter(self, frame: str) -> None:
         """Note the active frame."""
 
     def leave_building(self, frame: str) -> None:
         """Note that the map in a frame shows another building: cells of others lie elsewhere."""
-        self._kept = b""
 
     def reset(self) -> None:
         """Accept the next map as one that others share."""
-        self._kept = b""
 
     def snapshot(self, cell_m: float) -> LedgerSnapshot:
         """Return the cells swept by others as one ledger."""

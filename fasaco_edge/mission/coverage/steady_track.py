@@ -128,18 +128,13 @@ class SteadyTrack:
         self._done -= past
         return places
 
-    @property
-    def is_behind(self) -> bool:
-        """Whether some poses have no final place yet."""
-        return self._done < len(self._poses)
-
     def ahead(self) -> list[Position]:
         """Return the preliminary places of the newest poses."""
         return [self._place(index) for index in range(self._done, len(self._poses))]
 
     def box_ahead(self) -> tuple[float, float, float, float] | None:
         """Return the bounds of these places: least x, y, greatest x, y [m]; None for none."""
-        if not self.is_behind:
+        if self._done == len(self._poses):
             return None
         # Places are means of poses, so the poses bound them.
         around = self._poses[max(self._done - self._beside, 0) :]

@@ -139,7 +139,7 @@ class SweptFloor:
             geometry: placement of the grid, at any yaw.
             window: window of its pixels; None for all.
         """
-        whole = window or Window(0, 0, geometry.rows, geometry.cols)
+        whole = window or geometry.window
         found = np.zeros((whole.rows, whole.cols), np.bool_)
         place = Similarity.of(geometry)
         side = max(min(int(BLOCK * PIXEL_M / geometry.resolution), BLOCK), 1)

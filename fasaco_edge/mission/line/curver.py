@@ -68,7 +68,7 @@ class _Part:
         whole = floor.geometry
         (row0, col0), (row1, col1) = points.min(axis=0) - margin, points.max(axis=0) + margin
         box = Window(int(row0), int(col0) // WORD * WORD, int(row1) + 1, int(col1) + 1)
-        part = box.intersection(Window(0, 0, whole.rows, whole.cols))
+        part = box.intersection(whole.window)
         assert part is not None
         origin = Pose2D(*whole.to_map(float(part.col0), float(part.row0)), whole.origin.yaw)
         geometry = GridGeometry(part.rows, part.cols, whole.resolution, origin)

@@ -25,6 +25,7 @@ from fasaco_edge.mission.coverage.swept_floor import ANYWHERE, NOWHERE, SweptFlo
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.unswept import causes_of
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.mission.work.order_state import Stage
 from fasaco_edge.mission.work.sequencer import Sequencer
 
 # The robot does not drive to a cell with less unswept floor than this [m2].
@@ -115,7 +116,7 @@ class UnsweptTally:
             return None
         self._explain()
         left_m2 = tally.left_m2
-        possible = self._possible_m2 if self._orders.is_over else None
+        possible = self._possible_m2 if self._orders.order_state.stage is Stage.OVER else None
         ahead_m2, passed_m2 = tally.open_m2 - left_m2, tally.passed_m2
         return FloorToSweep(
             tally.wanted_m2, ahead_m2, left_m2, passed_m2, tally.beyond_m2, possible
@@ -129,7 +130,7 @@ class UnsweptTally:
 
     def sum_up(self) -> str:
         """Return how much floor an order has swept, as the end of a sentence; "" if nearly all."""
-        floor, grid, stamped = self._map.floor, self._map.grid, self._map.pose
+        floor, grid, stamped = self._map.ground.floor, self._map.grid, self._map.pose
         self._possible_m2 = None
         if floor is None or grid is None or stamped is None or self._map.area is None:
             return ""
@@ -164,7 +165,7 @@ class UnsweptTally:
         A polished line may pass a cell without reaching its stand. A cell without floor asked for,
         for instance in another robot's part, seems swept but needs a visit.
         """
-        tally, floor, covered = self._tally, self._map.floor, self._ledger.current
+        tally, floor, covered = self._tally, self._map.ground.floor, self._ledger.current
         assert tally is not None
         assert floor is not None
         cells = dict.fromkeys((row, col) for row, col in passed.tolist())
@@ -183,7 +184,7 @@ class UnsweptTally:
 
     def _keep(self, passed: NDArray[np.int32]) -> None:
         """Keep the passed cells; drop cells once their floor is swept."""
-        tally, floor, kept = self._tally, self._map.floor, self._ledger.passed
+        tally, floor, kept = self._tally, self._map.ground.floor, self._ledger.passed
         assert tally is not None
         assert floor is not None
         for row, col in passed.tolist():
@@ -197,7 +198,7 @@ class UnsweptTally:
 
         To be called at the end of a path, as the robot may have driven beside its line.
         """
-        tally, floor, lattice = self._tally, self._map.floor, self._map.lattice
+        tally, floor, lattice = self._tally, self._map.ground.floor, self._map.ground.lattice
         if tally is None or floor is None or lattice is None or self._map.pose is None:
             return False
         self.update(tally.forget_passed())
@@ -221,24 +222,23 @@ class UnsweptTally:
 
     def _explain(self) -> None:
         """Update the causes of unreachable floor where they may have changed."""
-        tally, floor, part = self._tally, self._map.floor, self._unexplained
+        tally, floor, part = self._tally, self._map.ground.floor, self._unexplained
         assert tally is not None
         assert floor is not None
         if part is None or self._asked is None or self._asked[0] != floor.stands.lattice.window:
             return
         self._unexplained = None
-        whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-        for strip in strips(part.intersection(whole) or NOWHERE):
-            free = self._map.free_floor or floor
+        for strip in strips(part.intersection(floor.geometry.window) or NOWHERE):
+            free = self._map.ground.free_floor or floor
             tally.set_causes(strip, causes_of(floor, free, self._asked[2], strip))
 
     def update(self, touched: Window | None = None) -> None:
         """Update the tally where order or ledger have changed, and in a window of the raster."""
-        tally, floor = self._tally, self._map.floor
+        tally, floor = self._tally, self._map.ground.floor
         assert tally is not None
         assert floor is not None
         swept = self._ledger.floor
-        whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+        whole = floor.geometry.window
         # A reset makes another object, and forgetting may change any pixel.
         known, since = self._swept
         news = swept.changed_since(since) if known is swept else ANYWHERE
@@ -275,7 +275,7 @@ class UnsweptTally:
         asked = self._orders.scope.worth.first(asked, window)
         before, self._asked = self._asked, (window, asked, reachable)
         if before is None:
-            return Window(0, 0, floor.geometry.rows, floor.geometry.cols)
+            return floor.geometry.window
         changed = asked != carried(before[1], before[0], window)
         changed |= reachable != carried(before[2], before[0], window)
         return floor.pixels_of(changed) if changed.any() else None

@@ -20,6 +20,7 @@ from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.events import PathUpdate
 from fasaco_edge.mission.line.curver import Curver
 from fasaco_edge.mission.line.floor_left import UnsweptTally
+from fasaco_edge.mission.line.laying import lay, lay_blocked
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.place_on_line import Offset
 from fasaco_edge.mission.line.polisher import Polisher
@@ -79,7 +80,7 @@ class LineLayer:
 
     def receive_map(self) -> None:
         """Follow the newest map; to be called with each map."""
-        floor = self._map.floor
+        floor = self._map.ground.floor
         if floor is None or (floor is self._seen[0] and floor.revision == self._seen[1]):
             return
         self._seen = floor, floor.revision
@@ -88,8 +89,7 @@ class LineLayer:
         elif self._ahead.follow_floor(floor):
             self._is_dropped = True
         if self.left.follow(floor, self._ahead.tally):
-            whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-            self._touched = self._unchecked = whole
+            self._touched = self._unchecked = floor.geometry.window
             return
         assert floor.shift is not None
         touched, self._unchecked = (
@@ -121,8 +121,13 @@ class LineLayer:
     def finish(self, update: PathUpdate | None, now: float) -> PathUpdate | None:
         """Return the update to publish after a step, with or without a new path."""
         ahead, stamped = self._ahead, self._map.pose
-        if ahead is None or stamped is None or self._polisher is None or self._map.floor is None:
-            self._publication.reset()
+        if (
+            ahead is None
+            or stamped is None
+            or self._polisher is None
+            or self._map.ground.floor is None
+        ):
+            self._publication.line.reset()
             return update
         touched, self._touched = self._touched, None
         self._unchecked = Window.around(self._unchecked, touched)
@@ -146,7 +151,7 @@ class LineLayer:
         self._is_dropped = False
         is_driven = len(self._route.path.cells) > 0
         if is_driven and self._unchecked is not None:
-            reason = "line blocked" if ahead.check(self._unchecked) else ""
+            reason = "line blocked" if lay_blocked(ahead, self._unchecked) else ""
             self._unchecked = self._unchecked if ahead.is_cut else None
         if touched is not None:
             self._is_settled = not self._orders.cells.is_exploring
@@ -155,15 +160,17 @@ class LineLayer:
         held = self._publication.compare(ahead)
         may_change = (update is None or update.may_wait) and not reason and not is_further
         is_new = update is not None or touched is not None
-        may_change = may_change and not (is_new and (ahead.is_cut or not self._publication.is_near))
+        may_change = may_change and not (
+            is_new and (ahead.is_cut or not self._publication.line.is_near)
+        )
         # A way is not polished, as the robot sweeps nothing beside it.
         if may_change and is_driven and not self._is_way:
             held = max(held, ahead.line.first_below(CURVED)) if self._curver else held
-            self._polisher.polish(ahead, self._map.floor, held, is_settled=self._is_settled)
+            self._polisher.polish(ahead, self._map.ground.floor, held, is_settled=self._is_settled)
             self._publication.compare(ahead)
         if self._curver is None:
             return self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
-        reason = self._curve(self._curver, ahead, self._map.floor, stamped.pose) or reason
+        reason = self._curve(self._curver, ahead, self._map.ground.floor, stamped.pose) or reason
         update = self._publication.finish(ahead, update, reason, now, is_way=self._is_way)
         if update is None or update.xy is None:
             return update
@@ -188,12 +195,12 @@ class LineLayer:
     def _lay(self, ahead: LineAhead, cells: NDArray[np.int32], pose: Pose2D) -> None:
         """Lay the line along cells; a way leads straight to the goal, clear of other robots."""
         beside, is_cut = self._route.beside, self._route.is_cut
-        ahead.lay(cells, pose, is_cut=is_cut, keeps=not self._is_way, beside=beside)
+        lay(ahead, cells, pose, is_cut=is_cut, keeps=not self._is_way, beside=beside)
 
     def unswept(self) -> tuple[GridGeometry, NDArray[np.uint8]] | None:
         """Return the raster, and why its pixels are not swept, uint8 (rows, cols) of ``Unswept``;
         None without a floor."""
-        floor = self._map.floor
+        floor = self._map.ground.floor
         if floor is None or self._ahead is None or self.left.areas is None:
             return None
         return floor.geometry, self._ahead.tally.unswept()
@@ -206,7 +213,7 @@ class LineLayer:
         None without a floor. ``most``: limit on the number of squares; where pixels are more,
         squares are wider, and count as the pixel in their middle.
         """
-        floor = self._map.floor
+        floor = self._map.ground.floor
         if floor is None or self._ahead is None or self.left.areas is None:
             return None
         whole = floor.geometry
@@ -220,7 +227,7 @@ class LineLayer:
 
     def ahead(self) -> AheadFigures | None:
         """Return figures of the line ahead; None without a line."""
-        to_sweep, floor = self.left.areas, self._map.floor
+        to_sweep, floor = self.left.areas, self._map.ground.floor
         if self._ahead is None or self._config is None or to_sweep is None or floor is None:
             return None
         seconds = self._config.seconds(self._ahead.from_place(), self._ahead.tally.unit_m)

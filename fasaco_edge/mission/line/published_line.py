@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from fasaco_edge.mission.events import PathUpdate
 from fasaco_edge.mission.line.line_ahead import LineAhead
 from fasaco_edge.mission.line.polyline import POLISHED, Points
+from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 
 # A change nearer than NEAR_M [m], or NEAR_S [s] of driving, is published at once, as the robot
@@ -136,6 +137,9 @@ STANDING_M, STANDING_S = 0.05, 3.0
 class Publication:
     """Keeps back paths that may wait.
 
+    Attributes:
+        line: the line as last published.
+
     Args:
         route: numbers the paths.
         speed_m_s: speed of the robot.
@@ -143,26 +147,16 @@ class Publication:
 
     def __init__(self, route: Route, speed_m_s: float) -> None:
         self._route = route
-        self._line = PublishedLine(speed_m_s)
+        self.line = PublishedLine(speed_m_s)
         # The newest path that waits; the newest reason for a change of the line alone.
         self._waiting: PathUpdate | None = None
         self._why = ""
-        # Where the robot was last seen to move, x, y [m], and until when [s].
-        self._at, self._moved_at = (math.inf, math.inf), -math.inf
+        self._stay = Stay(STANDING_M)
 
     def compare(self, ahead: LineAhead) -> int:
         """Compare the line with the published one; return how many of its points are held."""
-        self._line.compare(ahead.next_xy(COMPARED_POINTS))
-        return self._line.held
-
-    @property
-    def is_near(self) -> bool:
-        """Whether the robot is near what has changed, as of the last comparison."""
-        return self._line.is_near
-
-    def reset(self) -> None:
-        """Forget the line: the robot has none, or another one."""
-        self._line.reset()
+        self.line.compare(ahead.next_xy(COMPARED_POINTS))
+        return self.line.held
 
     def finish(
         self, ahead: LineAhead, update: PathUpdate | None, reason: str, now: float, *, is_way: bool
@@ -177,7 +171,7 @@ class Publication:
             is_way: whether the path is only a way: then nothing waits.
         """
         route, waiting = self._route, self._waiting
-        stands = self._stands(ahead, now)
+        stands = not self._stay.moves(ahead.here, now) and now - self._stay.since > STANDING_S
         if update is None and not len(route.path.cells):
             self._waiting = None
             return None
@@ -186,7 +180,7 @@ class Publication:
                 route.keep_back()
                 plan = waiting.plan if waiting and update.plan is None else update.plan
                 waiting = self._waiting = replace(update, plan=plan)
-            is_due = self._line.is_due(
+            is_due = self.line.is_due(
                 now, self._is_settled(ahead), lambda xy: route.is_cut and ahead.leads_on(xy)
             )
             is_due = is_due or (stands and waiting is not None)
@@ -198,21 +192,14 @@ class Publication:
                 update = replace(waiting, revision=update.revision, cells=update.cells)
         self._waiting, self._why = None, ""
         if update.xy is not None:
-            self.reset()
+            self.line.reset()
             return update  # a way out, along no cells
         if not len(update.cells):
-            self.reset()
+            self.line.reset()
             return replace(update, xy=NONE)
         polished = ahead.line.first_below(POLISHED)
-        self._line.record_published(ahead.next_xy(len(ahead.line) + 1), polished)
+        self.line.record_published(ahead.next_xy(len(ahead.line) + 1), polished)
         return replace(update, xy=ahead.xy())
-
-    def _stands(self, ahead: LineAhead, now: float) -> bool:
-        """Note the robot's place; return whether it stands."""
-        here = ahead.here
-        if math.dist(here, self._at) > STANDING_M:
-            self._at, self._moved_at = here, now
-        return now - self._moved_at > STANDING_S
 
     def _is_settled(self, ahead: LineAhead) -> bool:
         """Whether neither a plan nor polish is under way that changes the next metres."""

@@ -134,8 +134,8 @@ def corners_between(floor: FloorMap, a: Points, b: Points) -> Points:
     if np.isnan([a, b]).any() or np.abs(b - a).max() > margin:
         return none
     low, high = np.floor(np.minimum(a, b)) - margin, np.ceil(np.maximum(a, b)) + margin + 1.0
-    whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-    part = Window(int(low[0]), int(low[1]), int(high[0]), int(high[1])).intersection(whole)
+    around = Window(*low.astype(int).tolist(), *high.astype(int).tolist())
+    part = around.intersection(floor.geometry.window)
     if part is None:
         return none
     places = unpacked(floor.places[part.row0 : part.row1], floor.geometry.cols)
@@ -239,8 +239,7 @@ def lead_out(floor: FloorMap, here: Points) -> Points:
     if not LEAST_SHARE * most <= radius < most:
         return none
     low, high = np.floor(here - 2 * most).astype(int), np.ceil(here + 2 * most).astype(int) + 1
-    whole = Window(0, 0, floor.geometry.rows, floor.geometry.cols)
-    part = Window(*low.tolist(), *high.tolist()).intersection(whole)
+    part = Window(*low.tolist(), *high.tolist()).intersection(floor.geometry.window)
     if part is None:
         return none
     places = unpacked(floor.places[part.row0 : part.row1], floor.geometry.cols)

@@ -47,6 +47,7 @@ class ConfiguredPlaces:
 
     Attributes:
         note: which map they belong to; kept with the order.
+        mask_frame: frame of the map that the keep-out mask belongs to; "" for any.
     """
 
     def __init__(self, policy: MissionPolicy, given: MissionPolicy) -> None:
@@ -63,8 +64,8 @@ class ConfiguredPlaces:
         ]
         # A mask received as a message has its own frame, and may be replaced by another.
         mask = given.keep_out_mask
-        self._mask_frame = mask_frame(mask)
-        self._mask = f"{zlib.crc32(mask.encode()):08x}" if self._mask_frame else ""
+        self.mask_frame = mask_frame(mask)
+        self._mask = f"{zlib.crc32(mask.encode()):08x}" if self.mask_frame else ""
         self._names += ["keep_out_mask"] if mask and not self._mask else []
         values = {name: getattr(given, name) for name in self._names}
         of = msgspec.json.encode((values, given.map_frame))
@@ -89,7 +90,7 @@ class ConfiguredPlaces:
         """
         if self.note.of == self._of and self.note.frame == frame:
             self.note = replace(self.note, is_left=True)
-        if self._mask_frame == frame:
+        if self.mask_frame == frame:
             self.note = replace(self.note, left_mask=self._mask)
 
     def restore(self, note: PlacesNote) -> None:

@@ -1,4 +1,4 @@
-"""Map state: the newest map, its lattice, the robot's cell, and the reachable area."""
+"""Map state: the newest map, the robot's cell on it, and the reachable area."""
 
 from __future__ import annotations
 
@@ -44,10 +44,11 @@ from fasaco_edge.mission.orders.order import MissionOrder
 IN_DOCK_M = 0.5
 
 
-class MapState(MissionGround):
-    """Takes in maps and poses; lattice and floor show the newest map.
+class MapState:
+    """Takes in maps and poses.
 
     Attributes:
+        ground: lattice and floor of the newest map.
         grid: the newest map, with all updates and obstacles; None before there is one.
         given: the same map as received, without obstacles.
         obstacles: obstacles that the map does not show.
@@ -66,7 +67,7 @@ class MapState(MissionGround):
     """
 
     def __init__(self, config: MissionConfig) -> None:
-        super().__init__(config)
+        self._config, self.ground = config, MissionGround(config)
         self.grid: OccupancyGrid | None = None
         self.given: OccupancyGrid | None = None
         self.obstacles = Obstacles(config.footprint.robot_radius_m)
@@ -173,18 +174,18 @@ class MapState(MissionGround):
         return replace(lattice, states=states)
 
     def _apply_map(self, given: OccupancyGrid, within: Window | None = None) -> None:
-        grid, lattice, before = self.obstacles.on(given), self.lattice, self.given
+        grid, lattice, before = self.obstacles.on(given), self.ground.lattice, self.given
         if self.grid is None or self.grid.frame != grid.frame:
-            change = self.begin_lattice(grid)
+            change = self.ground.begin_lattice(grid)
             if self.grid is not None:
                 self.building.reset()
             self.area = self._shown = None
         else:
-            change = self.follow_map((self.grid, grid), within)
+            change = self.ground.follow_map((self.grid, grid), within)
         self._compare(change)
         self.shift = None
-        is_other = lattice is not None and self.lattice is not lattice and self.shows_floor
-        if before is not None and is_other and closes_cells(self.change):
+        is_other = lattice is not None and self.ground.lattice is not lattice and self.shows_floor
+        if before is not None and is_other and closes_cells(self.ground.change):
             self.shift = small_shift(before, given, self._config.footprint)
         self.grid, self.given = grid, given
         self.map_revision += 1
@@ -193,8 +194,8 @@ class MapState(MissionGround):
 
     def _compare(self, change: LatticeChange) -> None:
         """Find whether the newest map shows floor, and moved since the last map with floor."""
-        assert self.free is not None
-        self.has_moved, self.shows_floor = False, shows_floor(self.free)
+        assert self.ground.free is not None
+        self.has_moved, self.shows_floor = False, shows_floor(self.ground.free)
         if not self.shows_floor:
             return
         if self._shown is not None and self._shown is not change.before:
@@ -224,13 +225,13 @@ class MapState(MissionGround):
     def update_area(self) -> None:
         """Compute the area reachable from the robot's cell."""
         cell, before, self.area = self.robot_cell(), self.area, None
-        if cell is None or self.lattice is None:
+        if cell is None or self.ground.lattice is None:
             return
-        change = self.change
-        if before is not None and before.lattice is self.lattice and before.contains(cell):
+        change = self.ground.change
+        if before is not None and before.lattice is self.ground.lattice and before.contains(cell):
             self.area = before  # most poses change nothing: steps can be driven both ways
-        elif before is None or change is None or change.after is not self.lattice:
-            self.area = ReachableArea.around(self.lattice, cell)
+        elif before is None or change is None or change.after is not self.ground.lattice:
+            self.area = ReachableArea.around(self.ground.lattice, cell)
         else:
             self.area = before.updated(change, cell)
 
@@ -240,7 +241,7 @@ class MapState(MissionGround):
 
     def robot_cell(self) -> Cell | None:
         """Return the coverable cell at the robot; for a robot in its dock, in front of the dock."""
-        lattice, cell = self.lattice, self.path_cell
+        lattice, cell = self.ground.lattice, self.path_cell
         if lattice is None or self.pose is None:
             return None
         # A polished line may not pass through the cells of its walk.
@@ -259,9 +260,9 @@ class MapState(MissionGround):
 
         On a polished line, which takes short cuts, ``robot_cell`` may be metres from the robot.
         """
-        if self.lattice is None or self.pose is None:
+        if self.ground.lattice is None or self.pose is None:
             return None
-        own = anchor_cell(self.lattice, self.pose.pose)
+        own = anchor_cell(self.ground.lattice, self.pose.pose)
         is_reachable = own is not None and self.area is not None and self.area.contains(own)
         return own if is_reachable else self.robot_cell()
 
@@ -286,27 +287,29 @@ class MapState(MissionGround):
     @property
     def is_kept_out(self) -> bool:
         """Whether a keep-out zone alone makes the robot's cell unusable."""
-        if self.lattice is None or self.free is None or self.pose is None:
+        if self.ground.lattice is None or self.ground.free is None or self.pose is None:
             return False
-        cell = self.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
-        if not self.lattice.contains(cell):
+        cell = self.ground.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
+        if not self.ground.lattice.contains(cell):
             return False
-        place = self.lattice.local(cell)
-        return bool(self.free.states[place] == COVERABLE != self.lattice.states[place])
+        place = self.ground.lattice.local(cell)
+        return bool(
+            self.ground.free.states[place] == COVERABLE != self.ground.lattice.states[place]
+        )
 
     def why_misplaced(self) -> str:
         """Return why the robot's position is unusable, and which input it waits for."""
-        assert self.free is not None
-        assert self.lattice is not None
+        assert self.ground.free is not None
+        assert self.ground.lattice is not None
         assert self.pose is not None
-        cell = self.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
+        cell = self.ground.lattice.cell_at(self.pose.pose.x, self.pose.pose.y)
         waits = "waits for a map or a pose that puts it on free ground"
-        if not self.lattice.contains(cell):
+        if not self.ground.lattice.contains(cell):
             return f"robot is outside of the map: {waits}"
-        place = self.lattice.local(cell)
+        place = self.ground.lattice.local(cell)
         if self.is_kept_out:
             return "robot is in a keep-out zone: waits to be driven out of it, or for another order"
-        if self.free.states[place] == UNKNOWN:
+        if self.ground.free.states[place] == UNKNOWN:
             return f"robot is on unknown ground: {waits}"
         return f"robot is in an occupied cell, or too close to one: {waits}"
 
@@ -337,11 +340,11 @@ class MapState(MissionGround):
 
         ``known``: bool (rows, cols), the cells that are reachable or were before.
         """
-        if self.lattice is None or self.grid is None:
+        if self.ground.lattice is None or self.grid is None:
             return None
         reachable = self.area.reachable if self.area else None
-        visits = ledger.visits(self.lattice.window)
+        visits = ledger.visits(self.ground.lattice.window)
         free_m2 = self._free_area.out_of_reach_m2(
-            self.grid, self.map_revision, self.lattice, reachable
+            self.grid, self.map_revision, self.ground.lattice, reachable
         )
-        return Coverage.of(self.lattice, known, visits, free_m2)
+        return Coverage.of(self.ground.lattice, known, visits, free_m2)

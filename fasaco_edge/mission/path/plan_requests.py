@@ -64,13 +64,10 @@ class SpareTime:
         self._vain = min(self._vain + 1, MOST_VAIN) if walk == self._walk else 0
         self._walk, self._last = walk, (seconds, now)
 
-    def rest(self, seconds: float, now: float) -> None:
-        """Make no attempt for ``seconds`` from ``now`` [s]: a plan failed."""
+    def rest(self, now: float, seconds: float = SKIPPED_S) -> None:
+        """Make no attempt for ``seconds`` from ``now`` [s]: there was nothing to improve, or a plan
+        failed."""
         self._resting_until = max(self._resting_until, now + seconds)
-
-    def skip(self, now: float) -> None:
-        """Note that there was nothing to improve at ``now`` [s]."""
-        self._resting_until = now + SKIPPED_S
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,16 +122,10 @@ class Attempt:
         if path.index > self.joint:
             return None
         ahead = better[path.index - self.index :]
-        share = NEW_WALK_SHARE if self.problem.is_full else LEAST_SHARE
-        return ahead if _is_worth_it(self.problem, path.ahead, ahead, share) else None
-
-
-def _is_worth_it(
-    problem: CoverageProblem, before: NDArray[np.int32], after: NDArray[np.int32], share: float
-) -> bool:
-    cost_us = problem.price_us(before)
-    least_us = max(LEAST_STEPS * problem.cost.step_us, share * cost_us)
-    return cost_us - problem.price_us(after) >= least_us
+        problem, share = self.problem, NEW_WALK_SHARE if self.problem.is_full else LEAST_SHARE
+        cost_us = problem.price_us(path.ahead)
+        least_us = max(LEAST_STEPS * problem.cost.step_us, share * cost_us)
+        return ahead if cost_us - problem.price_us(ahead) >= least_us else None
 
 
 class PlanRequests:

@@ -11,22 +11,12 @@ from numpy.typing import NDArray
 from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import Cell
 from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.coverage.loop_closure import Motion, moved_cells
-from fasaco_edge.mission.events import (
-    BETTER,
-    PathUpdate,
-    PlanBroken,
-    PlanReady,
-    PlanRequest,
-)
+from fasaco_edge.mission.events import BETTER, PathUpdate, PlanBroken, PlanReady, PlanRequest
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.path.path_progress import PathProgress
-from fasaco_edge.mission.path.plan_requests import (
-    BROKEN_S,
-    Attempt,
-    PlanRequests,
-    SpareTime,
-)
+from fasaco_edge.mission.path.plan_requests import BROKEN_S, Attempt, PlanRequests, SpareTime
 from fasaco_edge.mission.work.sequencer import Sequencer
 
 NO_CELLS: NDArray[np.int32] = np.empty((0, 2), np.int32)
@@ -50,7 +40,9 @@ class Route:
             such limit.
     """
 
-    def __init__(self, spare_share: float, map_state: MapState, orders: Sequencer) -> None:
+    def __init__(
+        self, spare_share: float, map_state: MapState, orders: Sequencer, company: Company
+    ) -> None:
         self.requests = PlanRequests()
         self.path = PathProgress(NO_CELLS)
         # The part of a path kept for later: beyond a block, or the whole rest after a stop.
@@ -66,8 +58,7 @@ class Route:
         self.published_at = self.begun_at = 0.0
         self.is_way_out = False
         self.beside: NDArray[np.float64] | None = None
-        self._map = map_state
-        self._orders = orders
+        self._map, self._orders, self._company = map_state, orders, company
         self._spare = SpareTime(spare_share)
         self._checked_on: ReachableArea | None = None
 
@@ -157,8 +148,8 @@ class Route:
         """
         self.requests.discard_pending()
         self.requests.want("map and pose moved")
-        assert self._map.lattice is not None
-        cells = moved_cells(before, motion, self._map.lattice.cell_m)
+        assert self._map.ground.lattice is not None
+        cells = moved_cells(before, motion, self._map.ground.lattice.cell_m)
         cell, area, was_driving = self._map.robot_cell(), self._map.area, len(self.path.cells) > 0
         drivable = 0
         if cell is not None and area is not None and was_driving:
@@ -180,7 +171,7 @@ class Route:
         is_full = number % 2 == 1 and self._searched != self._walks
         attempt = Attempt.at(self.path, self._numberings, self._orders, number, is_full=is_full)
         if attempt is None:
-            self._spare.skip(now)
+            self._spare.rest(now)
             return None
         if is_full:
             self._searched = self._walks
@@ -188,7 +179,7 @@ class Route:
 
     def fail(self, event: PlanBroken, now: float) -> None:
         """Note that the pending plan failed: the same problem would fail again."""
-        self._spare.rest(BROKEN_S, now)
+        self._spare.rest(now, BROKEN_S)
         self.outdated += self.requests.close_failed(event, now)
 
     def accept(self, event: PlanReady, now: float) -> PathUpdate | None:
@@ -241,7 +232,7 @@ class Route:
         """
         first = self._first_open(cells, area.lattice.window)
         to = int(cells[first, 0]), int(cells[first, 1])
-        lead = self._orders.scope.passable(area, here).shortest_path(here, to)
+        lead = self._company.passable(area, here).shortest_path(here, to)
         return np.concatenate((lead[:-1], cells[first:])) if len(lead) else lead
 
     def _first_open(self, cells: NDArray[np.int32], window: Window) -> int:

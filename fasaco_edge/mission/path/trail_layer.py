@@ -85,10 +85,10 @@ class TrailLayer:
             self.trail.strengthen(cells, cost.quality(_distinct(cells), cost.of_walk_us(cells)))
 
     def _follow_map(self) -> None:
-        lattice, before = self._map.lattice, self._lattice
+        lattice, before = self._map.ground.lattice, self._lattice
         if lattice is None or lattice is before:
             return
-        change = self._map.change
+        change = self._map.ground.change
         is_next = change is not None and change.before is before and change.after is lattice
         changed = change.cells if change is not None and is_next and before is not None else None
         self.trail.follow(lattice.window, lattice.steps, changed)

@@ -50,6 +50,8 @@ LEAST_SHOWN_M2, LEAST_SHARE = 0.5, 0.2
 # A region with this share of a room's size shows the whole room: squares of the room outside the
 # region are then no floor.
 WHOLE = 0.8
+# A part of a named or set room stays with it if this share of the part has long been the room's.
+FIRM = 0.8
 
 
 def slots_of(ids: Ids, numbers: Iterable[int]) -> Ids:
@@ -214,7 +216,7 @@ class Matching:
         is_kept = parent > 0 and self._room(parent).is_kept
         # A kept room loses no part that it has had for long. But it may have got its name when it
         # and another room were half seen, as one region.
-        least = half if parent and self._room(parent).is_by_hand else WHOLE * self._areas[label]
+        least = half if parent and self._room(parent).is_by_hand else FIRM * self._areas[label]
         is_firm = parent > 0 and bool(self._firm[label, parent] >= least)
         if parent and (is_firm or not is_kept):
             self._becomes[label, 0] = self._rooms[parent]

@@ -61,7 +61,7 @@ class CellsLeft:
     def is_exploring(self) -> bool:
         """Whether a reachable cell is undecided: the map does not show if the robot fits there."""
         area = self._map.area
-        decided = None if area is None else self._map.is_decided(area.lattice.window)
+        decided = None if area is None else self._map.ground.is_decided(area.lattice.window)
         if area is None or decided is None:
             return False
         return bool((area.reachable & ~decided).any())
@@ -134,7 +134,7 @@ class CellsLeft:
         """Return the cells of an area in which this robot has to sweep floor, covered or not."""
         window = area.lattice.window
         asked = self.asked_for(window)
-        mine = self._company.mine_to_sweep(asked, self.unswept(window), area)
+        mine = self._company.mine(asked, area, self.unswept(window))
         if self.keeps_passed:
             mine = mine | (self._ledger.passed.inside(window) & asked)
         return mine

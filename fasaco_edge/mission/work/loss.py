@@ -25,7 +25,7 @@ def check_loss(command: str, zones: tuple[Zone, ...], ledger: MissionLedger, on:
     """
     if not zones:
         return
-    lattice, own = on.lattice, ledger.current.snapshot()
+    lattice, own = on.ground.lattice, ledger.current.snapshot()
     cells, share = max(own.cells - len(own.under_tool), 0), ""
     if lattice is not None:
         window = lattice.window

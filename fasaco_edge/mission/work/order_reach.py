@@ -57,7 +57,7 @@ class OrderReach:
         """Remember the cells that are reachable now."""
         area = self._map.area
         if area is not None and area is not self._newest:
-            decided = self._map.is_decided(area.lattice.window)
+            decided = self._map.ground.is_decided(area.lattice.window)
             reachable = area.reachable if decided is None else area.reachable & decided
             window = self.around(area.lattice.window)
             once = self.on(window)
@@ -87,7 +87,7 @@ class OrderReach:
         ``before``: the cells before it moved.
         """
         if before is not None and not motion.is_still:
-            lattice = self._map.lattice
+            lattice = self._map.ground.lattice
             assert lattice is not None
             self.reached = moved_mask(*before, motion, lattice.cell_m)
             self._newest, self._have_moved, self._cut_off = None, True, None
@@ -95,8 +95,8 @@ class OrderReach:
 
     def shift(self, motion: Motion) -> None:
         """Move the cells with the newest map, whose area is not known yet."""
-        if self.reached is not None and self._map.lattice is not None:
-            self.reached = moved_mask(*self.reached, motion, self._map.lattice.cell_m)
+        if self.reached is not None and self._map.ground.lattice is not None:
+            self.reached = moved_mask(*self.reached, motion, self._map.ground.lattice.cell_m)
             self._have_moved, self._cut_off = True, None
 
     def around(self, window: Window) -> Window:
@@ -113,8 +113,8 @@ class OrderReach:
         known, area = self.on(lattice.window), self._map.area
         if area is not None and area.lattice is lattice:
             known |= area.reachable
-        if self._map.free is not None:
-            known &= ~(self._map.free.coverable & ~lattice.coverable)
+        if self._map.ground.free is not None:
+            known &= ~(self._map.ground.free.coverable & ~lattice.coverable)
         return known
 
     def lost(self, area: ReachableArea) -> NDArray[np.bool_]:
@@ -131,7 +131,7 @@ class OrderReach:
 
     def without_keep_outs(self, area: ReachableArea) -> NDArray[np.bool_]:
         """Return which cells would be reachable without keep-outs, bool (rows, cols) of an area."""
-        free, reachable, window = self._map.free, area.reachable, area.lattice.window
+        free, reachable, window = self._map.ground.free, area.reachable, area.lattice.window
         if free is None or free is area.lattice or not reachable.any():
             return reachable
         row, col = divmod(int(np.argmax(reachable)), reachable.shape[1])
@@ -140,7 +140,7 @@ class OrderReach:
     @property
     def is_map_cut(self) -> bool:
         """Whether the newest map lacks cells that were reachable."""
-        lattice = self._map.lattice
+        lattice = self._map.ground.lattice
         if lattice is None or self.reached is None:
             return False
         window, once = self.reached

@@ -13,7 +13,7 @@ from fasaco_edge.mission.company import Company
 from fasaco_edge.mission.config import MissionConfig
 from fasaco_edge.mission.coverage.mission_ledger import MissionLedger
 from fasaco_edge.mission.map.map_state import MapState
-from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.work.cells_left import CellsLeft
 from fasaco_edge.mission.work.exploration import Exploration
 from fasaco_edge.mission.work.order_reach import OrderReach
@@ -46,7 +46,7 @@ class PresentPart:
         map_state: MapState,
         ledger: MissionLedger,
         company: Company,
-        room_price: RoomPrice,
+        room_cells: RoomCells,
         order: PresentOrder,
     ) -> None:
         self._config, self._map, self._ledger, self._company = config, map_state, ledger, company
@@ -60,7 +60,7 @@ class PresentPart:
         self._has_new_lanes = False
         self.cells = CellsLeft(config, map_state, ledger, company, order)
         self.scope = PlanScope(
-            config, map_state, self.cells, company, room_price, lambda: order.state
+            config, map_state, self.cells, company, room_cells, lambda: order.state
         )
 
     def begin_order(self) -> None:
@@ -105,17 +105,7 @@ class PresentPart:
     def problem(
         self, cell: Cell, before: NDArray[np.int32], home: Cell | None, *, attempt: int = 0
     ) -> CoverageProblem:
-        """Return the planning problem of the cells that are open now.
-
-        Args:
-            cell: the robot's cell.
-            before: int32 (n, 2), the current path from that cell on.
-            home: the cell (row, col) in which the order ends; None for none.
-            attempt: see ``CoverageProblem``.
-
-        Raises:
-            NothingToCover: no cell is open.
-        """
+        """Return the planning problem of the cells that are open now, see ``PlanScope.problem``."""
         area = self._map.area
         assert area is not None
         self._order.exploration.end_if_reached(self._order.state.current_zone, area)
@@ -128,7 +118,7 @@ class PresentPart:
         """Look for a path to an unreachable zone or part; return why a plan is wanted, or ""."""
         exploration, zone = self._order.exploration, self._order.state.current_zone
         area = self._map.area
-        free = None if area is None else self.scope.passable(area, cell)
+        free = None if area is None else self._company.passable(area, cell)
         if reason := exploration.seek(zone, area, free, cell):
             return reason
         of_others = self._company.viewpoints(self.cells.open_cells, cell)

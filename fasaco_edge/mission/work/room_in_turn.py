@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fasaco_edge.grid.lattice import Cell, CoverageLattice
 from fasaco_edge.grid.reachable_area import ReachableArea
+from fasaco_edge.kernels.lattice.reach import ways_from
 from fasaco_edge.mission.rooms.room_cells import RoomCells
 
 NONE = -1
@@ -78,8 +79,11 @@ class RoomInTurn:
             if here in left and (is_over or here > self._newest):
                 self._room = here
             elif is_over:
-                ways = {room: _way(cells & (rooms == room), area, cell) for room in left}
-                self._room = min(sorted(left), key=ways.__getitem__)
+                row, col = area.lattice.local(cell)
+                ways = ways_from(area.lattice.steps, row * rooms.shape[1] + col)
+                steps = ways.reshape(rooms.shape)
+                away = {room: steps[_nearest(cells & (rooms == room), (row, col))] for room in left}
+                self._room = min(sorted(left), key=away.__getitem__)
             self._newest = max(self._newest, int(rooms.max()))
         self._seen = rooms
         return self._room not in (before, NONE)
@@ -88,9 +92,8 @@ class RoomInTurn:
         return self._cells.on(lattice) if self._applies() else None
 
 
-def _way(cells: NDArray[np.bool_], area: ReachableArea, cell: Cell) -> int:
-    """Return the steps from ``cell`` to the cell that is nearest in rows and columns together."""
-    window = area.lattice.window
-    found = np.argwhere(cells) + np.array((window.row0, window.col0))
-    row, col = found[np.abs(found - cell).sum(axis=1).argmin()].tolist()
-    return len(area.shortest_path(cell, (row, col)))
+def _nearest(cells: NDArray[np.bool_], to: Cell) -> Cell:
+    """Return the marked cell that is nearest in rows and columns together; array indices."""
+    found = np.argwhere(cells)
+    row, col = found[np.abs(found - to).sum(axis=1).argmin()].tolist()
+    return row, col

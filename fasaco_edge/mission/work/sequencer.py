@@ -19,7 +19,7 @@ from fasaco_edge.mission.map.placing import left_out
 from fasaco_edge.mission.orders.order import Errand, Zone
 from fasaco_edge.mission.orders.zones import in_zones
 from fasaco_edge.mission.rooms.room_book import MOST_LISTED
-from fasaco_edge.mission.work.by_room import RoomPrice
+from fasaco_edge.mission.rooms.room_cells import RoomCells
 from fasaco_edge.mission.work.cells_left import LeftBehind, zones_beyond
 from fasaco_edge.mission.work.order_reach import CellsOn
 from fasaco_edge.mission.work.order_state import AT_HOME, OrderState, Stage
@@ -48,11 +48,11 @@ class Sequencer:
         map_state: MapState,
         ledger: MissionLedger,
         company: Company,
-        room_price: RoomPrice,
+        room_cells: RoomCells,
     ) -> None:
         self._config, self._map, self._ledger = config, map_state, ledger
         self._order = order = PresentOrder()
-        self.part = part = PresentPart(config, map_state, ledger, company, room_price, order)
+        self.part = part = PresentPart(config, map_state, ledger, company, room_cells, order)
         self.cells, self.scope = part.cells, part.scope
         self.reach, self.uncovered = part.reach, part.uncovered
         # Whether floor opens while the robot is on its way home.
@@ -81,7 +81,7 @@ class Sequencer:
 
     def goal(self, errand: Errand = "home") -> Cell | None:
         """Return the destination cell (row, col) of an errand; None for none."""
-        places, lattice = self._map.places, self._map.lattice
+        places, lattice = self._map.places, self._map.ground.lattice
         place = places.place(errand)
         if place is None or lattice is None:
             is_elsewhere = errand == "charge" and places.why_no_dock
@@ -93,11 +93,6 @@ class Sequencer:
     def is_waiting(self) -> bool:
         """Whether the robot waits for a retry."""
         return self._retry_at is not None
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the order is over."""
-        return self._order.state.stage is Stage.OVER
 
     def begin_order(self, state: OrderState) -> None:
         """Begin with another order, or with none."""
@@ -260,7 +255,7 @@ class Sequencer:
         state = self._order.state = replace(self._order.state, stage=Stage.OVER)
         late = f"{state.late}: " if state.late else ""
         self.ending = late + self.uncovered.outcome() + self._sum_up()
-        area, free = self._map.area, self._map.free
+        area, free = self._map.area, self._map.ground.free
         if order is not None and area is not None and free is not None:
             self.ending += zones_beyond(order, area, free, self._ledger.visits(free.window))
         if order is not None and (rooms := left_out(order.zones)):

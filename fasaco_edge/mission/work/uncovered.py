@@ -145,7 +145,7 @@ class UncoveredCells:
 
     def outcome(self) -> str:
         """Return as text how much of the order is covered, and why the rest is not."""
-        order, area, lattice = self._order.state.order, self._map.area, self._map.lattice
+        order, area, lattice = self._order.state.order, self._map.area, self._map.ground.lattice
         if order is None or lattice is None:
             return "the order was carried out"
         zones = "" if order.zones[0].polygon is None else " of the zones"
@@ -175,7 +175,7 @@ class UncoveredCells:
 
     def is_any_left(self) -> bool:
         """Return whether any ordered cell is left that was ever reachable."""
-        lattice, state = self._map.lattice, self._order.state
+        lattice, state = self._map.ground.lattice, self._order.state
         if state.order is None or state.next_pass() is not state:
             return True
         assert lattice is not None
@@ -227,7 +227,7 @@ class UncoveredCells:
 
     def _causes(self, order: MissionOrder, area: ReachableArea) -> NDArray[np.uint8]:
         """Return the cause of each uncovered cell, uint8 (rows, cols); later causes override."""
-        lattice, reachable, free = area.lattice, area.reachable, self._map.free
+        lattice, reachable, free = area.lattice, area.reachable, self._map.ground.free
         assert free is not None
         causes, once = np.zeros(lattice.states.shape, np.uint8), self._reach.on(lattice.window)
         causes[once & ~lattice.coverable] = Cause.CLOSED

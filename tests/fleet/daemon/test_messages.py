@@ -175,7 +175,7 @@ class Listener:
 
 def test_a_robot_sends_pace_and_all_tiles_after_it_forgets_cells():
     robot, listener = FleetRobot("r1", (0, 0), ["." * 12] * 4), Listener()
-    ledger, sender = robot.mission.ledger, FleetSender(listener, CONFIG)
+    ledger, sender = robot.mission.covered.current, FleetSender(listener, CONFIG)
     for row in range(TILES):
         ledger.visit((64 * row, 0))
     robot.mission.company.step_s = 7.5

@@ -76,7 +76,7 @@ def test_the_part_of_a_lost_robot_is_taken_over(at):
     del fleet.robots["r2"]
     survivor = fleet.robots["r1"].mission
     fleet.run(int(GONE_S) + 3)
-    assert not survivor.company.has_company
+    assert not survivor.company.parts
     fleet.finish()
     assert fleet.left_out() == set()
 
@@ -86,10 +86,10 @@ def test_a_standing_robot_loses_its_part_until_it_moves():
     fleet.run(20)
     fleet.robots["r2"].hangs = True
     fleet.run(12)
-    assert not fleet.robots["r1"].mission.company.has_company
+    assert not fleet.robots["r1"].mission.company.parts
     fleet.robots["r2"].hangs = False
     fleet.run(4)
-    assert fleet.robots["r1"].mission.company.has_company
+    assert fleet.robots["r1"].mission.company.parts
     fleet.finish()
     assert fleet.left_out() == set()
 
@@ -170,7 +170,7 @@ def test_a_robot_that_does_not_fit_is_named_and_left_out(changes, why):
     ours.tell(replace(report, **changes))
     ours.tick()
     assert ours.mission.company.others.known["r2"].absence(ours.now).startswith(why)
-    assert not ours.mission.company.has_company
+    assert not ours.mission.company.parts
     assert ours.mission.covered.shared.cells_of("r2") == 0
 
 
@@ -217,7 +217,7 @@ def test_an_unsweepable_cell_is_given_up_while_another_works():
         ours.tell(replace(report, x=0.5 + second % 2))
         ours.tick()
         reasons.append(ours.mission.reason)
-    assert ours.mission.company.has_company
+    assert ours.mission.company.parts
     assert "1 cell not reached: tried again after 30 s (1 of 1)" in reasons
     assert "0.1 m2 not reached: left over after" in reasons[-1]
     assert ours.mission.route.requests.plans < 40

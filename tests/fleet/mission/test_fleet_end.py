@@ -108,7 +108,7 @@ def test_cells_tried_in_vain_stay_the_others_despite_new_maps():
         assert fleet.seconds < 300
     ours.tell(patch("#", at=(0, 23)))
     assert not untried()
-    assert ours.mission.company.has_company
+    assert ours.mission.company.parts
     fleet.run(2)
     ours.tell(patch(".", at=(0, 23)))
     assert not untried()

@@ -164,7 +164,7 @@ def begun():
     robot.tell(replace(divided_by("r2", 0), parts=(), by=""))
     robot.drive(40, is_checked=False)
     passed = robot.mission.covered.passed.next(100)
-    return robot, next(cell for cell in passed if robot.mission.ledger.has_visited(cell))
+    return robot, next(cell for cell in passed if robot.mission.covered.current.has_visited(cell))
 
 
 def test_floor_of_a_passed_cell_stays_with_the_robot_that_passed():

@@ -170,7 +170,7 @@ def test_ground_sent_in_a_frame_since_left_does_not_count():
     assert cells_of(ground.joint(own)) > cells_of(own)
     for _ in range(int(PATIENCE_S) + 2):
         ours.tell(MapReceived(building("....", frame="map2")), pose_at(0, 0, "map2"), after=1.0)
-    assert ours.mission.ledger.frame == "map2"
+    assert ours.mission.covered.current.frame == "map2"
     assert cells_of(ground.joint(own)) == cells_of(own)
 
 

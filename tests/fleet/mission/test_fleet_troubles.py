@@ -67,19 +67,19 @@ def test_a_robot_with_a_changed_frame_is_left_out_until_it_fits(again):
     fleet = FleetDrive(HALL, {"r1": (0, 0), "r2": (9, 15)})
     fleet.run(15)
     ours, other = fleet.robots.values()
-    assert ours.mission.company.has_company
+    assert ours.mission.company.parts
     fleet.hears = lambda speaker, listener: False
     for _ in range(5):
         ours.tell(replace(other.report(), frame="elsewhere"))
         fleet.tick()
     member = ours.mission.company.others.known["r2"]
     assert "its frame is 'elsewhere'" in member.absence(fleet.seconds)
-    assert not ours.mission.company.has_company
+    assert not ours.mission.company.parts
     assert ours.mission.state == "covering"
     if again:
         fleet.hears = lambda speaker, listener: True
         fleet.run(4)
-        assert ours.mission.company.has_company
+        assert ours.mission.company.parts
         fleet.finish()
         assert fleet.left_out() == set()
     else:
