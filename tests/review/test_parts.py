@@ -142,6 +142,7 @@ def test_paths_without_a_plan_do_not_count_as_replans(parts):
     assert told["paths"] == 4
     assert told["first_plan_ms"] == 50.0
     assert told["replans_by_reason"] == {"map: cells more": 1, "path blocked": 1}
+    assert [told["replans"]] == [order["replans"] for order in told["orders"]] == [2]
     assert (told["replan_ms_p50"], told["replan_ms_p99"], told["replan_ms_max"]) == (4.0, 8.0, 8.0)
 
 
