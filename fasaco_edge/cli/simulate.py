@@ -21,6 +21,7 @@ from fasaco_edge.cli.console.terminal import ProgressLines
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, map_sources, read_map
+from fasaco_edge.text import percent
 
 if TYPE_CHECKING:
     from fasaco_edge.simulation.node import Progress
@@ -131,7 +132,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"touched other robots {world.touches} times, stopped {world.meetings} times")
     if world.battery is not None:
         battery = world.battery
-        print(f"charged {battery.charges} times, never below {battery.lowest:.1%}")
+        print(f"charged {battery.charges} times, never below {percent(battery.lowest)}")
     return 0
 
 

@@ -13,6 +13,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map, suggested_start
 from fasaco_edge.grid.occupancy import FREE, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.text import percent
 
 
 def start_cell(lattice: CoverageLattice, map_file: Path, grid: OccupancyGrid | None = None) -> Cell:
@@ -65,7 +66,7 @@ def _nowhere(grid: OccupancyGrid | None) -> NothingToCover:
         )
     unknown = np.count_nonzero(cells == UNKNOWN) / cells.size
     return NothingToCover(
-        f"no pixel of the map is free, {unknown:.0%} are unknown",
+        f"no pixel of the map is free, {percent(unknown, 0)} are unknown",
         hint="check image, negate, mode and free_thresh of the map's YAML file: free pixels are "
         "white" + ("; `plan --unknown-free` takes unknown ones for free" if unknown else ""),
     )

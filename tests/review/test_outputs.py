@@ -291,8 +291,8 @@ def test_each_time_it_charged_is_a_line(parts):
     told = [StatusSample(at_s, Status(battery=BatteryReport(level))) for at_s, level in levels]
     data = replace(review.data, statuses=[*review.data.statuses, *told])
     found = document_of(replace(review, states=(*review.states, *spans), data=data))
-    assert [row[1:] for row in charge_rows(found)] == [("1:00.0", "14% to 90%")]
-    assert "14% to 90%" in dict(screen_rows(review, found))["charges"]
+    assert [row[1:] for row in charge_rows(found)] == [("1:00.0", "14 % to 90 %")]
+    assert "14 % to 90 %" in dict(screen_rows(review, found))["charges"]
 
 
 @pytest.mark.parametrize(

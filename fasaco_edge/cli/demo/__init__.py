@@ -139,7 +139,7 @@ COMMAND = Subcommand(
     "processes that communicate by Zenoh over loopback; show the mission; exit when every "
     "reachable cell is covered. Write a recording (.rrd), a picture and the figures to the output "
     "folder. A terminal of at least 60 x 20 characters shows the mission as in `fasaco-edge "
-    "watch`: f toggles the pheromone trail, q quits.",
+    "watch`: q quits.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -14,7 +14,7 @@ from fasaco_edge.client.phrases import scale_words
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.fleet.review.report import FleetFigures, review_fleet
 from fasaco_edge.recording.read.robot_clock import clock
-from fasaco_edge.text import one_line
+from fasaco_edge.text import one_line, percent
 
 # Options for the recording of one robot only.
 ONE_ROBOT_OPTIONS = ("long", "at", "point", "against", "export")
@@ -71,7 +71,7 @@ def _print(figures: FleetFigures) -> None:
                 (
                     "swept",
                     f"{figures.swept_m2:.1f} m2; after another robot: {figures.again_m2:.1f} m2 "
-                    f"swept again ({figures.again_share:.1%}), {figures.through_m2:.1f} m2 "
+                    f"swept again ({percent(figures.again_share)}), {figures.through_m2:.1f} m2 "
                     "driven through",
                 ),
                 ("waited", f"{figures.waited_s:.0f} s in all"),

@@ -23,6 +23,7 @@ from fasaco_edge.grid.geometry import Window
 from fasaco_edge.grid.lattice import CoverageLattice
 from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.recording.read.robot_clock import clock
+from fasaco_edge.text import percent
 
 # Opacity of the colour of a robot's cells.
 TINT = 0.35
@@ -131,7 +132,7 @@ def draw_fleet_review(review: FleetReview) -> Image.Image:
     lines = [
         f"makespan {clock(figures.makespan_s)}; time at work (least / most): "
         f"{figures.busy_balance:.2f}; waited {figures.waited_s:.0f} s in all",
-        f"{figures.swept_m2:.1f} m2 swept, {figures.again_share:.1%} of it swept again",
+        f"{figures.swept_m2:.1f} m2 swept, {percent(figures.again_share)} of it swept again",
     ]
     if simulated := scale_words(figures.time_scale):
         lines.insert(0, f"{simulated}: times are by the robots' clocks")

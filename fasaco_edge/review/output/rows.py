@@ -280,7 +280,7 @@ def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
             clock(charge.at_s),
             clock(charge.seconds),
             " to ".join(
-                NOT_KNOWN if level is None else f"{level:.0%}"
+                NOT_KNOWN if level is None else percent(level, 0)
                 for level in (charge.level_from, charge.level_to)
             ),
         )
