@@ -52,7 +52,7 @@ def recording(tmp_path):
 @pytest.mark.parametrize(
     ("words", "shown", "first_line"),
     [
-        (PLAN, "steps, [0-9.]+% above the bound ", "map +.*"),
+        (PLAN, "steps, [0-9.]+ % above the bound ", "map +.*"),
         (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "map +.*"),
         (("warmup",), "checking the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (

@@ -81,7 +81,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "(default: %(default)g)",
     )
     parser.add_argument(
-        "--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="width of the tool [m]"
+        "--cell",
+        "--tool-width",
+        type=float,
+        default=DEFAULT_CELL_M,
+        metavar="M",
+        help="width of the tool [m]",
     )
     parser.add_argument(
         "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="radius [m]"
