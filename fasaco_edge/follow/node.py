@@ -119,7 +119,7 @@ class FollowerNode(Node):
         if self._settings.dry_run and now - self._reported_at >= REPORT_EVERY_S:
             self._reported_at, sent = now, command or STAND
             turn = math.degrees(sent.turn_rate)
-            self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {follower.state.value}")
+            self._report(f"{sent.speed:z6.3f} m/s {turn:z7.1f} deg/s  {follower.state.value}")
 
     def _send(self, command: VelocityCommand) -> None:
         """Send a command; send none in a dry run, or while another follower drives."""

@@ -62,7 +62,9 @@ def _nowhere(grid: OccupancyGrid | None) -> NothingToCover:
     if free:
         return NothingToCover(
             f"no cell of the map is coverable: {100 * free:.2g} % of its pixels are free, but "
-            "the robot fits nowhere"
+            "the robot fits nowhere",
+            hint="check cell size and robot radius against the map, and resolution and negate of "
+            "its YAML file",
         )
     unknown = np.count_nonzero(cells == UNKNOWN) / cells.size
     return NothingToCover(
