@@ -63,7 +63,8 @@ clean:  ## remove the environment and all that tools left behind
 
 # Kept apart from the targets above, so that a second run starts at once.
 $(STAMP): pyproject.toml
-	$(PYTHON) -I -c 'import sys; sys.exit("fasaco_edge needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.11") if sys.version_info < (3, 11) else 0'
+	@$(PYTHON) -I -c 'import sys; sys.exit("fasaco_edge needs Python 3.11 or newer, this is " + sys.version.split()[0] + "; try make PYTHON=python3.11") if sys.version_info < (3, 11) else 0'
+	@echo "installing what is needed into $(VENV): a minute or two, without more lines"
 	$(PYTHON) -I -m venv $(VENV)
 	$(BIN)/python -I -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
 	touch $(STAMP)

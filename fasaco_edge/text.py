@@ -71,10 +71,10 @@ def is_reported(count: int) -> bool:
     return count & (count - 1) == 0
 
 
-def percent(fraction: float) -> str:
-    """Return a share in percent; 100.0 % only if it is the whole."""
-    shown = min(100.0 * fraction, 99.9) if fraction < 1.0 else 100.0
-    return f"{shown:.1f} %"
+def percent(fraction: float, digits: int = 1) -> str:
+    """Return a share in percent with ``digits`` decimals; 100 % only if it is the whole."""
+    shown = min(100.0 * fraction, 100.0 - 10.0**-digits) if fraction < 1.0 else 100.0 * fraction
+    return f"{shown:.{digits}f} %"
 
 
 def duration(seconds: float) -> str:

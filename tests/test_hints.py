@@ -93,7 +93,7 @@ def test_the_image_of_a_map_may_be_in_a_home_folder(tmp_path, monkeypatch):
     ("pixels", "said", "hint"),
     [
         (np.full((40, 40), BLACK), "no pixel of the map is free", "negate, mode and free_thresh"),
-        (np.full((40, 40), GREY), "100% are unknown", "--unknown-free"),
+        (np.full((40, 40), GREY), "100 % are unknown", "--unknown-free"),
         (np.where(np.arange(40) == 20, WHITE, BLACK)[None].repeat(40, 0), "2.5 % of", "radius"),
     ],
 )

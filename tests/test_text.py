@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import functools
 import json
+import re
 import unicodedata
+from pathlib import Path
 
 import pytest
 
-from fasaco_edge.text import MOST, json_line, lines, one_line, shown
+import fasaco_edge
+from fasaco_edge.text import MOST, json_line, lines, one_line, percent, shown
 
 # What a terminal obeys or nobody sees, by Unicode's own tables. Signs that Arabic, Syriac and
 # Kaithi numbers begin with are of a category with them, and seen.
@@ -77,3 +80,29 @@ def test_json_has_escapes_of_its_own():
     assert line.isascii()
     assert line.isprintable()
     assert json.loads(line) == document
+
+
+@pytest.mark.parametrize(
+    ("share", "digits", "text"),
+    [
+        (0.039, 1, "3.9 %"),
+        (0.9999, 1, "99.9 %"),
+        (1, 1, "100.0 %"),
+        (0.999, 0, "99 %"),
+        (1.5, 0, "150 %"),
+    ],
+)
+def test_only_the_whole_is_shown_as_100_percent(share, digits, text):
+    assert percent(share, digits) == text
+
+
+def test_a_percent_sign_stands_apart():
+    """Python writes {0.039:%} as 3.9%, ``text.percent`` as 3.9 %: so does the package."""
+    package = Path(fasaco_edge.__file__).parent
+    found = [
+        f"{file.relative_to(package)}:{number}"
+        for file in package.rglob("*.py")
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
+        if re.search(r"%\}|\}%[\s\"']", line)
+    ]
+    assert not found

@@ -38,10 +38,10 @@ recording without a turn log is replayed approximately: time is that of the samp
 has a limit on its work. The same files give the same decisions on any machine.
 """
 EPILOG = """\
-Times are the robot's, since the recording began, as in its review. The column `then` shows whether
-the path equals the recorded one, cell by cell; without a turn log paths are not compared. With
---config or --work the replay is approximate, too, as it is another mission. Plans of a user's own
-planner, which earlier releases allowed in missions, cannot be repeated.
+Times are the robot's, since the recording began, as in its review. The column `recorded` shows
+whether the path equals the recorded one, cell by cell; without a turn log paths are not compared.
+With --config or --work the replay is approximate, too, as it is another mission. Plans of a user's
+own planner, which earlier releases allowed in missions, cannot be repeated.
 """
 
 
@@ -195,8 +195,8 @@ def _summary(
 
 def _table(steps: Sequence[ReplayStep]) -> Table:
     table = Table(box=None, pad_edge=False)
-    for name in ("at", "state", "path", "steps", "proposals", "then"):
-        table.add_column(name, justify="left" if name in ("state", "then") else "right")
+    for name in ("at", "state", "path", "steps", "proposals", "recorded"):
+        table.add_column(name, justify="left" if name in ("state", "recorded") else "right")
     table.add_column("why", overflow="fold")
     for step in steps:
         update = step.decision.path
@@ -279,15 +279,15 @@ def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
     """Return the result of a replay by cycles as rows of text."""
     if compared is None:
         return [("replay", "approximate: there is no turn log from the beginning, or it is unused")]
-    turns = f"{compared.turns_equal} of {compared.turns} turns"
+    cycles = f"{compared.turns_equal} of {compared.turns} cycles"
     verdict = "equal bit for bit" if compared.equal else "equal as far as can be compared"
     if compared.difference is not None:
         verdict = "not equal"
-    rows = [("replay", f"{verdict}: {turns}")]
+    rows = [("replay", f"{verdict}: {cycles}")]
     if compared.difference is not None:
         rows.append(("first difference", _words(compared.difference)))
     if compared.log_ends:
-        rows.append(("compared up to", f"turn {compared.turns}: {compared.log_ends}"))
+        rows.append(("compared up to", f"cycle {compared.turns}: {compared.log_ends}"))
     for name, versions in (("version", compared.version), ("kernels", compared.kernels)):
         was, now = versions.recorded, versions.replayed
         if was and was != now:
@@ -300,7 +300,7 @@ def _compared_rows(compared: Comparison | None) -> list[tuple[str, str]]:
 
 def _words(found: Difference) -> str:
     return (
-        f"turn {found.turn} at {clock(found.at_s)}: {found.what} "
+        f"cycle {found.turn} at {clock(found.at_s)}: {found.what} "
         f"was {found.recorded}, is {found.replayed}"
     )
 

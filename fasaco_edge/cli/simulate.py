@@ -17,7 +17,7 @@ from fasaco_edge.cli.console.arguments import (
     robot_on_bus,
     writing,
 )
-from fasaco_edge.cli.console.terminal import ProgressLines
+from fasaco_edge.cli.console.terminal import ProgressLines, out, say
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.grid.map_files import find_map, map_sources, read_map
@@ -33,10 +33,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed",
         type=float,
-        default=1.0,
         metavar="X",
-        help="simulated seconds per second; give the daemon's configuration the same "
-        "robot.time_scale, so that reviews of a recording are correct (default: %(default)g)",
+        help="simulated seconds per second; the daemon's configuration needs the same "
+        "robot.time_scale, so that reviews of a recording are correct (default: that of --config, "
+        "else 1)",
     )
     parser.add_argument(
         "--driver",
@@ -49,7 +49,10 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--start-xy", type=pair_of_floats, metavar="X,Y", help="start position of the robot [m]"
     )
     parser.add_argument(
-        "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="radius [m]"
+        "--robot-radius",
+        type=float,
+        metavar="M",
+        help=f"radius [m] (default: that of --config, else {DEFAULT_RADIUS_M:g})",
     )
     parser.add_argument(
         "--range", type=float, default=3.5, metavar="M", help="range of the scanner [m]"
@@ -86,6 +89,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Simulate until SIGTERM or SIGINT."""
+    from fasaco_edge.config.robot import RobotConfig
     from fasaco_edge.planners.grids import start_point
     from fasaco_edge.simulation.node import run_simulation
     from fasaco_edge.simulation.robot import SimulationConfig
@@ -93,8 +97,11 @@ def run(args: argparse.Namespace) -> int:
 
     path = find_map(args.map)
     check_outputs([args.trail_out], map_sources(path))
+    here = robot_on_bus(args)
+    robot = RobotConfig() if here.config is None else here.config.robot
     config = SimulationConfig(
-        robot_radius_m=args.robot_radius,
+        robot_radius_m=robot.radius_m if args.robot_radius is None else args.robot_radius,
+        speed_m_s=robot.speed_m_s,
         range_m=args.range,
         map_hz=args.map_hz,
         battery_min=args.battery_min,
@@ -103,16 +110,15 @@ def run(args: argparse.Namespace) -> int:
     if args.turn_radius and args.driver == "ideal":
         raise BadConfiguration("--turn-radius needs --driver follow")
     truth = read_map(path)
-    x, y = args.start_xy or start_point(path, truth, args.robot_radius)
+    x, y = args.start_xy or start_point(path, truth, config.robot_radius_m)
     world = World(truth, Pose2D(x, y), config)
-    here = robot_on_bus(args)
     with ProgressLines("{task.description}") as shown:
         task = shown.add_task("waits for a router")
         result = run_simulation(
             world,
             here.keys,
             here.bus,
-            speed=args.speed,
+            speed=robot.time_scale if args.speed is None else args.speed,
             driver=args.driver,
             meets_others=args.meets_others,
             waits=True,
@@ -123,10 +129,11 @@ def run(args: argparse.Namespace) -> int:
     if args.trail_out is not None:
         with writing(args.trail_out) as file:
             np.savetxt(file, world.track, "%.4f", ",", header="x,y", comments="")
-    print(
+    say(
+        out(),
         f"drove {world.distance_m:.1f} m in {1e-9 * world.stamp_ns:.0f} simulated s, "
         f"{world.collisions} collisions, {world.stops} stops before a wall, "
-        f"longest standstill {world.longest_stand_s:.1f} s"
+        f"longest standstill {world.longest_stand_s:.1f} s",
     )
     if args.meets_others:
         print(f"touched other robots {world.touches} times, stopped {world.meetings} times")

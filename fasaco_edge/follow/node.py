@@ -120,7 +120,7 @@ class FollowerNode(Node):
             self._reported_at, sent = now, command or STAND
             turn = math.degrees(sent.turn_rate)
             why = f"{follower.state.value}{f': {follower.detail}' if follower.detail else ''}"
-            self._report(f"{sent.speed:6.3f} m/s {turn:7.1f} deg/s  {why}")
+            self._report(f"{sent.speed:z6.3f} m/s {turn:z7.1f} deg/s  {why}")
 
     def _send(self, command: VelocityCommand) -> None:
         """Send a command; send none in a dry run, or while another follower drives."""

@@ -15,7 +15,7 @@ from fasaco_edge.judge.floor import (
 from fasaco_edge.offline.ground import Line
 from fasaco_edge.planners.curves import Curve
 from fasaco_edge.planners.path import CoveragePath
-from fasaco_edge.text import duration
+from fasaco_edge.text import duration, percent
 
 
 def judged_floor(
@@ -75,7 +75,7 @@ def floor_words(floor: FloorFigures) -> str:
     if floor.gap is not None:
         words += f", {gap_words(floor.seconds, floor.gap)}"
     if floor.illegal_share:
-        share = f"{floor.illegal_share:.1%}"
+        share = percent(floor.illegal_share)
         words += f"; {share} of the line is too close to obstacles or unknown floor"
     return words
 

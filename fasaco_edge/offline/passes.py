@@ -153,6 +153,8 @@ def plan_passes(
             "several passes are only planned for a robot that turns on the spot",
             hint="plan each pass separately; a mission drives one after the other",
         )
+    if isinstance(passes, str):
+        raise BadConfiguration(f"passes must be a list such as [{passes!r}], got {passes!r}")
     asked = tuple(read_pass(each) if isinstance(each, str) else each for each in passes)
     plans: list[Plan] = []
     for index, (each, lay) in enumerate(zip(asked, laid(asked), strict=True)):

@@ -1,10 +1,11 @@
 """Search of an offline plan: for walks, and for the line along the best of them, within a budget.
 
 A line is laid along each of two walks and annealed three times; then the better line is improved
-until the budget ends. The first walk and line are always completed. The steps do not depend on the
-budget, so a larger budget never gives a worse line (by its seconds, plus the price of unswept
-floor). If a share of the floor is requested, the first line is always annealed three times, to find
-the price of floor. A planner without local search gives one walk, until the budget ends.
+until the budget ends. The first walk and line are always completed, unless Ctrl-C cuts them. The
+steps do not depend on the budget, so a larger budget never gives a worse line (by its seconds, plus
+the price of unswept floor). If a share of the floor is requested, the first line is always annealed
+three times, to find the price of floor. A planner without local search gives one walk, until the
+budget ends.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from fasaco_edge.planners.path import CoveragePath
 from fasaco_edge.planners.planner import (
     ColonySnapshot,
     CoveragePlanner,
+    Interrupt,
     Observer,
     SearchProgress,
     StoppingCriterion,
@@ -90,6 +92,14 @@ class SearchEnd:
         self.is_walk_limited = self._limit is not None and self._limit(progress)
         return self.is_walk_limited
 
+    def is_interrupted(self) -> bool:
+        """Return whether the user ends the plan, even within the first stage of the first line."""
+        if self._progress is not None:
+            self._watch(self._progress)
+        asked = isinstance(self._stop, Interrupt) and self._stop.asked.is_set()
+        self.by = "Ctrl-C" if asked else self.by
+        return asked
+
     def is_stopped(self) -> bool:
         """Return whether ``stop`` ends the search for the first line, which has no budget."""
         return self._progress is not None and self._is_over(self._progress)
@@ -120,11 +130,16 @@ class _Laid:
     snapshots: list[ColonySnapshot]
 
     def complete(self, stages: int, stop: Callable[[], bool] = lambda: False) -> bool:
-        """Search to the end of stage number ``stages``; return False if stopped earlier."""
+        """Search to the end of stage number ``stages``; return False if stopped earlier.
+
+        Stopped within the first stage, it keeps the line of that moment.
+        """
         for _ in self.pieces:
             if self.line.stages >= stages:
                 return True
             if stop():
+                if self.line.best is None:
+                    self.line.keep()
                 return False
         return True
 
@@ -187,7 +202,7 @@ class Planning:
         most = PROPOSALS_A_CELL * self._problem.cells
         ending.limit_walk(min(most, FIRST_PROPOSALS) if has_two else most, is_first=has_two)
         best = self._lay(line, robot, search.seed, is_one_of_two=has_two)
-        best.complete(1)
+        best.complete(1, ending.is_interrupted)
         if search.swept is not None:
             best.complete(COMPARED, ending.is_stopped)
         may_go_on = has_two and ending.is_walk_limited and not ending.is_line_over()

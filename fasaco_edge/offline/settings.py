@@ -77,7 +77,9 @@ class Search:
             possible = math.isfinite(self.budget_s) and self.budget_s > 0.0
             require(possible, "budget", "be finite and above 0 s", self.budget_s)
         if self.swept is not None:
-            require(0.0 < self.swept <= 1.0, "swept", "be a share in (0, 1]", self.swept)
+            require(
+                0.0 < self.swept <= 1.0, "swept", "be a share in (0, 1], such as 0.99", self.swept
+            )
 
     @property
     def has_local_search(self) -> bool:

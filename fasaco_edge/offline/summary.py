@@ -19,7 +19,7 @@ Rows = list[tuple[str, str]]
 def rows_of(plan: Plan) -> Rows:
     """Return the main figures of a plan, as names and words."""
     drive, path, floor = plan.drive, plan.path, plan.floor
-    rows = [("map", f"{plan.map.name}, {plan.problem.cells} cells of {_metres(plan)}")]
+    rows = [("map", f"{_map_words(plan)} of {_metres(plan)}")]
     line = "centres of cells" if plan.line == CELLS else plan.line
     rows.append(("line", f"driven: {line_words(drive)} ({line})"))
     if floor is not None:
@@ -43,7 +43,7 @@ def rows_of(plan: Plan) -> Rows:
 def rows_of_passes(plans: PassPlans) -> Rows:
     """Return the main figures of several passes together."""
     first, floor, drive = plans.plans[0], plans.floor, plans.drive
-    rows = [("map", f"{first.map.name}, {first.problem.cells} cells in the first pass")]
+    rows = [("map", f"{_map_words(first)} in the first pass")]
     rows.append(("line", f"{drive.metres:,.1f} m in {len(plans.plans)} passes, {drive.time}"))
     if floor is not None:
         rows.append(("swept", _swept(floor)))
@@ -59,6 +59,18 @@ def pass_words(plan: Plan) -> str:
     """Return one of several passes in words."""
     drive = plan.drive
     return f"{plan.problem.cells} cells, {plan.steps} steps, {drive.metres:,.1f} m, {drive.time}"
+
+
+def _map_words(plan: Plan) -> str:
+    """Return the map's name and sides, by which a wrong resolution is seen, and its cells."""
+    grid, cells = plan.map.grid, plan.problem.cells
+    sides = ""
+    if grid is not None:
+        width_m, depth_m = (
+            pixels * grid.geometry.resolution for pixels in (grid.geometry.cols, grid.geometry.rows)
+        )
+        sides = f" {width_m:,.1f} x {depth_m:,.1f} m,"
+    return f"{plan.map.name},{sides} {cells} cell{'s' * (cells != 1)}"
 
 
 def _metres(plan: Plan) -> str:

@@ -13,6 +13,7 @@ from fasaco_edge.grid.lattice import Cell, CoverageLattice, Footprint
 from fasaco_edge.grid.map_files import find_map, read_coverage_grid, read_map, suggested_start
 from fasaco_edge.grid.occupancy import FREE, UNKNOWN, OccupancyGrid
 from fasaco_edge.kernels.lattice.reach import reachable_from
+from fasaco_edge.text import percent
 
 
 def start_cell(lattice: CoverageLattice, map_file: Path, grid: OccupancyGrid | None = None) -> Cell:
@@ -61,11 +62,13 @@ def _nowhere(grid: OccupancyGrid | None) -> NothingToCover:
     if free:
         return NothingToCover(
             f"no cell of the map is coverable: {100 * free:.2g} % of its pixels are free, but "
-            "the robot fits nowhere"
+            "the robot fits nowhere",
+            hint="check cell size and robot radius against the map, and resolution and negate of "
+            "its YAML file",
         )
     unknown = np.count_nonzero(cells == UNKNOWN) / cells.size
     return NothingToCover(
-        f"no pixel of the map is free, {unknown:.0%} are unknown",
+        f"no pixel of the map is free, {percent(unknown, 0)} are unknown",
         hint="check image, negate, mode and free_thresh of the map's YAML file: free pixels are "
         "white" + ("; `plan --unknown-free` takes unknown ones for free" if unknown else ""),
     )
@@ -74,7 +77,8 @@ def _nowhere(grid: OccupancyGrid | None) -> NothingToCover:
 def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[float, float]:
     """Return a built-in map's start (x, y) [m], or the map frame's origin for any other map.
 
-    If the origin is not on the map, as in UTM, the nearest place in the largest area is returned.
+    If the robot does not fit there, as in a corner of the building, or if the origin is not on the
+    map, as in UTM, the nearest place in the largest area is returned.
 
     Raises:
         NothingToCover: a robot of this radius [m] fits nowhere.
@@ -82,12 +86,23 @@ def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[
     suggested = suggested_start(map_file)
     if suggested is not None:
         return suggested
-    col, row = truth.geometry.to_pixels(0.0, 0.0)
-    if 0 <= col < truth.geometry.cols and 0 <= row < truth.geometry.rows:
+    if _is_free_around(truth, (0.0, 0.0), radius_m):
         return 0.0, 0.0
     lattice = CoverageLattice.from_map(truth, Footprint(2.0 * radius_m, radius_m))
     row, col = start_cell(lattice, map_file, truth)
     return (col + 0.5) * lattice.cell_m, (row + 0.5) * lattice.cell_m
+
+
+def _is_free_around(grid: OccupancyGrid, point: tuple[float, float], radius_m: float) -> bool:
+    """Return whether all pixels whose centres are within a radius, or a pixel, are free."""
+    geometry = grid.geometry
+    rows, cols = np.ogrid[: geometry.rows, : geometry.cols]
+    col, row = geometry.to_pixels(*point)
+    if not (0 <= col < geometry.cols and 0 <= row < geometry.rows):
+        return False
+    distances_m = np.hypot(cols + 0.5 - col, rows + 0.5 - row) * geometry.resolution
+    around = grid.cells[distances_m <= max(radius_m, geometry.resolution)]
+    return bool(((around >= FREE) & (around <= MAP_FOOTPRINT.free_at_most)).all())
 
 
 # Footprint of the robot that the built-in maps were drawn for.

@@ -127,7 +127,7 @@ class DrivenLine:
 
 
 class LineSearch:
-    """A running search for the line along a walk, in stages; the first is always completed.
+    """A running search for the line along a walk, in stages.
 
     Each later stage anneals the line again, twice as long as the previous one. The search keeps the
     line of the least cost, so a longer search along the same walk is never worse. If a share of the
@@ -171,7 +171,7 @@ class LineSearch:
     def run(self) -> Iterator[None]:
         """Search without end; pause after each piece of work. To be called once."""
         if not self._has_moves:
-            self._keep()
+            self.keep()
             yield
             return
         moves = self._moves
@@ -207,7 +207,7 @@ class LineSearch:
             most = int(line.state[kernel.TRIED]) + int(PATCH_SHARE * self._moves)
             patches = find_patches(self._sweeps, math.ceil(PATCH_M2 / (unit * unit)))
             sweep_patches(line, on, patch, memory, FARTHEST_M / unit, patches, most)
-        self._keep()
+        self.keep()
         self.stages += 1
         yield
 
@@ -233,8 +233,8 @@ class LineSearch:
         assert self.best is not None
         return self._rank(self.best)
 
-    def _keep(self) -> None:
-        """Keep the present line if it is better than the kept line."""
+    def keep(self) -> None:
+        """Keep the present line if it is better than the kept line; also within a stage."""
         points = straightened(self._line.points[numbers_along(self._line)])
         seconds = self._config.seconds(points, self._floor.geometry.resolution)
         xy, tried = self._floor.to_map(points), int(self._line.state[kernel.TRIED])

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fasaco_edge.errors import BadConfiguration
 from fasaco_edge.kernels import EAST, NORTH, SOUTH, WEST
 from fasaco_edge.planners.cost import ANY_LANES, COLUMNS, ROWS, Lanes
+from fasaco_edge.text import percent
 
 # All cells; the cells along walls and furniture; the other cells.
 Covers = Literal["all", "edge", "rest"]
@@ -54,7 +55,7 @@ class Pass:
         if self.angle_deg is not None:
             angle = f"{self.angle_deg:g} degrees"
         covers = "" if self.covers == "all" else self.covers
-        overlap = "" if self.overlap is None else f"{self.overlap:.0%} overlap"
+        overlap = "" if self.overlap is None else f"{percent(self.overlap, 0)} overlap"
         return " ".join(filter(None, (covers, angle, overlap)))
 
 

@@ -90,7 +90,7 @@ def other_problem(setup: list[Difference]) -> str:
 def setup_words(setup: list[Difference]) -> str:
     """Return a sentence on whether the figures of two runs can be compared."""
     if other := other_problem(setup):
-        return f"The figures cannot be compared: {other} differ."
+        return f"The figures cannot be compared, as the runs differ in {other}."
     return "They had different setups:" if setup else "Both had the same setup."
 
 

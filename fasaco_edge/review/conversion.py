@@ -152,7 +152,8 @@ def _add_coverage(document: ReviewDocument, review: Review) -> None:
         document.left = left_patches(floor)
     if (ledger := review.data.ledger_floor) is not None:
         document.ledger_swept_m2 = ledger.swept_m2
-        document.left_by_reason = _by_reason(ledger.left)
+        held = review.data.ordered_floor or ledger
+        document.left_by_reason = _by_reason(held.left)
         document.out_of_reach_by_reason = _by_reason(ledger.out_of_reach)
     if review.data.poses:
         document.driven_m = round(float(review.data.ways_m.sum()), 2)

@@ -95,7 +95,8 @@ class ReviewDocument(msgspec.Struct):
             count [m2]. As its poses are missing, it counts as unswept until it is swept again.
         left: the largest unswept patches: m2, and a place in the middle (x, y) [m].
         ledger_swept_m2: floor that the daemon counted as swept at the end, reachable or not [m2].
-        left_by_reason: unswept reachable floor at the end, by the daemon's reasons [m2].
+        left_by_reason: unswept reachable floor at the end, or shortly before the order was
+            cancelled, by the daemon's reasons [m2].
         out_of_reach_by_reason: free floor that the tool cannot reach, by reason [m2]; null if the
             robot drives through the centres of cells.
         reached_s: times at which 50, 90, 99 and 100 % of the cells coverable at the end were

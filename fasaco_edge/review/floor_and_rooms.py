@@ -8,7 +8,7 @@ the configuration. Pixels that touch a keep-out zone count as wall.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,15 +39,24 @@ MILESTONES = (50, 90, 99, 100)
 RESTS = ("idle", "done", "paused", "charging", "loading", "waiting for map", "waiting for pose")
 
 
-def visits_of(data: RunData, lattice: CoverageLattice) -> NDArray[np.uint16]:
-    """Return how often the tool passed over each cell, uint16 in the shape of the lattice."""
-    ledger = CoverageLedger(lattice.cell_m)
-    before = data.pose_s[0] if data.pose_s else 0.0
-    for now, (x, y, _) in zip(data.pose_s, data.poses, strict=True):
+def visits_of(
+    poses: Iterable[tuple[float, tuple[float, float, float]]],
+    lost_pose_s: float,
+    lattice: CoverageLattice,
+) -> NDArray[np.uint16]:
+    """Return how often the tool passed over each cell, uint16 in the shape of the lattice.
+
+    Args:
+        poses: times [s], and x, y [m] and yaw [rad].
+        lost_pose_s: the track is broken where no pose came for this time [s]; 0 for nowhere.
+        lattice: the cells.
+    """
+    ledger, before = CoverageLedger(lattice.cell_m), math.inf
+    for now, (x, y, _) in poses:
         # Poses outside the lattice are invalid, as in the mission.
         if not lattice.contains(lattice.cell_at(x, y)):
             continue
-        if 0 < data.lost_pose_s < now - before:
+        if 0 < lost_pose_s < now - before:
             ledger.break_track()
         ledger.record(Pose2D(x, y))
         before = now

@@ -16,7 +16,7 @@ from fasaco_edge.mission.orders.order import (
 )
 from fasaco_edge.mission.orders.passes import passes_words
 from fasaco_edge.recording.scene.runcard import cells_of
-from fasaco_edge.review.moments import Span
+from fasaco_edge.review.moments import Replans, Span
 from fasaco_edge.review.run_data import RunData
 from fasaco_edge.text import one_line
 from fasaco_edge.wire.documents.replies import UnreachedArea, ZoneReport
@@ -55,8 +55,14 @@ class CommandThen(msgspec.Struct):
 def commands_of(data: RunData) -> list[CommandThen]:
     """Return the commands of a recording, in order."""
     found = []
-    for at_s, name, order in data.commands:
-        words = f"start: {order_words(_document(order))}" if name == "start" else name
+    for at_s, command in data.commands:
+        words: str = command.name
+        if command.name == "start":
+            words = f"start: {order_words(_document(command.order))}"
+        elif command.keep_out is not None:
+            words = f"{words} {one_line(command.keep_out.name)}"
+        elif command.room is not None:
+            words = f"{words} {command.room.id}"
         found.append(CommandThen(round(at_s, 3), words))
     return found
 
@@ -136,11 +142,11 @@ def _held(
 ) -> Iterator[tuple[str, float, float, str | None, MissionOrder | None]]:
     """Yield for each order its source, beginning and end [s], ending command, content."""
     # Daemon or recorder may have been restarted during an order.
-    first_s = next((at_s for at_s, name, _ in data.commands if name == "start"), end_s)
+    first_s = next((at_s for at_s, command in data.commands if command.name == "start"), end_s)
     reported = (each.status.mission.ordered for each in data.statuses if each.at_s < first_s)
     ordered, began, order = next(filter(None, reported), "itself"), 0.0, None
     is_open = True
-    for at_s, name, given in data.commands:
+    for at_s, (name, given, *_) in data.commands:
         is_the_same = name == "start" and is_open and order == given
         if is_the_same and _state_at(states, at_s) not in OVER:
             continue
@@ -199,9 +205,7 @@ def _chapter(
         covered,
         coverable,
         order=_document(order) if order else _by_zones(zones),
-        replans=sum(
-            begin_s <= path.at_s < until for path in data.paths if path.about.planner is not None
-        ),
+        replans=sum(begin_s <= path.at_s < until for path in Replans.of(data.paths).later),
         paused_s=round(paused_s, 3),
         driven_m=round(float(data.ways_m[(times >= begin_s) & (times < until)].sum()), 2),
         unreached=list(statuses[-1].mission.unreached.areas) if statuses else [],

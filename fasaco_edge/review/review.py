@@ -83,8 +83,7 @@ def read_review(
     # The number of the last batch's first sample approximates the number of samples.
     about = max(batch.place.first for batch in record.batches) + 1
     data = gather(_reported(samples, progress, "decoding", about), record.clock)
-    progress("the robot's track", 0, 1)
-    return review_of(record, data, samples.missing, others)
+    return review_of(record, data, samples.missing, others, progress)
 
 
 def _reported(items: Iterable[Item], progress: Progress, task: str, total: int) -> Iterator[Item]:
@@ -219,7 +218,11 @@ class Review:
 
 
 def review_of(
-    record: RunRecord, data: RunData, missing: int, others: Others = lambda *_: None
+    record: RunRecord,
+    data: RunData,
+    missing: int,
+    others: Others = lambda *_: None,
+    progress: Progress = lambda *_: None,
 ) -> Review:
     """Return the review of a recording.
 
@@ -228,6 +231,7 @@ def review_of(
         data: data of its samples.
         missing: number of samples lost before they were written.
         others: called for a robot of a fleet.
+        progress: reports the progress.
     """
     end_s = _end_s(record, data)
     lattice, no_lattice = _lattice(data)
@@ -244,12 +248,17 @@ def review_of(
             floor = all_floor = all_floor.only(~by_others)
     if floor is not None and (zones := ordered_zones(data, chapters(data, states, end_s))):
         floor = floor.only(labels_of(floor.geometry, zones) > 0)
+    visits = None
+    if lattice:
+        poses = zip(data.pose_s, data.poses, strict=True)
+        poses_reported = _reported(poses, progress, "poses", len(data.poses))
+        visits = visits_of(poses_reported, data.lost_pose_s, lattice)
     return Review(
         record=record,
         data=data,
         lattice=lattice,
         no_lattice=no_lattice,
-        visits=visits_of(data, lattice) if lattice else None,
+        visits=visits,
         floor=floor,
         all_floor=all_floor,
         by_others=by_others,

@@ -23,7 +23,7 @@ from fasaco_edge.grid.occupancy import OccupancyGrid
 from fasaco_edge.mission.coverage.ledger import JUMP_CELLS
 from fasaco_edge.mission.orders.commands import read_command
 from fasaco_edge.mission.orders.mask import mask_polygons
-from fasaco_edge.mission.orders.order import MissionOrder
+from fasaco_edge.mission.orders.order import Command
 from fasaco_edge.recording.read.robot_clock import RobotClock
 from fasaco_edge.recording.read.run import RecordedSamples, RunRecord
 from fasaco_edge.wire.documents.json_text import Settings, decode_json, decode_tolerant
@@ -70,7 +70,7 @@ class RunData:
         pose_s, poses: arrival of each pose, and its x [m], y [m], yaw [rad].
         map_s: arrival of each map and map update.
         paths, statuses: newest last.
-        commands: arrival, name and order of each; only a ``start`` has an order.
+        commands: arrival of each, and the command.
         grid: the map at the end, with all updates.
         ordered_keep_out: keep-out polygons of the last order [m].
         zones: zone polygons of the last order [m]; empty without an order, or for everything.
@@ -86,7 +86,7 @@ class RunData:
     map_s: list[float] = field(default_factory=list)
     paths: list[PathSample] = field(default_factory=list)
     statuses: list[StatusSample] = field(default_factory=list)
-    commands: list[tuple[float, str, MissionOrder]] = field(default_factory=list)
+    commands: list[tuple[float, Command]] = field(default_factory=list)
     grid: OccupancyGrid | None = None
     ordered_keep_out: tuple[Polygon, ...] = ()
     zones: tuple[Polygon, ...] = ()
@@ -135,6 +135,12 @@ class RunData:
     def ledger_floor(self) -> FloorReport | None:
         """The daemon's last report of the floor."""
         return self.last(lambda status: status.floor)
+
+    @property
+    def ordered_floor(self) -> FloorReport | None:
+        """The same, before an order was cancelled: after that, no floor has to be swept."""
+        held = self.last(lambda s: s.floor if s.floor and s.floor.reachable_m2 else None)
+        return held or self.ledger_floor
 
     @property
     def keep_out(self) -> tuple[Polygon, ...]:
@@ -273,11 +279,12 @@ class _SampleReader:
         self.data.poses.append((pose.x, pose.y, pose.yaw))
 
     def _command(self, arrival: Arrival) -> None:
-        name, order, *_ = read_command(decode_json(arrival.sample.payload))
-        self.data.commands.append((self._now, name, order))
-        if name == "start":
-            self.data.ordered_keep_out = order.keep_out
-            self.data.zones = tuple(zone.polygon for zone in order.zones if zone.polygon)
+        command = read_command(decode_json(arrival.sample.payload))
+        self.data.commands.append((self._now, command))
+        if command.name == "start":
+            zones = command.order.zones
+            self.data.ordered_keep_out = command.order.keep_out
+            self.data.zones = tuple(zone.polygon for zone in zones if zone.polygon)
 
     def _status(self, arrival: Arrival) -> None:
         status, data = decode_tolerant(arrival.sample.payload, Status), self.data

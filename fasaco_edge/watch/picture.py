@@ -226,7 +226,7 @@ def draw_names(kinds: Kinds, frame: Frame, rooms: Rooms) -> None:
         place = label_place(room.outline)
         if place is None:
             continue
-        share = "" if room.swept is None else f"{math.floor(100 * room.swept)}%"
+        share = "" if room.swept is None else f"{math.floor(100 * room.swept)} %"
         texts = (
             f" {text} " for text in (f"{room.title} {share}".rstrip(), room.title, str(room.id))
         )

@@ -407,7 +407,7 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
         *((f"--overlap={m}", "--overlap: expected float") for m in ("0.9", "-0.1", "nan")),
         *((f"--turn-radius={m}", "--turn-radius: expected float") for m in ("21", "-1", "nan")),
         ("--line cells --turn-radius 0.3", "only has turns on the spot"),
-        ("--swept 1.5", "swept must be a share in (0, 1], got 1.5"),
+        ("--swept 1.5", "swept must be a share in (0, 1], such as 0.99, got 1.5"),
         *((f"--line cells --align {to}", "line over the floor") for to in ("walls", "30")),
         ("--line cells --swept 0.9", "has no share to choose"),
         ("--rooms --passes 2", "for one pass"),

@@ -52,7 +52,7 @@ def recording(tmp_path):
 @pytest.mark.parametrize(
     ("words", "shown", "first_line"),
     [
-        (PLAN, "steps, [0-9.]+% above the bound ", "map +.*"),
+        (PLAN, "steps, [0-9.]+ % above the bound ", "map +.*"),
         (("plan", "flat", "--ants", "40", "--planner", "fasaco"), "ants ━* +0/40 ", "map +.*"),
         (("warmup",), "checking the kernels ", "kernels ready after [0-9.]+ s in .*"),
         (
@@ -155,12 +155,14 @@ def test_a_file_gets_no_progress(monkeypatch, colour):
     assert "\x1b" not in COLOURS.sub("", ended.out)
 
 
-def test_long_work_says_so_in_a_file_too(monkeypatch, capsys):
+@pytest.mark.parametrize(("counted", "count"), [(True, " (1 of 3)"), (False, "")])
+def test_long_work_says_so_in_a_file_too(monkeypatch, capsys, counted, count):
+    """Of a search the bar shows seconds, as no numbers: "25 of 2" said nothing."""
     monkeypatch.setattr(terminal, "SAY_S", 0.0)
-    with terminal.progress() as bar:
+    with terminal.progress(counted=counted) as bar:
         task = bar.add_task("looking", total=3)
         bar.update(task, description="compiling kernels", completed=1)
-    assert capsys.readouterr().err == "compiling kernels (1 of 3)\n"
+    assert capsys.readouterr().err == f"compiling kernels{count}\n"
 
 
 # Run in a terminal: what a log, a warning, a second console and a thread print meanwhile.

@@ -80,7 +80,7 @@ def test_all_outputs_report_a_dead_dock(tmp_path):
             (trouble,) = status["troubles"]
             assert (status["state"], trouble["code"]) == ("charging", "no_current")
             assert trouble["text"].startswith("in the dock the battery, at 1")
-            assert "does not charge: its level falls, from 18% to 1" in trouble["text"]
+            assert "does not charge: its level falls, from 18 % to 1" in trouble["text"]
             assert trouble["do"].startswith("check the dock's power and contacts")
             with OPENER.open(f"http://{figures}/metrics", timeout=TIMEOUT_S) as answer:
                 lines = answer.read().decode().splitlines()

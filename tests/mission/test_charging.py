@@ -9,6 +9,7 @@ from fasaco_edge.mission.config import BatteryPolicy, Dock
 from fasaco_edge.mission.core.charging import FULL_AFTER_S, BatteryGauge
 from fasaco_edge.mission.events import BatteryReceived, PoseReceived, State
 from fasaco_edge.mission.work.order_state import NO_ORDER, OrderState
+from fasaco_edge.text import percent
 from tests.mission.battery import AT_DOCK, WALLED, Battery
 from tests.mission.world import CELL, patch, pose_at
 
@@ -25,10 +26,10 @@ def test_a_low_robot_docks_charges_and_continues():
         State.RETURNING,
         "on the way to the dock",
     )
-    assert drive.updates[-1].reason == "drives to the dock: battery at 20%"
+    assert drive.updates[-1].reason == "drives to the dock: battery at 20 %"
     drive.run(State.CHARGING)
     assert (drive.cell, drive.walk) == (AT_DOCK, [])
-    assert drive.mission.reason == "battery at 20%, but discharging, goes on at 90%"
+    assert drive.mission.reason == "battery at 20 %, but discharging, goes on at 90 %"
     before = drive.visited
     drive.charge(to=0.87)
     assert drive.mission.state is State.CHARGING
@@ -184,7 +185,8 @@ def test_full_counts_a_tenth_above_where_it_turned_back():
         drive.go()
         assert (drive.mission.state is not State.CHARGING) is goes
         if not goes:
-            assert drive.mission.reason == f"battery at {level:.0%}, but full, goes on at 90%"
+            shown = f"battery at {percent(level, 0)}, but full, goes on at 90 %"
+            assert drive.mission.reason == shown
 
 
 def test_a_dock_out_of_reach_is_named():

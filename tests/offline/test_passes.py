@@ -129,6 +129,11 @@ def test_lanes_need_the_search():
             fe.plan(fe.load_map("office"), **options)
 
 
+def test_one_text_is_no_list_of_passes():
+    with pytest.raises(BadConfiguration, match=r"must be a list such as \['edge'\], got 'edge'"):
+        fe.plan_passes(fe.load_map("office"), passes="edge")
+
+
 def test_a_slow_pass_takes_longer():
     usual, slow = planned(fe.load_map(np.ones((6, 6), bool)), "auto", Pass(speed_m_s=0.1)).plans
     assert slow.robot.speed_m_s == 0.1

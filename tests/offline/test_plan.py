@@ -182,6 +182,14 @@ def test_the_picture_has_the_figures_of_the_summary(monkeypatch):
     assert turns in dict(rows_of(planned))["line"]
 
 
+def test_a_summary_names_the_size_of_the_map():
+    """A resolution of 5 in place of 0.05 shows there, and nowhere else."""
+    office = fe.plan(fe.load_map("office"), line="cells", search=QUICK)
+    assert dict(rows_of(office))["map"] == "office.yaml, 7.7 x 9.0 m, 334 cells of 0.3 m"
+    cell = fe.plan(fe.load_map(np.ones((1, 1), bool)), search=QUICK)
+    assert ", 1 cell of " in dict(rows_of(cell))["map"]
+
+
 def test_a_plan_is_one_line_of_text_and_a_picture():
     office = fe.load_map("office")
     planned = fe.plan(office, search=QUICK)

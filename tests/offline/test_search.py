@@ -18,8 +18,8 @@ from fasaco_edge.offline.plan import _problem
 from fasaco_edge.offline.search import Planning, SearchEnd
 from fasaco_edge.offline.settings import ANYWHERE, WALLS
 from fasaco_edge.planners.bound import lower_bound_of
-from fasaco_edge.planners.line import LINES, LineSearch, _sweeps, memory_for_moves
-from fasaco_edge.planners.planner import ignore
+from fasaco_edge.planners.line import LINES, LineSearch, _sweeps, anneal, memory_for_moves
+from fasaco_edge.planners.planner import Interrupt, ignore
 
 ROBOT = fe.Robot()
 # Pauses after which a search is stopped; the second walk begins after some ninety, and the better
@@ -121,3 +121,17 @@ def test_a_requested_share_is_searched_for_beyond_the_budget():
         plan = fe.plan(grid, ROBOT, search=fe.Search(budget_s=0.01, swept=swept))
         shares.append(plan.swept_share)
     assert shares[1] >= 0.994 > shares[0]
+
+
+def test_ctrl_c_ends_even_the_first_line(monkeypatch):
+    """On a large map that line takes half a minute, which Ctrl-C did not shorten."""
+    pieces, ctrl_c = [], Interrupt()
+
+    def annealed(*given):
+        ctrl_c.asked.set()
+        pieces.append(anneal(*given))
+
+    monkeypatch.setattr("fasaco_edge.planners.line.anneal", annealed)
+    plan = fe.plan(fe.load_map("flat"), stop=ctrl_c)
+    assert (len(pieces), plan.ended_by) == (1, "Ctrl-C")
+    assert plan.swept_share > 0.9

@@ -21,7 +21,7 @@ from fasaco_edge.planners.passes import Laid, Pass, edge_cells, laid, read_pass,
         ("-30deg", Pass(angle_deg=-30.0), "-30 degrees"),
         ("rest:22.5deg@0.2", Pass("rest", "auto", 22.5, 0.2), "rest 22.5 degrees"),
         ("edge@0.1", Pass("edge", speed_m_s=0.1), "edge"),
-        ("cross%30@0.2", Pass("all", "cross", None, 0.2, 0.3), "cross 30% overlap"),
+        ("cross%30@0.2", Pass("all", "cross", None, 0.2, 0.3), "cross 30 % overlap"),
     ],
 )
 def test_a_text_is_a_pass(text, read, name):

@@ -7,7 +7,9 @@ import pytest
 pytest.importorskip("rerun")
 
 from fasaco_edge.cli.review.screen import print_comparison
-from fasaco_edge.mission.orders.order import read_order
+from fasaco_edge.mission.orders.keep_outs import KeepOut
+from fasaco_edge.mission.orders.order import Command, read_order
+from fasaco_edge.mission.orders.room_requests import RoomRequest
 from fasaco_edge.review.comparison import (
     compared_rows,
     setup_differences,
@@ -16,7 +18,7 @@ from fasaco_edge.review.comparison import (
 )
 from fasaco_edge.review.document import MapSize, ReviewDocument
 from fasaco_edge.review.moments import spans_of
-from fasaco_edge.review.orders import OrderChapter, chapters, order_words
+from fasaco_edge.review.orders import OrderChapter, chapters, commands_of, order_words
 from fasaco_edge.review.output.answers import verdicts
 from fasaco_edge.review.run_data import RunData, StatusSample
 from fasaco_edge.wire.documents.replies import CoverageReport, MissionReport, ZoneReport
@@ -24,6 +26,11 @@ from fasaco_edge.wire.documents.status import Status
 
 ALL = read_order({})
 KITCHEN = read_order({"zones": [{"name": "k", "polygon": [[0, 0], [4, 0], [4, 3]], "passes": 1}]})
+
+
+def received(commands):
+    """Return the commands as a recording has them."""
+    return [(at_s, Command(name, order)) for at_s, name, order in commands]
 
 
 def told(*rows, commands=()):
@@ -36,7 +43,7 @@ def told(*rows, commands=()):
         for at_s, state, covered, coverable in rows
     ]
     states = spans_of([(at_s, state, "") for at_s, state, _, _ in rows], 100.0)
-    data = RunData(statuses=statuses, commands=list(commands))
+    data = RunData(statuses=statuses, commands=received(commands))
     return chapters(data, states, 100.0)
 
 
@@ -99,7 +106,7 @@ def restarted(*missions, states=("done",), commands=()):
         for at_s, state, mission in zip((0.0, 60.0), states, missions, strict=False)
     ]
     spans = spans_of([(each.at_s, each.status.state, "") for each in statuses], 100.0)
-    return chapters(RunData(statuses=statuses, commands=list(commands)), spans, 100.0)
+    return chapters(RunData(statuses=statuses, commands=received(commands)), spans, 100.0)
 
 
 def test_an_equal_order_continues_unless_it_is_over():
@@ -120,6 +127,24 @@ def test_a_cancelled_order_is_over(command):
         (30, 90, command),
     ]
     assert [order.complete for order in orders] == [False, False]
+    document = ReviewDocument(complete=False, state="idle", orders=orders[:1])
+    said = f"not complete: ended by the command {command} at 0:20.0"
+    assert verdicts(document) == [(False, said)]
+
+
+def test_a_command_names_what_it_changes():
+    rug = KeepOut("rug", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))
+    commands = [
+        Command("pause"),
+        Command("keep_out_add", keep_out=rug),
+        Command("room_name", room=RoomRequest(4, "hall")),
+    ]
+    data = RunData(commands=[(1.0, command) for command in commands])
+    assert [each.command for each in commands_of(data)] == [
+        "pause",
+        "keep_out_add rug",
+        "room_name 4",
+    ]
 
 
 ORDER = OrderChapter("itself", 0.0, 100.0, None, "done", True, 400, 400)

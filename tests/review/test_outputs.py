@@ -35,7 +35,13 @@ from fasaco_edge.review.output.rows import charge_rows, screen_rows
 from fasaco_edge.review.review import read_review, review_of
 from fasaco_edge.review.run_data import StatusSample
 from fasaco_edge.review.spot import explain
-from fasaco_edge.wire.documents.replies import CoverageReport, MissionReport, ZoneReport
+from fasaco_edge.wire.documents.replies import (
+    CoverageReport,
+    FloorLeft,
+    FloorReport,
+    MissionReport,
+    ZoneReport,
+)
 from fasaco_edge.wire.documents.status import BatteryReport, LedgerReport, Status
 from tests.review.test_parts import run_told
 from tests.support.processes import ENVIRONMENT, PROGRAM, fasaco_edge
@@ -168,6 +174,26 @@ def test_floor_swept_before_the_recording_is_not_estimated(review):
     assert "7 cells were covered before: the recording does not show which" in caption
 
 
+def test_floor_of_a_cancelled_order_is_what_was_swept(review):
+    """After a cancel no floor has to be swept: the last report says 0 of 0 m2."""
+    counted = FloorReport(swept_m2=3.0, reachable_m2=9.0, left=(FloorLeft(6.0, "on the path"),))
+    over = FloorReport(swept_m2=3.5, reachable_m2=0.0, left=())
+    floors = [
+        StatusSample(at_s, Status(state=state, floor=floor, ledger=LedgerReport(restored_cells=7)))
+        for at_s, state, floor in ((1.0, "covering", counted), (2.0, "idle", over))
+    ]
+    data = replace(review.data, statuses=[*review.data.statuses, *floors])
+    cancelled = review_of(review.record, data, 0)
+    document = document_of(cancelled)
+    assert dict(screen_rows(cancelled, document))["floor swept"].startswith("3.5 m2, by the daemon")
+    assert document.left_by_reason == {"on the path": 6.0}
+
+
+def test_a_screen_says_how_long_each_state_lasted(review):
+    document = document_of(replace(review, states=(Span("paused", 0, 9), Span("covering", 9, 70))))
+    assert dict(screen_rows(review, document))["time"] == "covering 1:01.0, paused 0:09.0"
+
+
 def test_troubles_of_the_recorder_are_reported(review):
     states = (Span("recording", 0, 2), Span("disk full", 2, 5, "less than 50 MB are free"))
     told = document(replace(review, recorder_states=states))
@@ -281,6 +307,12 @@ def test_a_file_that_cannot_be_written_is_named(parts, tmp_path, capsys, option,
     (tmp_path / "file").touch()
     assert main(["review", *map(str, parts), option, str(tmp_path / name)]) == code
     assert said in capsys.readouterr().err
+
+
+def test_an_answer_takes_no_option_of_the_report(parts, tmp_path, capsys):
+    words = ["review", *map(str, parts), "--point", "1,1", "--export", str(tmp_path / "tables")]
+    assert main(words) == 78
+    assert "--export does not go with --point" in capsys.readouterr().err
 
 
 def test_shares_that_were_never_reached_are_left_out(parts):

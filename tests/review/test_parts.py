@@ -119,13 +119,16 @@ def test_parts_are_one_run(parts):
     assert (document(last)["robot"], document(last)["samples_missing"]) == ("robot", 0)
 
 
-def test_progress_is_reported(parts):
+def test_progress_is_reported(parts, monkeypatch):
+    monkeypatch.setattr("fasaco_edge.review.review.REPORT_EVERY", 2)
     told = []
     read_review(parts, lambda *what: told.append(what))
+    # The poses of a long recording take longest, so they move the bar, too.
+    assert [counts for what, *counts in told if what == "poses"] == [[0, 6], [2, 6], [4, 6]]
     assert list(dict.fromkeys(what for what, _, _ in told)) == [
         "reading kB",
         "decoding",
-        "the robot's track",
+        "poses",
     ]
     reading = [(done, total) for what, done, total in told if what == "reading kB"]
     assert [done for done, _ in reading] == sorted(done for done, _ in reading)
@@ -139,6 +142,7 @@ def test_paths_without_a_plan_do_not_count_as_replans(parts):
     assert told["paths"] == 4
     assert told["first_plan_ms"] == 50.0
     assert told["replans_by_reason"] == {"map: cells more": 1, "path blocked": 1}
+    assert [told["replans"]] == [order["replans"] for order in told["orders"]] == [2]
     assert (told["replan_ms_p50"], told["replan_ms_p99"], told["replan_ms_max"]) == (4.0, 8.0, 8.0)
 
 

@@ -9,9 +9,11 @@ from functools import partial
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
+from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
 from fasaco_edge.grid.geometry import Pose2D
 from fasaco_edge.simulation.node import Pace, run_simulation
@@ -170,6 +172,30 @@ def test_an_impossible_simulation_is_an_error():
         run_simulation(new_world(), Keys(), BusSettings(), speed=0.0)
     with pytest.raises(BusUnavailable):
         run_simulation(new_world(), Keys(), BusSettings(connect=("tcp/127.0.0.1:1",)))
+
+
+def test_the_robot_is_that_of_the_configuration(tmp_path, monkeypatch):
+    """On a map of one's own it begins where it fits: a corner of the walls is often at (0, 0)."""
+    floor = np.full((40, 60), 255, np.uint8)
+    floor[[0, -1], :] = floor[:, [0, -1]] = 0
+    Image.fromarray(floor).save(tmp_path / "room.png")
+    house = tmp_path / "room.yaml"
+    house.write_text("{image: room.png, resolution: 0.1, origin: [0, 0, 0], negate: 0}")
+    config = tmp_path / "robot.yaml"
+    config.write_text("robot: {radius_m: 0.3, speed_m_s: 0.4, time_scale: 5}")
+    started = []
+    monkeypatch.setattr(
+        "fasaco_edge.simulation.node.run_simulation",
+        lambda world, *_, speed, **__: started.append((world, speed)),
+    )
+    for more in ([], ["--robot-radius", "0.2", "--speed", "2"]):
+        assert main(["simulate", str(house), "--config", str(config), *more]) == 0
+    sizes = [(world.config.robot_radius_m, world.config.speed_m_s) for world, _ in started]
+    assert sizes == [(0.3, 0.4), (0.2, 0.4)]
+    assert [speed for _, speed in started] == [5.0, 2.0]
+    pose = started[0][0].pose
+    assert 0.3 < pose.x < 1.0
+    assert 0.3 < pose.y < 1.0
 
 
 def test_it_waits_for_a_bus_that_is_not_there_yet():

@@ -163,7 +163,7 @@ def test_it_shows_rooms_with_their_swept_shares():
     page = page_of(view, 140, 60)
     assert "leaves out nook" in page
     assert "limit     home in 12 min 30 s, priority 60+ first" in page
-    assert " hall 45% " in page
+    assert " hall 45 % " in page
     assert " 2 " in page  # a name that would control the terminal is none
     assert "hall 45.9 %" in page
     assert ", 8 more" in page

@@ -204,7 +204,7 @@ def test_a_journal_keeps_the_newest():
 def test_a_trouble_of_a_robot_at_rest_begins_and_ends():
     view = RobotView("robot")
     dead = {"code": "no_current", "text": "the dock gives no current", "since_s": 3.0}
-    resting = {"state": "charging", "reason": "battery at 15%"}
+    resting = {"state": "charging", "reason": "battery at 15 %"}
     for troubles in ([], [dead], [dead | {"since_s": 4.0}], []):
         tell(view, "status", status(**resting, troubles=troubles))
     assert texts(view).count("trouble: the dock gives no current") == 1

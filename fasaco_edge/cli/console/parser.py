@@ -59,6 +59,8 @@ class Parser(argparse.ArgumentParser):
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
         meant = suggestion(names[0], options) if names else ""
+        if unknown[0].endswith((".yaml", ".yml")) and "--config" in options:
+            meant = f"did you mean --config {unknown[0]}?"
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
 
     def _get_value(self, action: argparse.Action, arg_string: str) -> Any:  # noqa: ANN401
@@ -78,4 +80,8 @@ class Parser(argparse.ArgumentParser):
             return
         names = [str(choice) for choice in action.choices]
         meant = suggestion(str(value), names) or f"there are {', '.join(names)}"
+        if isinstance(action, argparse._SubParsersAction) and value in self._given:
+            before = self._given[max(self._given.index(value) - 1, 0)]
+            if before.startswith("-"):
+                meant = f"options such as {before} come after the command"
         raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {meant}")

@@ -158,16 +158,17 @@ class ProgressBar(ProgressLines):
     """A progress bar; without a terminal that can draw it, a line every ``SAY_S``, so that a log
     shows that long work goes on."""
 
-    def __init__(self, *columns: ProgressColumn | str) -> None:
+    def __init__(self, *columns: ProgressColumn | str, counted: bool) -> None:
         super().__init__(*columns)
-        self._said_at = time.monotonic()
+        self._said_at, self._is_counted = time.monotonic(), counted
 
     def update(self, task_id: TaskID, **changes: Any) -> None:  # noqa: ANN401 - as rich has them
         """Change a task, as ``Progress.update``."""
         super().update(task_id, **changes)
         if self.disable and time.monotonic() - self._said_at >= SAY_S:
             self._said_at, task = time.monotonic(), self._tasks[task_id]
-            count = f" ({task.completed:.0f} of {task.total:.0f})" if task.total else ""
+            shows_count = self._is_counted and task.total
+            count = f" ({task.completed:.0f} of {task.total:.0f})" if shows_count else ""
             err().print(f"{task.description}{count}", soft_wrap=True)
 
 
@@ -180,6 +181,7 @@ def progress(*, counted: bool = True) -> Progress:
         BarColumn(bar_width=bar),
         *count,
         TimeElapsedColumn(),
+        counted=counted,
     )
 
 

@@ -81,7 +81,12 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "(default: %(default)g)",
     )
     parser.add_argument(
-        "--cell", type=float, default=DEFAULT_CELL_M, metavar="M", help="width of the tool [m]"
+        "--cell",
+        "--tool-width",
+        type=float,
+        default=DEFAULT_CELL_M,
+        metavar="M",
+        help="width of the tool [m]",
     )
     parser.add_argument(
         "--robot-radius", type=float, default=DEFAULT_RADIUS_M, metavar="M", help="radius [m]"
@@ -139,7 +144,7 @@ COMMAND = Subcommand(
     "processes that communicate by Zenoh over loopback; show the mission; exit when every "
     "reachable cell is covered. Write a recording (.rrd), a picture and the figures to the output "
     "folder. A terminal of at least 60 x 20 characters shows the mission as in `fasaco-edge "
-    "watch`: f toggles the pheromone trail, q quits.",
+    "watch`: q quits.",
     run=run,
     add_options=_add_options,
     epilog=EPILOG,

@@ -120,6 +120,7 @@ def _add_problem(group: argparse._ArgumentGroup) -> None:
     start.add_argument("--start-xy", type=pair_of_floats, metavar="X,Y", help="start position [m]")
     group.add_argument(
         "--cell",
+        "--tool-width",
         type=float,
         metavar="M",
         help="width of the tool [m], and of a cell, which for a line over the floor is narrower "

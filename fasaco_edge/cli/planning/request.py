@@ -21,6 +21,7 @@ from fasaco_edge.host.documents import inspected
 from fasaco_edge.offline.settings import CELLS, LIKE_OWN, Search, default_line
 from fasaco_edge.planners.own.loading import UserCode, load
 from fasaco_edge.planners.planner import SearchProgress
+from fasaco_edge.text import percent
 
 if TYPE_CHECKING:
     from fasaco_edge.offline.maps import Map
@@ -57,7 +58,7 @@ def watching(
 
 def _words(search: SearchProgress) -> str:
     words = f"{search.steps} steps"
-    return words if search.gap is None else f"{words}, {search.gap:.2%} above the bound"
+    return words if search.gap is None else f"{words}, {percent(search.gap, 2)} above the bound"
 
 
 # Options, and the members of ``RobotConfig`` and ``Search`` that they set.

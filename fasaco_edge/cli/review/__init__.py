@@ -128,6 +128,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the report, and write the requested files."""
     recordings = [*args.recordings, *(args.against or ())]
     check_outputs((args.png,), recordings)
+    _check_together(args)
     for file in recordings:
         with open_part(file):  # raises for a file that is no recording, before slow imports
             pass
@@ -177,6 +178,17 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _check_together(args: argparse.Namespace) -> None:
+    asked = "--point" if args.at is None else "--at"
+    for option in ("against", "export", "long"):
+        if (args.at is not None or args.point) and getattr(args, option):
+            raise BadConfiguration(
+                f"--{option} does not go with {asked}", hint="run the command once for each"
+            )
+    if args.export is not None and args.export.exists() and not args.export.is_dir():
+        raise BadConfiguration(f"cannot write {args.export}: that is a file", hint="name a folder")
+
+
 def _answer(args: argparse.Namespace, review: Review) -> int:
     """Print the answers about a moment and about spots; draw them on request."""
     import msgspec
@@ -221,6 +233,7 @@ def _save(picture: Image.Image | None, review: Review, path: Path) -> None:
         )
     with writing(path) as file:
         picture.save(file, "PNG")
+    terminal.err().print(f"wrote {path}", soft_wrap=True)
 
 
 def _read(paths: Sequence[Path], name: str) -> Review:

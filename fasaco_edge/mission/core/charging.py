@@ -20,6 +20,7 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.path.route import Route
 from fasaco_edge.mission.work.order_state import AT_HOME, NO_ORDER
 from fasaco_edge.mission.work.sequencer import Sequencer
+from fasaco_edge.text import percent
 
 # A level that differs from the last accepted one by more than JUMP must be repeated for HOLD_S [s].
 JUMP, HOLD_S = 0.05, 5.0
@@ -216,7 +217,7 @@ class Charging:
         if self.gauge.level is None:
             return ""
         near = ", the dock is near" if self._is_best_here else ""
-        return f": battery at {self.gauge.level:.0%}{near}"
+        return f": battery at {percent(self.gauge.level, 0)}{near}"
 
     @property
     def turns_back_at(self) -> float:
@@ -273,7 +274,8 @@ class Charging:
             return "waits for the level of the battery"
         power = self.gauge.power
         but = f", but {power}" if power in ("discharging", "full") else ""
-        return f"battery at {self.gauge.level:.0%}{but}, goes on at {self.goes_on_at:.0%}"
+        now_at, then_at = percent(self.gauge.level, 0), percent(self.goes_on_at, 0)
+        return f"battery at {now_at}{but}, goes on at {then_at}"
 
     def _is_best_to_leave_here(self) -> bool:
         """Return whether charging is due soon, and this is the best place to leave the path.

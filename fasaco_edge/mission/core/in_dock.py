@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from fasaco_edge.mission.core.charging import RISE, BatteryGauge
 from fasaco_edge.mission.map.map_state import MapState
+from fasaco_edge.text import percent
 
 # Tolerances to the dock's pose, and to the pose in front of the dock [m].
 DOCKED_M, NEAR_M = 0.1, 0.5
@@ -117,7 +118,7 @@ class DockCurrent:
         if docked_at is None or level is None:
             return ""
         if self._falls:
-            return f"its level falls, from {self._from:.0%} to {level:.0%}"
+            return f"its level falls, from {percent(self._from, 0)} to {percent(level, 0)}"
         since = docked_at if self._rose_at is None else self._rose_at
         unclaimed = self._unclaimed_at
         if unclaimed is not None and now - unclaimed >= PATIENCE_S:

@@ -14,6 +14,7 @@ from fasaco_edge.mission.core.in_dock import DockCurrent
 from fasaco_edge.mission.core.parts import MissionParts
 from fasaco_edge.mission.core.path_checks import FAR_APART
 from fasaco_edge.mission.events import State
+from fasaco_edge.text import percent
 
 # Least timeout of poses at rest [s]; timeout of the first map and of the first pose [s].
 REST_S = 30.0
@@ -133,7 +134,11 @@ class Troubles:
         if policy is None or level is None or self.charging.silence(now) or level >= policy.enough:
             return ""
         why = self._current.why_none(now)
-        return f"in the dock the battery, at {level:.0%}, does not charge: {why}" if why else ""
+        return (
+            f"in the dock the battery, at {percent(level, 0)}, does not charge: {why}"
+            if why
+            else ""
+        )
 
     def shut_in(self, _: State, now: float) -> str:
         """Return what shuts the robot in, or why its place has long been impossible; else ""."""

@@ -241,7 +241,8 @@ class RoomBook:
     def listed(self) -> str:
         """Return a list of the rooms as text."""
         titles = ", ".join(repr(room.name) if room.name else room.title for room in self.rooms)
-        return f"there are {titles:.{MOST_LISTED}}" if titles else "no room is known yet"
+        verb = "is" if len(self.rooms) == 1 else "are"
+        return f"there {verb} {titles:.{MOST_LISTED}}" if titles else "no room is known yet"
 
     def name(self, called: str | int, name: str) -> None:
         """Give a room a name; "" removes its name.

@@ -107,7 +107,8 @@ def user_code(planner: object, name: str = "", said: str = "planner", file: str 
     if not callable(walk) or isinstance(walk, type):
         raise BadConfiguration(
             f"{said} must be a function, or a class with plan(self, problem), got {shown(planner)}",
-            hint="it is called with the problem and returns cells (row, col) in order",
+            hint="it is called with the problem and returns cells (row, col) in order; a planner "
+            "of the package is named by Search(planner=...)",
         )
     return UserCode(name, walk, file)
 

@@ -53,6 +53,9 @@ def _ending(document: ReviewDocument) -> str:
     if document.state == "done" and (covered or 0) < (coverable or 0):
         cells = f"{covered} of {coverable} cells{zones} covered"
         return f"not complete: the mission was done with {cells}"
+    if orders := [order for order in document.orders if order.ended_by]:
+        ended = f"ended by the command {orders[-1].ended_by} at {clock(orders[-1].until_s)}"
+        return f"not complete: {ended}"
     how = "ended" if document.is_ended else "broke off"
     swept = f"; {floor}{zones} swept" if zones and floor else ""
     return f"not complete: the recording {how} while the mission was {document.state}{swept}"

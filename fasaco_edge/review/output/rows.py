@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 # Keys of the settings shown; the run card and the JSON document have all.
 CARD_SETTINGS = ("planner.name", "robot.tool_width_m", "robot.radius_m", "planner.seed")
-MOST_PLACES = 2
-# Least distance without poses that is shown [m].
-LEAST_LOST_M = 1.0
+MOST_PLACES, MOST_COMMANDS = 2, 6
+# Least distance without poses [m], and least time in a state [s], that are shown.
+LEAST_LOST_M, LEAST_STATE_S = 1.0, 0.1
 
 Rows = Sequence[tuple[str, ...]]
 
@@ -150,10 +150,11 @@ def screen_rows(review: Review, document: ReviewDocument) -> list[tuple[str, str
         ("not reached", _some(unreached)),
         ("troubles", _some(troubles)),
         ("poses", _lost_way(review)),
-        ("commands", _some(commands)),
+        ("commands", _some(commands, MOST_COMMANDS)),
         ("rooms", _shares(document)),
         ("charges", _some(charges)),
         ("driven", amount(document.driven_m, "m")),
+        ("time", _times(document)),
         ("stood", _stood(document)),
         ("replans", replans),
         (
@@ -188,6 +189,13 @@ def _stood(document: ReviewDocument) -> str:
     return f"longest {stand.seconds:.1f} s {at}: {', '.join(stand.states)}"
 
 
+def _times(document: ReviewDocument) -> str:
+    """Return the time in each state, the longest first; "" if there was one state only."""
+    longest = sorted(document.states.items(), key=lambda each: -each[1])
+    shown = [f"{name} {clock(seconds)}" for name, seconds in longest if seconds >= LEAST_STATE_S]
+    return ", ".join(shown) if len(shown) > 1 else ""
+
+
 def _processor(document: ReviewDocument) -> str:
     daemon, recorder = document.processor_s, document.recorder_processor_s
     if not daemon:
@@ -198,9 +206,9 @@ def _processor(document: ReviewDocument) -> str:
     return text if recorder is None else f"{text}, recorder {amount(recorder, 's')}"
 
 
-def _some(texts: Sequence[str]) -> str:
-    more = f"; {len(texts) - MOST_PLACES} more" if len(texts) > MOST_PLACES else ""
-    return "; ".join(texts[:MOST_PLACES]) + more
+def _some(texts: Sequence[str], most: int = MOST_PLACES) -> str:
+    more = f"; {len(texts) - most} more" if len(texts) > most else ""
+    return "; ".join(texts[:most]) + more
 
 
 def _swept(review: Review, document: ReviewDocument) -> str:
@@ -208,9 +216,10 @@ def _swept(review: Review, document: ReviewDocument) -> str:
     orders = document.orders
     counted = review.data.ledger_floor
     if not text and counted is not None and counted.reached_m2 is not None:
-        reachable_m2 = counted.reachable_m2 or 0.0
-        text, by = swept_words(counted.reached_m2, reachable_m2), "the daemon's count"
-        orders, share = orders[-1:], "of these"
+        text = f"{counted.swept_m2:,.1f} m2"
+        if counted.reachable_m2:
+            text = swept_words(counted.reached_m2, counted.reachable_m2)
+        by, orders, share = "the daemon's count", orders[-1:], "of these"
     if not text:
         return NOT_KNOWN
     before_m2 = document.swept_before_m2
@@ -275,7 +284,7 @@ def charge_rows(document: ReviewDocument) -> list[tuple[str, str, str]]:
             clock(charge.at_s),
             clock(charge.seconds),
             " to ".join(
-                NOT_KNOWN if level is None else f"{100 * level:.0f} %"
+                NOT_KNOWN if level is None else percent(level, 0)
                 for level in (charge.level_from, charge.level_to)
             ),
         )
