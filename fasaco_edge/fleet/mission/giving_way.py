@@ -206,13 +206,13 @@ class GivingWay(Waiting):
 
     def _note_place(self, here: tuple[float, float], now: float) -> None:
         """Note where the robot is, and since when it has been free to drive on from there."""
-        if not self._free.moves(here, now) and len(self._cells()) < 2:
+        if not self._free.update(here, now) and len(self._cells()) < 2:
             self._free.begin(here, now)
         if self.waits_for:
             self._waited, self._waited_at = self._reason, now
         # A moment without an obstruction does not end a wait.
         has_waited = now - self._waited_at <= STANDS_S
-        if self._stay.moves(here, now) or not has_waited:
+        if self._stay.update(here, now) or not has_waited:
             self._stay.begin(here, now)
             self._failed_refuge = None
 

@@ -131,7 +131,7 @@ class Standing:
         assert self._map.pose is not None
         stamped = self._map.pose
         here, at = (stamped.pose.x, stamped.pose.y), (self._now, stamped.stamp_ns)
-        if self._stay.moves(here, self._now):
+        if self._stay.update(here, self._now):
             self._since_ns, self._had_path, self._tries = stamped.stamp_ns, at, 0
         elif not self._has_path:
             return

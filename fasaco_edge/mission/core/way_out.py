@@ -117,7 +117,7 @@ class WayOut:
         floor, stamped, drives = self._map.ground.floor, self._map.pose, self._route.is_way_out
         assert stamped is not None
         here = stamped.pose.x, stamped.pose.y
-        has_moved = self._stay.moves(here, now)
+        has_moved = self._stay.update(here, now)
         if has_moved:
             self._tries = 0
         waits_s = now - self._stay.since

@@ -171,7 +171,7 @@ class Publication:
             is_way: whether the path is only a way: then nothing waits.
         """
         route, waiting = self._route, self._waiting
-        stands = not self._stay.moves(ahead.here, now) and now - self._stay.since > STANDING_S
+        stands = not self._stay.update(ahead.here, now) and now - self._stay.since > STANDING_S
         if update is None and not len(route.path.cells):
             self._waiting = None
             return None

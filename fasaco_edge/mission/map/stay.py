@@ -29,8 +29,8 @@ class Stay:
         """Return whether a robot at ``here`` (x, y) [m] has left the place."""
         return math.dist(here, self._at) > self._within_m
 
-    def moves(self, here: Point, now: float) -> bool:
-        """Return whether the robot has left; then ``here`` is its place from ``now`` [s] on."""
+    def update(self, here: Point, now: float) -> bool:
+        """Take in the robot's position; return whether ``here`` is a new place."""
         has_left = self.has_left(here)
         if has_left:
             self.begin(here, now)
