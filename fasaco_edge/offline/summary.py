@@ -24,8 +24,8 @@ def rows_of(plan: Plan) -> Rows:
     rows.append(("line", f"driven: {line_words(drive)} ({line})"))
     if floor is not None:
         rows.append(("swept", _swept(floor)))
-    if drive.gap is not None:
-        rows.append(("gap", f"line: {gap_words(drive.seconds, drive.gap)}"))
+        if floor.gap is not None:
+            rows.append(("gap", f"line: {gap_words(floor.seconds, floor.gap)}"))
     if plan.curve_words:
         rows.append(("curve", plan.curve_words))
     if floor is not None and floor.illegal_share:

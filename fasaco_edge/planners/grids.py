@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -96,12 +97,14 @@ def start_point(map_file: Path, truth: OccupancyGrid, radius_m: float) -> tuple[
 def _is_free_around(grid: OccupancyGrid, point: tuple[float, float], radius_m: float) -> bool:
     """Return whether all pixels whose centres are within a radius, or a pixel, are free."""
     geometry = grid.geometry
-    rows, cols = np.ogrid[: geometry.rows, : geometry.cols]
     col, row = geometry.to_pixels(*point)
     if not (0 <= col < geometry.cols and 0 <= row < geometry.rows):
         return False
-    distances_m = np.hypot(cols + 0.5 - col, rows + 0.5 - row) * geometry.resolution
-    around = grid.cells[distances_m <= max(radius_m, geometry.resolution)]
+    radius = max(radius_m / geometry.resolution, 1.0)
+    row0, col0 = max(math.floor(row - radius), 0), max(math.floor(col - radius), 0)
+    part = grid.cells[row0 : math.ceil(row + radius) + 1, col0 : math.ceil(col + radius) + 1]
+    rows, cols = np.ogrid[: part.shape[0], : part.shape[1]]
+    around = part[np.hypot(rows + row0 + 0.5 - row, cols + col0 + 0.5 - col) <= radius]
     return bool(((around >= FREE) & (around <= MAP_FOOTPRINT.free_at_most)).all())
 
 

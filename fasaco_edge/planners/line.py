@@ -135,7 +135,7 @@ class LineSearch:
     one that sweeps most. Each stage then adapts the price of floor.
 
     Attributes:
-        best: the line kept; None until the first stage is over.
+        best: the line kept; None until the first stage is over, or ``keep`` is called in it.
         stages: number of stages that are over.
     """
 

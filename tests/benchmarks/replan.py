@@ -143,10 +143,7 @@ def _timed_parts() -> tuple[tuple[str, type | ModuleType, str], ...]:
 
 @contextmanager
 def _charged(parts: Parts, name: str, owner: type | ModuleType, method: str) -> Iterator[None]:
-    before: Callable[..., Any] | None = owner.__dict__.get(method)
-    if before is None:
-        yield
-        return
+    before: Callable[..., Any] = owner.__dict__[method]
 
     def timed(*args: Any, **kwargs: Any) -> Any:
         parts.enter(name)

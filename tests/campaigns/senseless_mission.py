@@ -369,7 +369,7 @@ class MissionTrial:
 
     def _check_line(self, xy: np.ndarray[Any, Any], reason: str) -> None:
         """Check that a line leads over places where the robot may be."""
-        floor, grid = self._mission.map.floor, self._mission.map.grid
+        floor, grid = self._mission.map.ground.floor, self._mission.map.grid
         assert floor is not None
         assert grid is not None
         _hold(bool(np.isfinite(xy).all()), "a line that leads nowhere")

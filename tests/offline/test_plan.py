@@ -190,6 +190,14 @@ def test_a_summary_names_the_size_of_the_map():
     assert ", 1 cell of " in dict(rows_of(cell))["map"]
 
 
+def test_the_bound_of_a_coverage_grid_is_that_of_its_walk():
+    """A row gap called it a time without turns, although the bound counts turns."""
+    planned = fe.plan(fe.load_map(np.ones((4, 5), bool)), search=QUICK)
+    assert planned.drive.turns > 0
+    assert "gap" not in (rows := dict(rows_of(planned)))
+    assert rows["walk"].endswith(", at most 0.0 % above its bound")
+
+
 def test_a_plan_is_one_line_of_text_and_a_picture():
     office = fe.load_map("office")
     planned = fe.plan(office, search=QUICK)

@@ -5,7 +5,9 @@ import signal
 import subprocess
 import threading
 import time
+import tracemalloc
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +17,9 @@ from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
 from fasaco_edge.cli import main
 from fasaco_edge.errors import BadConfiguration, BusUnavailable
-from fasaco_edge.grid.geometry import Pose2D
+from fasaco_edge.grid.geometry import GridGeometry, Pose2D
+from fasaco_edge.grid.occupancy import OccupancyGrid
+from fasaco_edge.planners.grids import start_point
 from fasaco_edge.simulation.node import Pace, run_simulation
 from fasaco_edge.simulation.robot import SimulationConfig
 from fasaco_edge.simulation.world import Activity, World
@@ -196,6 +200,18 @@ def test_the_robot_is_that_of_the_configuration(tmp_path, monkeypatch):
     pose = started[0][0].pose
     assert 0.3 < pose.x < 1.0
     assert 0.3 < pose.y < 1.0
+
+
+def test_a_start_on_a_large_map_takes_no_memory():
+    """Distances of all pixels took 216 MB on a map of 25 million."""
+    geometry = GridGeometry(2000, 2000, 0.05, Pose2D(-50.0, -50.0))
+    hall = OccupancyGrid(geometry, np.zeros((2000, 2000), np.int8))
+    tracemalloc.start()
+    try:
+        assert start_point(Path("hall.yaml"), hall, 0.18) == (0.0, 0.0)
+        assert tracemalloc.get_traced_memory()[1] < 4e6
+    finally:
+        tracemalloc.stop()
 
 
 def test_it_waits_for_a_bus_that_is_not_there_yet():

@@ -194,8 +194,8 @@ class Loop:
     ) -> None:
         """Let another mission continue from the ledger, as after a restart of the daemon.
 
-        The turn log ends with ``why``. ``newest_inputs``: the first events; None for the present
-        map and pose.
+        The turn log ends with ``why``. ``held``: the first events; None for the present map and
+        pose.
         """
         self._ports.turns.end(why)
         if config is not None:

@@ -18,9 +18,9 @@ class OthersCells:
     """The cells that other robots have swept, a part of the ledger; here none.
 
     A robot that has left its fleet keeps the cells that others had swept, in case it joins again.
-    Once it forgets cells of its own, it drops all others, too: else forgotten cells that others had
-    swept would still count. The ledger calls ``record_forgotten`` with ``clear``,
-    ``leave_building`` and ``reset``, too.
+    Once it forgets cells of its own, it drops those of others, too: else a forgotten cell that
+    another robot had swept would still count. The ledger calls ``record_forgotten`` also where it
+    calls ``clear``, ``leave_building`` or ``reset``.
 
     Attributes:
         version: counter of changes.
