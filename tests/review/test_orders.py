@@ -143,6 +143,18 @@ def test_a_cancelled_order_is_over(command):
     assert verdicts(document) == [(False, said)]
 
 
+def test_an_order_that_was_done_is_not_ended_by_a_later_command():
+    (order,) = told(
+        (0, "covering", 0, 9),
+        (10, "done", 8, 9),
+        (21, "idle", 8, 9),
+        commands=[(20, "cancel", ALL)],
+    )
+    document = ReviewDocument(complete=order.complete, state="idle", orders=[order])
+    said = "not complete: the mission was done with 8 of 9 cells covered"
+    assert verdicts(document) == [(False, said)]
+
+
 def test_a_command_names_what_it_changes():
     rug = KeepOut("rug", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)))
     commands = [
