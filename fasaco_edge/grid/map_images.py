@@ -148,8 +148,10 @@ def read_image(path: Path, most_bytes: int | None = None) -> MapImage:
             f"{path}: not an image (PGM, PNG, BMP or JPEG)", hint="save it as PGM or PNG"
         ) from error
     except (OSError, ValueError, SyntaxError) as error:
+        # Other errors than the system's and those of short files are about Pillow's own code.
+        why = str(error) if isinstance(error, OSError) else "its content is damaged"
         raise MapFileError(
-            f"{path}: not readable as an image: {error}",
+            f"{path}: not readable as an image: {why}",
             hint="see that the file is whole and may be read; save or copy it again",
         ) from error
 

@@ -103,6 +103,19 @@ def misfits(held: object, error: type[_Error], key: str = "") -> Iterator[_Error
                 yield from misfits(item, error, f"{key}[{index}]")
 
 
+# What msgspec calls types and bounds, in words; and what texts and lists consist of.
+_KINDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "a text",
+    "bool": "true or false",
+    "array": "a list",
+    "object": "a mapping",
+}
+_BOUNDS = {">=": "of at least", "<=": "of at most", ">": "above", "<": "below"}
+_ITEMS = {"str": "letters", "array": "items"}
+
+
 class _Reader:
     """Converts a document of type ``root`` part by part, and collects the faults."""
 
@@ -140,7 +153,7 @@ class _Reader:
     def _members(self, kind: type[msgspec.Struct], value: dict[Any, object], key: str) -> _Value:
         fields = {field.encode_name: field for field in structs.fields(kind)}
         if any(not isinstance(name, str) for name in value):
-            self._add(key, f"expected str as key, got {shown(value)}")
+            self._add(key, f"expected a text as key, got {shown(value)}")
         is_open = getattr(kind, "is_open", False)
         misspelt: set[str] = set()
         for name in (each for each in value if isinstance(each, str) and each not in fields):
@@ -223,7 +236,24 @@ def _expected(kind: _Kind, expected: str) -> str:
         words += ["a number"] if float in arms else []
         return "expected " + " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
     # YAML 1.1 takes 8:1 for a number.
-    return f"{expected}, in quotes" if expected == "expected str" else expected
+    return _in_words(expected) + (", in quotes" if expected == "expected str" else "")
+
+
+def _in_words(expected: str) -> str:
+    """Return what msgspec expected, such as "expected float > 0.0 | null", in words."""
+    if not expected.startswith("expected "):
+        return expected
+    arms = []
+    for arm in expected.removeprefix("expected ").split(" | "):
+        kind, _, bound = arm.partition(" ")
+        sign, _, limit = bound.removeprefix("of length ").rpartition(" ")
+        words = [_KINDS.get(kind, kind)]
+        if bound:
+            words += [_BOUNDS.get(sign, sign or "of"), limit.removesuffix(".0")]
+        if bound.startswith("of length "):
+            words.append(_ITEMS[kind].removesuffix("s" * (limit == "1")))
+        arms.append(" ".join(words))
+    return "expected " + " or ".join(arms)
 
 
 def _misfit(message: str, value: _Value) -> tuple[str, str, object]:

@@ -32,9 +32,9 @@ ros2: {domain: x}
 """
 TOLD = [
     (2, "robot.radius", "robot.radius: unknown key; did you mean robot.radius_m?"),
-    (3, "robot.tool_width_m", "robot.tool_width_m: expected float <= 10.0, got 20"),
+    (3, "robot.tool_width_m", "robot.tool_width_m: expected a number of at most 10, got 20"),
     (4, "robots", "robots: unknown key; did you mean robot?"),
-    (6, "bus.listen[1]", "bus.listen[1]: expected str, in quotes, got 7447"),
+    (6, "bus.listen[1]", "bus.listen[1]: expected a text, in quotes, got 7447"),
     (7, "bus.speed_m_s", "bus.speed_m_s: unknown key; did you mean robot.speed_m_s?"),
     (8, "bus.mode", "bus.mode: expected peer, client or router, got 'dealer'"),
     (
@@ -43,7 +43,7 @@ TOLD = [
         "bus.security.tls.colour: unknown key; there are root_ca, certificate, private_key",
     ),
     (12, "planner.ants", "planner.ants: is given twice, in line 11 and in line 12"),
-    (13, "ros2.domain", "ros2.domain: expected int, got 'x'"),
+    (13, "ros2.domain", "ros2.domain: expected a whole number, got 'x'"),
     (13, "ros2.kind", "ros2.kind: missing"),
 ]
 TOGETHER = """\
@@ -125,7 +125,7 @@ def test_one_round_names_what_is_wrong_with_every_zone(check):
         ("a: [", None, "not plain YAML"),
         ("a: &a {b: *a}", None, "not plain YAML: line 1: *a refers to nothing, or to itself"),
         ("x: &r {name: r2}\nrobot: *r", 1, "x: unknown key; there are robot, bus"),
-        ("[1, 2]", None, "expected object, got [1, 2]"),
+        ("[1, 2]", None, "expected a mapping, got [1, 2]"),
         ("robot: {name: " + "x" * 9999 + "/}", 1, "robot.name: must be chunks"),
     ],
     ids=["no YAML", "in itself", "an alias", "a list", "a book"],

@@ -65,13 +65,17 @@ def folder(tmp_path, monkeypatch):
         ("plan good.npy --end 6,0", 1, "end cell (6, 0) lies outside rows 0..5"),
         ("plan blocked.npy --end 2,2", 1, "end cell (2, 2) is blocked"),
         ("plan halves.npy --end 5,5", 1, "no walk leads from start cell (0, 0) to end cell (5, 5)"),
-        ("plan good.npy --speed-m-s 0", 78, "--speed-m-s: expected float > 0.0, got 0.0"),
-        ("plan good.npy --turn-s -1", 78, "--turn-s: expected float >= 0.0, got -1.0"),
+        ("plan good.npy --speed-m-s 0", 78, "--speed-m-s: expected a number above 0, got 0.0"),
+        ("plan good.npy --turn-s -1", 78, "--turn-s: expected a number of at least 0, got -1.0"),
         ("plan good.npy --cell 1e-5", 78, "cell_m / speed_m_s: must be in [0.001, 3600] s"),
         ("plan good.npy --budget 0", 78, "budget must be finite and above 0 s, got 0.0"),
         ("plan office --cell 0.0001", 1, "exceeds 4000000 cells"),
-        ("plan office --cell 0", 78, "--cell: expected float > 0.0, got 0.0"),
-        ("plan office --robot-radius -1", 78, "--robot-radius: expected float > 0.0, got -1.0"),
+        ("plan office --cell 0", 78, "--cell: expected a number above 0, got 0.0"),
+        (
+            "plan office --robot-radius -1",
+            78,
+            "--robot-radius: expected a number above 0, got -1.0",
+        ),
         ("plan good.npy --ants 0", 78, "ants: must be in 8..1000000"),
         ("plan good.npy --ants 7", 78, "one for each cohort at least, got 7"),
         ("plan good.npy --velocities 8:x", 78, "velocities: must look like 8:1, 1:8, 4 or 8,4,1"),
@@ -111,7 +115,7 @@ def folder(tmp_path, monkeypatch):
         (
             f"record --out . --quota-mb -5 --connect {NOBODY}",
             78,
-            "--quota-mb: expected int >= 0, got -5",
+            "--quota-mb: expected a whole number of at least 0, got -5",
         ),
         (
             f"record --out . --quota-mb 100 --connect {NOBODY}",
@@ -286,7 +290,7 @@ def test_a_demo_whose_daemon_refuses_shows_why(folder):
     ended = fasaco_edge("demo", "--map", "office", "--cell", 20, "--out", "o")
     assert ended.code == 1
     assert "the daemon ended with 78" in ended.err
-    assert "robot.tool_width_m: expected float <= 10.0, got 20.0" in ended.err
+    assert "robot.tool_width_m: expected a number of at most 10, got 20.0" in ended.err
 
 
 def test_a_recorder_without_a_folder_is_an_error(folder):

@@ -401,11 +401,11 @@ def test_a_line_is_quicker_for_who_says_how_the_robot_turns(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("--speed-m-s -1", "--speed-m-s: expected float > 0.0, got -1.0"),
-        ("--turn-s -1", "--turn-s: expected float >= 0.0, got -1.0"),
-        *((f"--clearance={m}", "--clearance: expected float") for m in ("1.1", "-0.1", "nan")),
-        *((f"--overlap={m}", "--overlap: expected float") for m in ("0.9", "-0.1", "nan")),
-        *((f"--turn-radius={m}", "--turn-radius: expected float") for m in ("21", "-1", "nan")),
+        ("--speed-m-s -1", "--speed-m-s: expected a number above 0, got -1.0"),
+        ("--turn-s -1", "--turn-s: expected a number of at least 0, got -1.0"),
+        *((f"--clearance={m}", "--clearance: expected a number") for m in ("1.1", "-0.1", "nan")),
+        *((f"--overlap={m}", "--overlap: expected a number") for m in ("0.9", "-0.1", "nan")),
+        *((f"--turn-radius={m}", "--turn-radius: expected a number") for m in ("21", "-1", "nan")),
         ("--line cells --turn-radius 0.3", "only has turns on the spot"),
         ("--swept 1.5", "swept must be a share in (0, 1], such as 0.99, got 1.5"),
         *((f"--line cells --align {to}", "line over the floor") for to in ("walls", "30")),

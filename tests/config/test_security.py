@@ -176,7 +176,10 @@ def user(**more):
         ({"security": {"kind": "tsl"}}, "bus.security.kind: expected none, tls or user"),
         ({"security": {"roles": {"admin": []}}}, "bus.security.roles.admin: unknown key"),
         ({"security": {"roles": {"viewer": [""]}}}, "bus.security.roles.viewer[0]"),
-        ({"security": {"limits": {"maps_hz": 0}}}, "bus.security.limits.maps_hz: expected float"),
+        (
+            {"security": {"limits": {"maps_hz": 0}}},
+            "bus.security.limits.maps_hz: expected a number",
+        ),
         (
             {
                 "listen": ["tls/0.0.0.0:1"],

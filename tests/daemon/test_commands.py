@@ -284,7 +284,7 @@ def begin_idle(outsider: Outsider) -> None:
             ("start", "--order", "order.yaml", "--passes", "2"),
             "--order must be the only option for the order, got --passe",
         ),
-        (("start", "--passes", "0"), "passes: expected int >= 1, got 0"),
+        (("start", "--passes", "0"), "passes: expected a whole number of at least 1, got 0"),
         (("start", "--zone", "a:0,0;1,1;1,0;0,1"), "zones[0].polygon: crosses or touches itself"),
         (("start", "--zone", "a:0,0;1,0;nan,1"), "zones[0].polygon[2]: must be finite"),
         (("status",), "cannot connect to tcp/127.0.0.1:1\n"),

@@ -94,14 +94,14 @@ def test_changeable_and_other_keys_are_separated():
 
 def test_an_invalid_file_changes_nothing(caplog):
     def read() -> DaemonConfig:
-        first = BadConfiguration("expected int, got 'many'", key="planner.ants")
+        first = BadConfiguration("expected a whole number, got 'many'", key="planner.ants")
         raise together([first, OpenToEveryone("anybody may join", key="bus.listen[0]")])
 
     reload = Reload(read, ServiceManager({}))
     reload.asked.set()
     taken, faults = taken_by(reload)
     assert taken == RUNNING
-    said = ["planner.ants: expected int, got 'many'", "bus.listen[0]: anybody may join"]
+    said = ["planner.ants: expected a whole number, got 'many'", "bus.listen[0]: anybody may join"]
     assert [str(fault) for fault in faults] == said
     assert all(
         f"configuration refused, the previous one stays in force: {s}" in caplog.text for s in said

@@ -62,7 +62,7 @@ def test_an_invalid_configuration_is_not_retried(service: Service):
     time.sleep(2.5)  # RestartSec= is 2
     assert service.show("ActiveState") == "failed"
     assert service.show("NRestarts") == "0"
-    assert "planner.ants: expected int, got 'many'" in service.text()
+    assert "planner.ants: expected a whole number, got 'many'" in service.text()
 
 
 def test_the_service_restarts_after_any_end(service: Service):

@@ -190,21 +190,21 @@ def test_alpha_does_not_matter_to_raw_values(tmp_path):
     ("changes", "expected"),
     [
         ({"mode": "binary"}, "mode: expected trinary, scale or raw, got 'binary'"),
-        ({"occupied_thresh": 1.5}, "occupied_thresh: expected float <= 1.0, got 1.5"),
-        ({"free_thresh": -0.1}, "free_thresh: expected float >= 0.0, got -0.1"),
+        ({"occupied_thresh": 1.5}, "occupied_thresh: expected a number of at most 1, got 1.5"),
+        ({"free_thresh": -0.1}, "free_thresh: expected a number of at least 0, got -0.1"),
         ({"free_thresh": 0.7}, "free_thresh: must be less than occupied_thresh, 0.65, got 0.7"),
-        ({"free_thresh": "low"}, "free_thresh: expected float, got 'low'"),
-        ({"resolution": math.nan}, "resolution: expected float >= 0.0001, got nan"),
-        ({"resolution": 1e300}, "expected float <= 100.0, got 1e+300"),
-        ({"resolution": [["lol"] * 9] * 9}, "resolution: expected float, got [['lol', "),
-        ({"origin": [1e300, 0, 0]}, "origin[0]: expected float <= 20000000.0, got 1e+300"),
-        ({"origin": [0, 0, 1e300]}, "origin[2]: expected float <= 20000000.0"),
+        ({"free_thresh": "low"}, "free_thresh: expected a number, got 'low'"),
+        ({"resolution": math.nan}, "resolution: expected a number of at least 0.0001, got nan"),
+        ({"resolution": 1e300}, "expected a number of at most 100, got 1e+300"),
+        ({"resolution": [["lol"] * 9] * 9}, "resolution: expected a number, got [['lol', "),
+        ({"origin": [1e300, 0, 0]}, "origin[0]: expected a number of at most 20000000, got 1e+300"),
+        ({"origin": [0, 0, 1e300]}, "origin[2]: expected a number of at most 20000000"),
         ({"mode": "\x1b[2J"}, r"got '\x1b[2J'"),
-        ({"origin": [0, 0]}, "origin: expected array of length 3, got [0, 0]"),
-        ({"origin": "here"}, "origin: expected array, got 'here'"),
-        ({"origin": [0, 0, math.inf]}, "origin[2]: expected float <= 20000000.0, got inf"),
+        ({"origin": [0, 0]}, "origin: expected a list of 3 items, got [0, 0]"),
+        ({"origin": "here"}, "origin: expected a list, got 'here'"),
+        ({"origin": [0, 0, math.inf]}, "origin[2]: expected a number of at most 20000000, got inf"),
         ({"negate": "maybe"}, "negate: expected 0 or 1, got 'maybe'"),
-        ({"image": ""}, "image: expected str of length >= 1, got ''"),
+        ({"image": ""}, "image: expected a text of at least 1 letter, got ''"),
         ({"image": "none.pgm"}, "image: no file"),
     ],
 )
@@ -230,7 +230,7 @@ def test_missing_keys_are_named(tmp_path, key):
     [
         ("resolutoin: 0.05", "resolutoin: unknown key; did you mean resolution?"),
         ("", "image: missing"),
-        ("- a", "expected object, got ['a']"),
+        ("- a", "expected a mapping, got ['a']"),
     ],
 )
 def test_an_incomplete_map_file_error_lists_its_keys(tmp_path, text, said):
@@ -265,7 +265,7 @@ def test_all_keys_are_judged_at_once(tmp_path):
         *((None, "negate"), (1, "image"), (2, "resolution"), (3, "origin")),
         *((4, "ocupied_thresh"), (6, "mode")),
     ]
-    assert "expected float with a decimal point, got '0,05'" in faults[2].what
+    assert "expected a number with a decimal point, got '0,05'" in faults[2].what
     assert faults[5].hint == "mode is trinary for maps of map_saver"
 
 

@@ -345,7 +345,7 @@ def test_documents_are_read_as_they_were_written():
         ({"command": "room_split", "room": {"id": 3}}, "room.cut: missing with room_split"),
         (
             {"command": "room_split", "room": {"id": 3, "cut": [[0, 0]]}},
-            "room.cut: expected array of length >= 2",
+            "room.cut: expected a list of at least 2 items",
         ),
         (
             {"command": "room_split", "room": {"id": 3, "cut": [[0, 0], [math.inf, 0]]}},
