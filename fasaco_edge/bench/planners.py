@@ -193,7 +193,7 @@ def _report(args: argparse.Namespace, runs: Sequence[Run]) -> Report:
             "grids": figures,
         },
         remarks=(
-            "medians over the seeds, below them their range; n_r_paper: revisits including the "
+            "medians over the seeds (with their range); n_r_paper: revisits including the "
             "way home, as in the paper's Table I",
         ),
         further=tuple(others),
@@ -246,7 +246,7 @@ def _failed(row: dict[str, Any]) -> str:
 
 def _range(spread: dict[str, float]) -> str:
     median, low, high = (spread[name] for name in ("median", "low", "high"))
-    return f"{median:g}" if low == high else f"{median:g}\n{low:g}-{high:g}"
+    return f"{median:g}" if low == high else f"{median:g}\n({low:g}-{high:g})"
 
 
 PLANNERS = Benchmark(

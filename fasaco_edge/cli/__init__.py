@@ -125,9 +125,10 @@ def _parser(words: Sequence[str]) -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"fasaco-edge {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    first = next((word for word in words if not word.startswith("-")), "")
     for name, about in COMMANDS.items():
         described = commands.add_parser(name, help=about)
-        if name in words[:1]:
+        if name == first:
             module = import_module(f"fasaco_edge.cli.{name.replace('-', '_')}")
             _describe(described, module.COMMAND)
     return parser

@@ -146,8 +146,8 @@ def _print_table(console: Console, shown: ResultTable) -> None:
         console.print(Text(shown.title, "bold"))
         for row in shown.rows:
             figures = zip(shown.header[1:], row[1:], strict=True)
-            words = ", ".join(f"{name.replace(chr(10), ' ')} {value}" for name, value in figures)
-            console.print(Text.assemble((row[0], "cyan"), f": {words}"))
+            words = ", ".join(f"{name} {value}" for name, value in figures)
+            console.print(Text.assemble((row[0], "cyan"), f": {words}".replace("\n", " ")))
         return
     usual, console.width = console.width, max(console.width, least)
     console.print(table)

@@ -38,6 +38,7 @@ STDIN = 0
 # Default of ros2.nav2.near_m, as a share of the tool's width: less than the distance of two lanes,
 # and more than a robot's distance from its lane.
 NEAR_SHARE = 0.75
+MOST_PACE = 100.0
 EPILOG = """\
 Speeds and accelerations are those of the configuration: robot.speed_m_s, acceleration_m_s2,
 turn_deg_s, turn_deg_s2, steered_deg and turn_radius_m. If the configuration has a block ros2, poses
@@ -101,9 +102,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed",
         type=float,
-        default=1.0,
         metavar="X",
-        help="simulated seconds per second, for a simulated robot (default: %(default)g)",
+        help="simulated seconds per second, for a simulated robot (default: robot.time_scale of "
+        "--config, else 1)",
     )
     add_robot_on_bus(parser)
     parser.add_argument("--given", action="store_true", help=argparse.SUPPRESS)
@@ -116,8 +117,6 @@ def run(args: argparse.Namespace) -> int:
 
 def _become_small(args: argparse.Namespace) -> NoReturn:
     """Read the settings, and replace the process by a small one that drives."""
-    if not 0.0 < args.speed <= 100.0:
-        raise BadConfiguration(f"--speed must be above 0 and at most 100, got {args.speed}")
     document = settings_of(args).encode()
     # The settings may hold a password, and other users can read a command line: use a pipe.
     reading, writing = os.pipe()
@@ -183,9 +182,18 @@ def settings_of(args: argparse.Namespace) -> FollowSettings:
         nav2=_nav2(config) if ros and ros.follow == "nav2" else {},
         scan=_scan(config) if config.scan and not (ros and ros.follow == "nav2") else {},
         radius_m=robot.radius_m,
-        pace=args.speed,
+        pace=_pace(args, robot),
         dry_run=args.dry_run,
     )
+
+
+def _pace(args: argparse.Namespace, robot: RobotConfig) -> float:
+    """Return the seconds of the robot per second, as ``simulate`` has them."""
+    pace = robot.time_scale if args.speed is None else args.speed
+    if not 0.0 < pace <= MOST_PACE:
+        where = "robot.time_scale" if args.speed is None else "--speed"
+        raise BadConfiguration(f"{where} must be above 0 and at most {MOST_PACE:g}, got {pace:g}")
+    return pace
 
 
 def limits_of(robot: RobotConfig) -> BaseLimits:

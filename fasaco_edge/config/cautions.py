@@ -95,12 +95,12 @@ def _planner(config: DaemonConfig) -> Iterator[str]:
             "planner.name fasaco is the paper's colony, without local search; the default is "
             "colony-search, which had that name before 1.0.0"
         )
-    if planner.name == "colony-search":
-        of_colonies = "ants", "visibility", "threads"
-        changed = [key for key in of_colonies if getattr(planner, key) != getattr(usual, key)]
+    if planner.name not in ("fasaco", "aco"):
+        of_these = "ants", "visibility", "threads"
+        changed = [key for key in of_these if getattr(planner, key) != getattr(usual, key)]
         if changed:
             keys = ", ".join(f"planner.{key}" for key in changed)
-            yield f"no effect where planner.name is colony-search: {keys}"
+            yield f"no effect where planner.name is {planner.name}: {keys}"
     if planner.line == "cells":
         idle = ["planner.align"] if planner.align != usual.align else []
         idle += ["robot.overlap"] if config.robot.overlap != RobotConfig().overlap else []

@@ -97,7 +97,8 @@ def session(context: CheckContext) -> Finding:
             return fail(f"{endpoint}: no daemon can listen there: {why}", to_do)
         else:
             details.append(f"{endpoint}: free")
-    silent = [endpoint for endpoint in bus.connect if answers(endpoint) is False]
+    answered = {endpoint: answers(endpoint) for endpoint in bus.connect}
+    silent = [endpoint for endpoint, does in answered.items() if does is False]
     details += [f"{endpoint}: no answer" for endpoint in silent]
     if len(silent) == len(bus.connect) > 0:
         # A client with credentials exits, as these may be wrong; systemd restarts it.
@@ -106,9 +107,10 @@ def session(context: CheckContext) -> Finding:
         found = f"no answer at {', '.join(silent)}: the daemon {then}"
         return make(found, "start the router there, or correct bus.connect", details)
     if not is_taken:
-        there = ", ".join(endpoint for endpoint in bus.connect if endpoint not in silent)
-        found = "the endpoints are free" if bus.listen else f"{there}: a program listens there"
-        return ok(found, details)
+        listening = [endpoint for endpoint, does in answered.items() if does]
+        where, who = ", ".join(listening or bus.connect), "a program listens there"
+        found = f"{where}: {'' if listening else 'only a connection shows whether '}{who}"
+        return ok("the endpoints are free" if bus.listen else found, details)
     try:
         with _joined(context) as joined:
             met = " and ".join(joined.met()) or "no other session"

@@ -67,8 +67,8 @@ class ReviewDocument(msgspec.Struct):
         orders: each order: ordered (`command`, or `itself` for an order without a command), at_s,
             until_s, ended_by (`start` of another order, `cancel`, `reset`; null for the end of the
             recording), state, complete, covered_cells, coverable_cells, order (its content; null if
-            not recorded), replans, paused_s, driven_m, and unreached: areas not covered at its end,
-            with cells, m2, place (x, y) [m] and reason.
+            not recorded), replans (without its first plan), paused_s, driven_m, and unreached:
+            areas not covered at its end, with cells, m2, place (x, y) [m] and reason.
         commands: each received command: at_s, command (as text).
         rooms: each room, with its outline at the end: room (its number), name, area_m2, seconds
             (of work in it, standstill included, pauses and charging excluded), entered (how often

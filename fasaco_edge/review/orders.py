@@ -194,6 +194,7 @@ def _chapter(
         if span.name == "paused"
     )
     times = data.times[1:]
+    paths = [path for path in data.paths if begin_s <= path.at_s < until]
     zones = _zones(data, begin_s, until)
     return OrderChapter(
         ordered,
@@ -205,7 +206,7 @@ def _chapter(
         covered,
         coverable,
         order=_document(order) if order else _by_zones(zones),
-        replans=sum(begin_s <= path.at_s < until for path in Replans.of(data.paths).later),
+        replans=len(Replans.of(paths).later),
         paused_s=round(paused_s, 3),
         driven_m=round(float(data.ways_m[(times >= begin_s) & (times < until)].sum()), 2),
         unreached=list(statuses[-1].mission.unreached.areas) if statuses else [],

@@ -14,7 +14,7 @@ from fasaco_edge.client.robot_state import RobotState
 from fasaco_edge.grid.geometry import Bounds, Polygon
 from fasaco_edge.grid.label_place import label_place
 from fasaco_edge.serve import plain
-from fasaco_edge.serve.last_order import again, order_of, rooms_of
+from fasaco_edge.serve.last_order import again, order_of, room_of, rooms_of
 from fasaco_edge.wire.documents.json_text import Corners
 from fasaco_edge.wire.documents.replies import FloorReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.rooms import RoomReport, Rooms
@@ -143,7 +143,7 @@ def _mission(view: RobotState, status: Status) -> Digest:
                 "name": zone.name,
                 "pass": zone.pass_number,
                 "passes": zone.passes,
-                "share": _share(zone, rooms.get(zone.name), status),
+                "share": _share(zone, room_of(zone, rooms), status),
             }
             for zone in mission.zones[:MOST_AREAS]
         ],

@@ -5,8 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from fasaco_edge.client.robot_state import RobotState
-from fasaco_edge.wire.documents.replies import MissionReport
+from fasaco_edge.grid.geometry import polygon_bounds
+from fasaco_edge.wire.documents.replies import MissionReport, ZoneReport
 from fasaco_edge.wire.documents.rooms import RoomReport
+
+# An area is the room of its name if their bounds differ by less [m]: outlines change as maps grow.
+NEAR_M = 0.5
 
 
 def rooms_of(view: RobotState) -> dict[str, RoomReport]:
@@ -15,18 +19,27 @@ def rooms_of(view: RobotState) -> dict[str, RoomReport]:
     return {room.title: room for room in view.rooms.rooms if room.title not in standing}
 
 
+def room_of(zone: ZoneReport, rooms: dict[str, RoomReport]) -> RoomReport | None:
+    """Return the room that a zone of an order is; None for an area, also with a room's name."""
+    room = rooms.get(zone.name)
+    if room is None or not (zone.polygon and room.outline):
+        return room
+    bounds = zip(polygon_bounds(zone.polygon), polygon_bounds(room.outline), strict=True)
+    return room if all(abs(one - other) < NEAR_M for one, other in bounds) else None
+
+
 def order_of(view: RobotState, mission: MissionReport) -> dict[str, Any] | None:
     """Return the order in a status, for an order commanded before this server began; else None.
 
-    A zone with the name of a room is that room. The status has the number of passes, not their
-    kinds.
+    A zone with name and bounds of a room is that room. The status has the number of passes, not
+    their kinds.
     """
     if mission.ordered != "command":
         return None
     rooms, zones = rooms_of(view), list[dict[str, object]]()
     for zone in mission.zones:
         found: dict[str, object] = {"name": zone.name, "passes": zone.passes}
-        if room := rooms.get(zone.name):
+        if room := room_of(zone, rooms):
             found["room"], usual = room.id, room.passes or 1
             if zone.passes == (usual if isinstance(usual, int) else len(usual)):
                 del found["passes"]

@@ -81,7 +81,7 @@ LEFT = {
 """Why floor was left, in the owner's words, by the reason in the status."""
 TRIED, OTHERWISE = "left over after", "for another reason"
 NOT_REACHED = "it could not get there"
-ENDED = "the work was ended before it got there"
+ENDED = "left when the work was ended"
 # Reason of the mission if poses come too seldom, and its words for the owner.
 FAR_APART = "poses are too far apart"
 SELDOM = "it may have missed that: its place was not known often enough"

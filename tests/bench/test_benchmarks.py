@@ -106,7 +106,7 @@ def test_table_shows_brackets_and_the_interruption(capsys):
 
 def test_wide_tables_keep_words_whole(capsys, monkeypatch):
     names = [f"figure{number}" for number in range(20)]
-    wide = Report("wide", ("map", *names), (("flat", *["0.125"] * 20),), {})
+    wide = Report("wide", ("map", *names), (("flat", *["0.125\n(0-1)"] * 20),), {})
     benchmark, _ = counting(1)
     benchmark = replace(benchmark, report=lambda args, samples: wide)
     for is_terminal in (False, True):
@@ -115,6 +115,8 @@ def test_wide_tables_keep_words_whole(capsys, monkeypatch):
         shown = capsys.readouterr().out
         assert all(name in shown for name in names)
         assert shown.count("0.125") == 20
+        # A range is below its median in a table, beside it in a paragraph.
+        assert len(shown.splitlines()) < 20
         assert (max(map(len, shown.splitlines())) <= 80) is is_terminal
 
 

@@ -42,6 +42,7 @@ def said(**sections):
             "colony-search: planner.ants, planner.visibility, planner.threads",
         ),
         ({"planner": {"name": "aco", "ants": 300}}, ""),
+        ({"planner": {"name": "zigzag", "ants": 300}}, "planner.name is zigzag: planner.ants"),
         ({"scan": {"x_m": 0.1}}, ""),
         ({"scan": {"x_m": 3.0, "y_m": 4.0}}, "the lidar is 5 m from the robot's middle"),
         (

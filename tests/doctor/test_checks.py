@@ -342,6 +342,13 @@ def test_a_daemon_is_found_with_what_it_lacks(tmp_path):
         assert len(said) == len(set(said)) > 0
 
 
+def test_a_listener_is_only_claimed_where_it_was_looked_for():
+    """Of endpoints without TCP it said so, too."""
+    client = session.session(at(connect=("udp/127.0.0.1:7999",), mode="client"))
+    only = "only a connection shows whether a program listens there"
+    assert (client.level, client.found) == (Level.OK, f"udp/127.0.0.1:7999: {only}")
+
+
 def test_publishers_are_found_without_a_daemon(tmp_path):
     with (
         daemon_process(tmp_path) as other,

@@ -9,7 +9,8 @@ import yaml
 
 from fasaco_edge.bus.session import open_bus
 from fasaco_edge.bus.settings import BusSettings
-from fasaco_edge.cli import main
+from fasaco_edge.cli import _parser, main
+from fasaco_edge.cli.follow import settings_of
 from fasaco_edge.follow.estimate import VelocityCommand
 from fasaco_edge.grid.geometry import Pose2D, StampedPose
 from fasaco_edge.host.processes import cpu_seconds, own_mb
@@ -34,6 +35,15 @@ def base():
     base = DrivenBase()
     yield base
     base.close()
+
+
+@pytest.mark.parametrize(("words", "pace"), [((), 5.0), (("--speed", "2"), 2.0)])
+def test_its_time_is_that_of_the_configuration(tmp_path, words, pace):
+    """As that of `simulate`: at another one it hit walls."""
+    config = tmp_path / "robot.yaml"
+    config.write_text("robot: {time_scale: 5}")
+    given = ["follow", "--config", str(config), *words]
+    assert settings_of(_parser(given).parse_args(given)).pace == pace
 
 
 def test_it_drives_twenty_times_a_second_and_stays_small(base, tmp_path):

@@ -20,7 +20,8 @@ from fasaco_edge.review.document import MapSize, ReviewDocument
 from fasaco_edge.review.moments import spans_of
 from fasaco_edge.review.orders import OrderChapter, chapters, commands_of, order_words
 from fasaco_edge.review.output.answers import verdicts
-from fasaco_edge.review.run_data import RunData, StatusSample
+from fasaco_edge.review.run_data import PathSample, RunData, StatusSample
+from fasaco_edge.wire.documents.path_documents import PathAttachment
 from fasaco_edge.wire.documents.replies import CoverageReport, MissionReport, ZoneReport
 from fasaco_edge.wire.documents.status import Status
 
@@ -69,6 +70,16 @@ def test_three_orders_have_three_verdicts():
         "order 3, ordered, 0:50.0 to 1:40.0: not complete: done at the end of the recording, "
         "52 of 56 cells",
     ]
+
+
+def test_the_first_plan_of_each_order_is_no_replan():
+    paths = [
+        PathSample(at_s, PathAttachment(revision=revision, planner="colony-search"))
+        for revision, at_s in enumerate((1.0, 5.0, 9.0, 21.0, 25.0), 1)
+    ]
+    states = spans_of([(0.0, "covering", "")], 100.0)
+    data = RunData(paths=paths, commands=received([(20.0, "start", KITCHEN)]))
+    assert [order.replans for order in chapters(data, states, 100.0)] == [2, 1]
 
 
 def test_the_time_of_a_pause_is_rounded():
@@ -129,6 +140,18 @@ def test_a_cancelled_order_is_over(command):
     assert [order.complete for order in orders] == [False, False]
     document = ReviewDocument(complete=False, state="idle", orders=orders[:1])
     said = f"not complete: ended by the command {command} at 0:20.0"
+    assert verdicts(document) == [(False, said)]
+
+
+def test_an_order_that_was_done_is_not_ended_by_a_later_command():
+    (order,) = told(
+        (0, "covering", 0, 9),
+        (10, "done", 8, 9),
+        (21, "idle", 8, 9),
+        commands=[(20, "cancel", ALL)],
+    )
+    document = ReviewDocument(complete=order.complete, state="idle", orders=[order])
+    said = "not complete: the mission was done with 8 of 9 cells covered"
     assert verdicts(document) == [(False, said)]
 
 

@@ -178,9 +178,14 @@ def test_floor_of_a_cancelled_order_is_what_was_swept(review):
     """After a cancel no floor has to be swept: the last report says 0 of 0 m2."""
     counted = FloorReport(swept_m2=3.0, reachable_m2=9.0, left=(FloorLeft(6.0, "on the path"),))
     over = FloorReport(swept_m2=3.5, reachable_m2=0.0, left=())
+    restored = LedgerReport(restored_cells=7)
+    kitchen = MissionReport("command", zones=(ZoneReport("kitchen", 1, 1, 9, 3),))
     floors = [
-        StatusSample(at_s, Status(state=state, floor=floor, ledger=LedgerReport(restored_cells=7)))
-        for at_s, state, floor in ((1.0, "covering", counted), (2.0, "idle", over))
+        StatusSample(at_s, Status(state=state, floor=floor, ledger=restored, mission=mission))
+        for at_s, state, floor, mission in (
+            (1.0, "covering", counted, kitchen),
+            (2.0, "idle", over, MissionReport()),
+        )
     ]
     data = replace(review.data, statuses=[*review.data.statuses, *floors])
     cancelled = review_of(review.record, data, 0)

@@ -282,10 +282,15 @@ def test_a_room_has_one_figure_on_the_map_and_in_the_list_of_the_order():
     tell(view, "status", {"state": "done", "mission": {"zones": zones}}, 2.0)
     found = heard(view, "state", 2.0)["mission"]["zones"]
     assert {zone["name"]: zone["share"] for zone in found} == {"bath": 0.94, "area 1": 1.0}
+    # A corner of the room that was given its name has its own.
+    zones[0]["polygon"] = [[2, 2], [3, 2], [3, 3]]
+    tell(view, "status", {"state": "done", "mission": {"zones": zones}}, 3.0)
+    found = heard(view, "state", 3.0)["mission"]["zones"]
+    assert found[0] == {"name": "bath", "pass": 0, "passes": 1, "share": 1.0}
     # A single zone has that above the list; of one that is not on the map nothing is known.
     left = {"reachable_m2": 4.0, "left": [{"m2": 1.0, "reason": "too narrow"}]}
     for floor, share in ((left, 0.75), ({}, None)):
         alone = {"zones": [{"name": "area 1", "passes": 1}]}
-        tell(view, "status", {"state": "done", "mission": alone, "floor": floor}, 3.0 + (not floor))
-        (zone,) = heard(view, "state", 3.0 + (not floor))["mission"]["zones"]
+        tell(view, "status", {"state": "done", "mission": alone, "floor": floor}, 4.0 + (not floor))
+        (zone,) = heard(view, "state", 4.0 + (not floor))["mission"]["zones"]
         assert zone["share"] == share

@@ -14,6 +14,7 @@ from fasaco_edge.text import suggestion
 
 USAGE = 2
 """Exit code of a wrong command line."""
+_AFTER_COMMAND = "options such as {} come after the command"
 
 
 class Parser(argparse.ArgumentParser):
@@ -58,9 +59,14 @@ class Parser(argparse.ArgumentParser):
         """Print the unknown arguments and a suggestion, and exit."""
         options = [name for name in self._option_string_actions if name.startswith("--")]
         names = [word.partition("=")[0] for word in unknown if word.startswith("-")]
-        meant = suggestion(names[0], options) if names else ""
-        if unknown[0].endswith((".yaml", ".yml")) and "--config" in options:
-            meant = f"did you mean --config {unknown[0]}?"
+        if names and names[0] in options:
+            meant = _AFTER_COMMAND.format(names[0])
+        elif names:
+            meant = suggestion(names[0], options)
+        else:
+            files = [name for name in ("--order", "--config") if name in options]
+            is_file = unknown[0].endswith((".yaml", ".yml"))
+            meant = f"did you mean {files[0]} {unknown[0]}?" if files and is_file else ""
         self.error(f"unrecognized arguments: {' '.join(unknown)}{meant and f'; {meant}'}")
 
     def _get_value(self, action: argparse.Action, arg_string: str) -> Any:  # noqa: ANN401
@@ -79,9 +85,10 @@ class Parser(argparse.ArgumentParser):
         if action.choices is None or value in action.choices:
             return
         names = [str(choice) for choice in action.choices]
-        meant = suggestion(str(value), names) or f"there are {', '.join(names)}"
-        if isinstance(action, argparse._SubParsersAction) and value in self._given:
+        meant = suggestion(str(value), names)
+        if not meant and isinstance(action, argparse._SubParsersAction) and value in self._given:
             before = self._given[max(self._given.index(value) - 1, 0)]
             if before.startswith("-"):
-                meant = f"options such as {before} come after the command"
+                meant = _AFTER_COMMAND.format(before)
+        meant = meant or f"there are {', '.join(names)}"
         raise argparse.ArgumentError(action, f"invalid choice: {value!r}; {meant}")

@@ -49,12 +49,14 @@ def _ending(document: ReviewDocument) -> str:
         return f"complete: every cell{zones} covered" + (swept if floor else "")
     if document.complete is None:
         return "not recorded whether it was completed"
-    covered, coverable = document.covered_cells, document.coverable_cells
-    if document.state == "done" and (covered or 0) < (coverable or 0):
+    commanded = next((order for order in document.orders if order.ended_by), None)
+    at_end = commanded or document
+    covered, coverable = at_end.covered_cells, at_end.coverable_cells
+    if at_end.state == "done" and (covered or 0) < (coverable or 0):
         cells = f"{covered} of {coverable} cells{zones} covered"
         return f"not complete: the mission was done with {cells}"
-    if orders := [order for order in document.orders if order.ended_by]:
-        ended = f"ended by the command {orders[-1].ended_by} at {clock(orders[-1].until_s)}"
+    if commanded:
+        ended = f"ended by the command {commanded.ended_by} at {clock(commanded.until_s)}"
         return f"not complete: {ended}"
     how = "ended" if document.is_ended else "broke off"
     swept = f"; {floor}{zones} swept" if zones and floor else ""

@@ -216,10 +216,12 @@ def _swept(review: Review, document: ReviewDocument) -> str:
     orders = document.orders
     counted = review.data.ledger_floor
     if not text and counted is not None and counted.reached_m2 is not None:
-        text = f"{counted.swept_m2:,.1f} m2"
+        # Without an order the daemon counts all floor, in its zones or not.
+        text, orders = f"{counted.swept_m2:,.1f} m2", []
         if counted.reachable_m2:
             text = swept_words(counted.reached_m2, counted.reachable_m2)
-        by, orders, share = "the daemon's count", orders[-1:], "of these"
+            orders = document.orders[-1:]
+        by, share = "the daemon's count", "of these"
     if not text:
         return NOT_KNOWN
     before_m2 = document.swept_before_m2
