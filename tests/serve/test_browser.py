@@ -371,7 +371,7 @@ def test_a_reason_shows_its_floor_on_the_map_and_nothing_else(tmp_path):
         assert (corners[0][0] > 0, corners[1][0]) == (True, 0)
         until(lambda: canceled(tab, outsider))
         until(lambda: tab.js("find('left-what').textContent") == "Not swept")
-        show_left(tab, "ended before it got there")
+        show_left(tab, "left when the work was ended")
         inside, outside = painted(tab, (2.05, 2.05), (2.55, 2.55))
         assert outside > 10_000
         assert inside == 0
