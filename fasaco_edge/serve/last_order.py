@@ -15,8 +15,8 @@ NEAR_M = 0.5
 
 def rooms_of(view: RobotState) -> dict[str, RoomReport]:
     """Return the rooms that zones of an order may be, by their titles."""
-    standing = {zone.name for zone in view.settings.mission.zones}
-    return {room.title: room for room in view.rooms.rooms if room.title not in standing}
+    configured = {zone.name for zone in view.settings.mission.zones}
+    return {room.title: room for room in view.rooms.rooms if room.title not in configured}
 
 
 def room_of(zone: ZoneReport, rooms: dict[str, RoomReport]) -> RoomReport | None:
