@@ -6,6 +6,7 @@ First come the values that do not fit their types, then the faults that the stru
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator, Sequence
 from types import UnionType
@@ -147,7 +148,10 @@ class _Reader:
             expected = _expected(kind, expected)
             if isinstance(misfit, str) and re.fullmatch(r"-?\d+,\d+", misfit):
                 expected += " with a decimal point"
-            self._add(key + where, f"{expected}, got {shown(misfit):.100}")
+            # As YAML and JSON write them, not as Python does.
+            is_word = misfit is None or isinstance(misfit, bool)
+            given = json.dumps(misfit) if is_word else shown(misfit)
+            self._add(key + where, f"{expected}, got {given:.100}")
         return read
 
     def _members(self, kind: type[msgspec.Struct], value: dict[Any, object], key: str) -> _Value:

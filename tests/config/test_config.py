@@ -116,8 +116,8 @@ def test_a_removed_key_without_a_value_is_ignored(load):
         ("robot: {radius_m: 10.5}", "robot.radius_m: expected a number of at most 10, got 10.5"),
         ("robot: {radius_m: .nan}", "robot.radius_m: expected a number above 0, got nan"),
         ("robot: {radius_m: wide}", "robot.radius_m: expected a number, got 'wide'"),
-        ("robot: {radius_m: true}", "robot.radius_m: expected a number, got True"),
-        ("robot: {radius_m: }", "robot.radius_m: expected a number, got None"),
+        ("robot: {radius_m: true}", "robot.radius_m: expected a number, got true"),
+        ("robot: {radius_m: }", "robot.radius_m: expected a number, got null"),
         (
             "robot: {tool_width_m: .inf}",
             "robot.tool_width_m: expected a number of at most 10, got inf",
@@ -405,7 +405,7 @@ def test_ros_is_left_out_unless_it_stands_there(load):
 @pytest.mark.parametrize(
     ("block", "text"),
     [
-        ("", "ros2: expected a mapping, got None"),
+        ("", "ros2: expected a mapping, got null"),
         ("{}", "ros2.kind: missing"),
         ("{kind: dds}", "ros2.kind: expected bridge or rmw_zenoh, got 'dds'"),
         ("{kind: bridge, domain: 3}", "domain and node are for kind rmw_zenoh"),

@@ -1,4 +1,4 @@
-"""Configured zones of the configuration: orders name them, and every mission keeps out."""
+"""Zones of the configuration: orders name them, and every mission keeps out."""
 
 import time
 import tracemalloc

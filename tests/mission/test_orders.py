@@ -114,7 +114,7 @@ def test_each_pass_may_have_its_cells_lanes_and_speed():
             "zones[0].passes: expected a whole number of at least 1, got 0",
         ),
         ({"passes": 101}, "passes: expected a whole number of at most 100, got 101"),
-        ({"passes": True}, "passes: expected a whole number or a list or null, got True"),
+        ({"passes": True}, "passes: expected a whole number or a list or null, got true"),
         ({"passes": 1.5}, "passes: expected a whole number or a list or null, got 1.5"),
         ({"passes": []}, "passes: expected a list of at least 1 item, got []"),
         ({"passes": ["auto"] * 101}, "passes: expected a list of at most 100 items"),
