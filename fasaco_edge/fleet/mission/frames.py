@@ -19,8 +19,8 @@ from fasaco_edge.grid.geometry import MOST_INDEX, Point, Pose2D
 from fasaco_edge.mission.coverage.ledger import TILE
 from fasaco_edge.mission.events import MemberReceived
 
-# Number of robots tracked at once. It exceeds the number of members: a refused robot may become a
-# member later, and would need many messages to send its tiles again.
+# Number of robots tracked at once. It exceeds the limit on members: a refused robot may become a
+# member later, and would have to send all its tiles again.
 MOST_OTHERS = 64
 
 # Smaller overlaps of tiles [cells] and smaller angles [rad] are rounding errors.
@@ -80,7 +80,7 @@ class ResampledTiles:
         return tuple((place, self._made[place]) for place in sorted(wanted & self._shown))
 
     def cell(self, row: int, col: int) -> tuple[int, int]:
-        """Return this robot's cell (row, col) in which the centre of the other's cell lies."""
+        """Return this robot's cell that contains the centre of the other robot's (row, col)."""
         x, y = self._here(col + 0.5, row + 0.5)
         return math.floor(y), math.floor(x)
 
@@ -159,7 +159,7 @@ class FleetFrames:
             y=y,
             ahead=tuple(placed_point(frame, *point) for point in message.ahead),
             tiles=swept.tiles(message.tiles),
-            # Unknown: a tile here overlaps several tiles of the other, and some may not have come.
+            # Unknown: a tile here overlaps several tiles of the other robot; some may be missing.
             kept=None,
             ground=ground.tiles(message.ground),
             parts=parts,

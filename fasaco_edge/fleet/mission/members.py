@@ -1,4 +1,4 @@
-"""Members of a fleet: the other robots, the last message of each, and those that block the way."""
+"""Members of a fleet: the other robots, their last messages, and the robots that block the way."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Member:
         return has_begun or math.dist(self.place, (message.x, message.y)) > STANDING_M
 
     def absence(self, now: float) -> str:
-        """Return why it takes no part now; "" if it does."""
+        """Return why the robot takes no part in the work at ``now``; "" if it does."""
         if self.left_out:
             return self.left_out
         if now - self.received_at > GONE_S:
@@ -73,7 +73,7 @@ class Members:
 
     Attributes:
         known: the others, by name.
-        ground: the cells that the robots with a fitting frame can reach.
+        ground: the cells that the others can reach, without robots that are left out.
     """
 
     def __init__(self, robot: str, ledger: MissionLedger, cell_m: float) -> None:

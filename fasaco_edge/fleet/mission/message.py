@@ -45,7 +45,7 @@ class Messages:
             mission.covered.current.snapshot().tiles,
         )
         if layer.others.shared.epoch != self._epoch:
-            # A new epoch sends all tiles again. In the first, the cells swept before it are
+            # All tiles are sent again in a new epoch. Before the first epoch, swept cells are
             # unknown.
             before = tiles if self._epoch else None
             self._epoch, self._swept, most = (

@@ -1,8 +1,8 @@
 """Survey of a fleet's floor: the cells swept and left, and the owner of each cell left.
 
 The owner is the robot with the least sum of its handicap and the travel time from its seed, as in
-the robots' own division, here over the cells that the robots report as reachable. Each robot may
-send two million cells, on a lattice of its own, so the survey's size and search are bounded.
+the robots' own division. Travel leads over the cells that robots report as reachable. Each robot
+may send two million cells, on a lattice of its own, so the survey's size and search are bounded.
 """
 
 from __future__ import annotations

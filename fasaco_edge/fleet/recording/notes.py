@@ -209,7 +209,7 @@ def decode_notes(blob: bytes) -> NoteBatch:
     """Return the batch of a blob.
 
     Raises:
-        ValueError: it is malformed, or of another version.
+        ValueError, msgspec.DecodeError: the blob is malformed, or of another version.
     """
     inflate = zlib.decompressobj()
     try:
@@ -223,7 +223,7 @@ def decode_notes(blob: bytes) -> NoteBatch:
         raise ValueError(f"notes of a fleet of version {version}, not {NOTES_VERSION}")
     batch = msgspec.msgpack.decode(body, type=NoteBatch)
     if any(note.robot >= len(batch.robots) for note in batch.notes):
-        raise ValueError("notes of a fleet: of a robot that is not listed")
+        raise ValueError("notes of a fleet: a note names a robot that is not listed")
     return batch
 
 

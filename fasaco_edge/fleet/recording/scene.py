@@ -174,7 +174,7 @@ class FleetScene:
 
     def add_division(self) -> None:
         """Draw the shares of the remaining cells, and the cells that two robots swept."""
-        # The size of the ground also limits the time of this drawing.
+        # Drawings of a large ground are rarer, as they take more time.
         size = 2 * CHUNK_BYTES + sum(member.ground.count for member in self._members) // 4
         self._layers.draw(entities.FLEET_SHARES, size, self._draw_survey, self._writer.wall_ns)
 

@@ -1,4 +1,4 @@
-"""Cells that robots of a fleet swept, from its recording with their tracks, or from one robot's."""
+"""Cells that robots of a fleet swept, from the fleet's recording or from that of one robot."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ class FleetFeed(BusJoining):
         self._subscriptions: FleetSubscriptions | None = None
 
     def attend(self, robots: Collection[str]) -> None:
-        """Subscribe to the robots of these names; call it often."""
+        """Subscribe to the robots with these names; call it often."""
         if (subscriptions := self._subscriptions) is not None:
             for robot in set(robots) - subscriptions.robots:
                 subscriptions.subscribe(robot)
@@ -235,7 +235,7 @@ class FleetWatch(Watched):
         return len(self.view.members) > 0
 
     def is_whole(self) -> bool:
-        """Return whether all robots have had time for a message."""
+        """Return whether all robots have had time for a message, and the survey includes them."""
         view = self.view
         is_complete = steady_now() - self._known_at > SENT_S
         return is_complete and view.floor.robots >= set(view.names())

@@ -24,7 +24,7 @@ from fasaco_edge.wire.reasons import plain
 NOTED_EVERY_S = 1.0
 # Least time between two surveys of the floor: in [s], and as a multiple of a survey's duration.
 LEAST_AGE_S, LEAST_REST = 1.0, 10.0
-# A robot that is silent here is named if others received a message from it within this time [s].
+# A robot without messages to this watch is named if others received one within this time [s].
 RECENT_S = 600.0
 # Number of robots and topics whose faults are counted separately; of other fleets that are named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
@@ -64,7 +64,7 @@ class FleetRobot:
 
     @property
     def is_at_work(self) -> bool:
-        """Whether it does something for its mission."""
+        """Whether the robot does something for its mission."""
         return self.silent_s is None and self.state in AT_WORK
 
     @property
@@ -75,7 +75,7 @@ class FleetRobot:
         return f"waits for {self.waits_for}" if self.waits_for else self.state or "no state"
 
     def document(self) -> dict[str, object]:
-        """Return it as ``--json`` prints it."""
+        """Return the robot as ``--json`` prints it."""
         said = self.member.newest
         x, y = self.member.placed(said.x, said.y)
         return {
