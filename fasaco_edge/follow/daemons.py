@@ -2,8 +2,8 @@
 
 Only samples of the daemon that plans count. Another daemon, which waits or restarts in a loop, does
 not prove by its status that the planner runs, and its path is not driven. Samples of one daemon may
-arrive in any order, for instance a path before the token of its claim, so the newest of each kind
-are kept.
+arrive in any order, for instance a path before the token of its claim, so the newest sample of each
+kind is kept.
 
 Of several followers of one robot, one drives. Each shows a token ``driver/<its Zenoh id>/<waits,
 yields or drives>``. A follower that waits sends no commands, not even zeros. A session sees its own

@@ -1,4 +1,4 @@
-"""Inputs of a follower by cycle: poses, paths and heartbeats of the daemon, scans and maps."""
+"""Inputs of a follower in each cycle: poses, paths and heartbeats of the daemon, scans and maps."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_POSES = 256
 
 
 class WatchedPublisher(OnePublisher):
-    """The publisher of an input that is listened to; a conflict with another one is logged."""
+    """Selects one publisher of an input, and logs a conflict of two publishers."""
 
     _logged = ""
 
@@ -65,7 +65,7 @@ class Inputs:
         return self.time_of(time.monotonic())
 
     def time_of(self, came_at: float) -> float:
-        """Return the robot's time of an arrival, given by the computer's monotonic clock [s]."""
+        """Return the robot's time at a time of the computer's monotonic clock [s]."""
         return self._clock.at(came_at)
 
     def feed(self, follower: Supervision) -> None:

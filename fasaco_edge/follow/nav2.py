@@ -2,11 +2,10 @@
 
 A goal is a piece of the path that begins at the robot. The next goal is sent before the robot
 reaches the end of the last one, so that Nav2 switches without a stop. Where the path returns to
-itself, the next piece begins only shortly before that end: a controller continues at the nearest
-part of a path, and would skip the rest of the last goal. The last pose of a goal has the heading of
-the path beyond it, so that the robot turns there until the next goal arrives. A robot that cannot
-turn on the spot gets pieces of a curve, each driven forward or backward as a whole. No clock, no
-session.
+itself, the next piece begins only shortly before the last one ends: a controller continues at the
+nearest part of a path, and would skip the rest of the last goal. The last pose of a goal has the
+heading of the path beyond it, so that the robot turns there until the next goal arrives. A robot
+that cannot turn on the spot gets pieces of a curve, each driven forward or backward as a whole.
 """
 
 from __future__ import annotations
@@ -34,17 +33,17 @@ from fasaco_edge.wire.messages.path_points import PathPoints
 # The next goal begins at most this far before the end of the last one [m], plus the distance driven
 # in this time [s].
 AHEAD_M, AHEAD_S = 0.5, 3.0
-# It is sent when the robot is this far from its start [m].
+# The next goal is sent when the robot is this near to the goal's start [m].
 EARLY_M = 0.05
-# Length of a path's beginning, and largest distance of the robot from it for the path to be driven
+# Length of a path's beginning; a robot farther than this from the beginning does not drive the path
 # [m].
 BEGINNING_M = 1.0
 # An unanswered goal counts as accepted once the robot has moved this far on it [m].
 DRIVES_M = 0.15
 # A goal that Nav2 reports as done is not done if the robot is farther than this from its end [m].
 DONE_M = 0.5
-# Pause after an error before the next goal [s], doubled each time up to the maximum until the robot
-# has moved this far [m] or the path leads elsewhere, by its direction this far ahead [m].
+# Pause after an error before the next goal [s]. It doubles each time up to the maximum, until the
+# robot has moved PROGRESS_M [m], or the direction to the path's point LEADS_M ahead [m] changes.
 RETRY_S, MOST_RETRY_S = 1.0, 30.0
 PROGRESS_M, LEADS_M = 0.5, 0.5
 # A robot stands if it has moved less than MOVED_M [m] for STANDS_S, or near the end of its goal for
@@ -139,7 +138,7 @@ class Nav2Follower(Supervision):
         self._requests: list[Request] = []
 
     def step(self, now: float) -> list[Request]:
-        """Return the requests to Nav2 now."""
+        """Return the requests to send to Nav2 now."""
         if not self._supervised(self._drive, now):
             self._stop()
         if self.state in (FollowerState.STANDS, FollowerState.GIVEN_UP) and self._path:
@@ -158,7 +157,7 @@ class Nav2Follower(Supervision):
             self._fail(FollowerState.NO_NAV2, why, now)
 
     def take_accepted(self, goal_id: bytes, accepted: bool | None, why: str, now: float) -> None:
-        """Take in whether Nav2 accepted a goal; None without an answer: it is cancelled."""
+        """Take in whether Nav2 accepted a goal; None without an answer, which cancels the goal."""
         if self._pending is None or self._pending.id != goal_id:
             return
         goal, self._pending = self._pending, None
@@ -178,7 +177,7 @@ class Nav2Follower(Supervision):
         self._fail(state, why or "is its controller server active?", now)
 
     def take_ending(self, goal_id: bytes, ending: Ending | None, why: str, now: float) -> None:
-        """Take in how a goal ended; None if that is unknown: it is cancelled."""
+        """Take in how a goal ended; None if that is unknown, which cancels the goal."""
         if self._active is None or self._active.id != goal_id:
             return
         goal, self._active = self._active, None

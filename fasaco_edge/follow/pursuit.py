@@ -67,7 +67,7 @@ class Pursuit:
         return self._is_turning
 
     def brake(self) -> VelocityCommand:
-        """Return the next command on the way to rest."""
+        """Return the next command to brake to rest."""
         self._is_turning, self.last = True, VelocityCommand(self._braked(), self._toward(0.0))
         return self.last
 
@@ -189,7 +189,7 @@ class CurvePursuit(Pursuit):
         return False
 
     def brake(self) -> VelocityCommand:
-        """Return the next command on the way to rest."""
+        """Return the next command to brake to rest."""
         return self._sent(self._braked(), 0.0)
 
     def _along(

@@ -21,7 +21,7 @@ from fasaco_edge.grid.geometry import Point, Pose2D
 # while the path was planned and sent.
 JOIN_WITHIN_M = 0.3
 # Largest distance from a path [m], and angle to it [rad], to join it while driving. Else the robot
-# comes to rest, and drives to the nearest point or to the path's start, if within these [m].
+# comes to rest, and drives to the nearest point or the start, if within NEAREST_M or BEGINNING_M.
 BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
 # A path continues the last one if it begins on it, between these distances ahead [m].
@@ -65,9 +65,9 @@ class LegRoute:
         """Go on to the next leg.
 
         A robot at rest at ``here`` that has missed the corner returns to it first: the straight
-        line to the next leg may cross a wall. It returns again only if that brought it nearer.
-        Otherwise, a robot with late poses, or poses of another point than it turns about, would
-        circle about the corner endlessly.
+        line to the next leg may cross a wall. It returns again only if the last return brought it
+        nearer. Otherwise a robot with late poses, or poses of a point that is not its centre of
+        rotation, would circle about the corner endlessly.
         """
         self._leg(1)
         corner = self._legs[0].end if self._legs else None
@@ -88,7 +88,7 @@ class LegRoute:
     def round_corner(self, here: Point, speed: float) -> None:
         """Go on to the next leg if the robot, at this speed [m/s], has to begin the turn to it.
 
-        A robot that has missed that place comes to rest at the corner instead.
+        A robot past the place where the turn begins comes to rest at the corner instead.
         """
         leg = self.leg
         if leg is None or leg.stops or leg.bends:
@@ -134,9 +134,9 @@ class LegRoute:
     def join(self, here: Point, heading: float | None, before: LegRoute | None) -> JoinOutcome:
         """Join this new path at its beginning: find the robot's leg.
 
-        If the path has the corner that the robot was driving to, this is the leg to that corner: on
-        the same leg the robot just goes on. If the path begins farther along the last one, the
-        robot drives along the last one up to there.
+        If the path has the corner that the robot was driving to, the robot's leg is the leg to that
+        corner. If the path begins farther along the last path, the robot first drives along the
+        last path to the new one's start.
 
         Args:
             here: the robot's position.
@@ -196,7 +196,7 @@ class LegRoute:
         return index, False
 
     def _lead_to(self, point: Point, here: Point) -> list[Leg]:
-        """Return the legs up to a point soon ahead; none if it or the robot is off them."""
+        """Return the legs up to a point soon ahead; none if point or robot is off the legs."""
         way = 0.0
         for index, leg in enumerate(self._ahead()):
             if index == 0:

@@ -1,6 +1,6 @@
 """Supervision of a follower's inputs: a daemon that plans, its path, and the robot's pose.
 
-No clock, no session: the caller passes the monotonic time.
+It has no clock and no session: the caller passes the monotonic time.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fasaco_edge.wire.messages.poses import Link
 
 _Result = TypeVar("_Result")
 
-# Timeout of the links of poses from transforms [s], which may be older than poses.
+# Timeout of a transform between map and robot [s]; transforms may be older than poses.
 LINK_S = 2.0
 
 
@@ -133,7 +133,7 @@ class Supervision:
         self._have(points)
 
     def take_planner(self, planner: str) -> None:
-        """Note which daemon plans, "" without one; a path of the previous one is dropped."""
+        """Note which daemon plans, "" without one; a path of the previous daemon is dropped."""
         if planner == self._planner:
             return
         self._planner, self._statuses, self._status_at = planner, 0, -math.inf
