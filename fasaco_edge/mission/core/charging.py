@@ -30,14 +30,14 @@ COARSE = 0.2
 STEP, LEAST_S = 0.01, 10.0
 # The drain is the median over the NEWEST stretches; at least FEWEST are needed.
 NEWEST, FEWEST = 15, 3
-# Least difference between the level at which the robot turns back and the one at which it resumes.
+# Least difference between the levels at which the robot turns back and at which it resumes.
 HYSTERESIS = 0.1
-# The estimate of the rest assumes this many unknown cells beyond each cell at the map's border.
+# The estimated rest of the order has this many unknown cells beyond each cell at the map's border.
 BEYOND_CELLS = 20
 # A robot near its dock may go to charge at a level that is EARLY above the level at which it turns
 # back. PLACES_AHEAD places on its path ahead are compared.
 EARLY, PLACES_AHEAD = 0.2, 8
-# Limit on the cells of a lattice on which these places are compared: larger ones take too long.
+# Limit on the cells of a lattice on which these places are compared: larger lattices take too long.
 MOST_CELLS = 200_000
 # The battery is full if its level has risen by less than RISE in FULL_AFTER_S [s].
 RISE, FULL_AFTER_S = 0.005, 1800.0
@@ -76,10 +76,7 @@ class BatteryGauge:
         return median(self._drains) if len(self._drains) >= FEWEST else None
 
     def silent_s(self, now: float) -> float:
-        """Return the time since the last accepted level; until the first, since ``start_timeout``.
-
-        In seconds; 0 before both.
-        """
+        """Return the time since the last accepted level or, at first, ``start_timeout`` [s]."""
         return 0.0 if self._accepted_at is None else now - self._accepted_at
 
     def why_silent(self, since: float) -> str:
@@ -134,7 +131,7 @@ class Charging:
     orders: Sequencer
     route: Route
     gauge: BatteryGauge = field(default_factory=BatteryGauge)
-    # Time to the dock [s]; time for the rest of the order [s], None if unknown; their age.
+    # Time to the dock [s]; time for the rest of the order [s], None if unknown; age of both.
     _to_dock_s: float = field(default=0.0, init=False)
     _rest_s: float | None = field(default=None, init=False)
     _looked: Lapse = field(init=False)
@@ -231,7 +228,7 @@ class Charging:
 
     @property
     def goes_on_at(self) -> float:
-        """The level at which it resumes: ``enough``, or less if the rest needs less."""
+        """The level at which the robot resumes: ``enough``, or less if the order needs less."""
         assert self.policy is not None
         policy, drain = self.policy, self.gauge.drain_per_s
         if drain is None or self._rest_s is None:

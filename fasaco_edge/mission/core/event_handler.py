@@ -166,7 +166,7 @@ class EventHandler:
         return self.map.building.receive_map(plain, pose, self._now, contradicts)
 
     def _settle_frame(self) -> None:
-        """Assign the map's frame to places and orders without one; drop those of other frames."""
+        """Assign the map's frame to places and orders without one; drop any of other frames."""
         grid, frames = self.map.grid, self.map.frames
         if grid is None or grid.frame != frames.active or not frames.is_settled:
             return
@@ -194,7 +194,7 @@ class EventHandler:
         self._change_building(misfit)
 
     def _change_building(self, misfit: LedgerMismatchError | None) -> None:
-        """Continue on a new map; drop the places of the previous building if it shows another."""
+        """Continue on a new map; drop the places if the map shows another building."""
         if misfit is not None:
             self.map.building.accept_building(self._now)
             self.map.places.leave_building(self.ledger.current.frame)

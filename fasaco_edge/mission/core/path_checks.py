@@ -14,7 +14,7 @@ FAR_APART = "poses are too far apart"
 
 
 class PathChecks:
-    """Wants a new plan if the path no longer serves the driving robot.
+    """Requests a new plan if the path no longer serves the driving robot.
 
     Nothing is checked while a plan is wanted or being made.
     """
@@ -37,7 +37,7 @@ class PathChecks:
             check(cell, now)
 
     def _check_deviation(self, cell: Cell, now: float) -> None:
-        """Ask for a new plan for a robot that is off its path or at its end."""
+        """Ask for a new plan for a robot that is off its path or at the path's end."""
         route, monitor, path = self._route, self._monitor, self._route.path
         waited = self._standing.has_waited
         if self._drives_in_vain(now):
@@ -46,7 +46,7 @@ class PathChecks:
         if monitor.doubt:
             doubted = route.published_at < monitor.doubt_since
             if doubted and list(cell) in path.ahead[:2].tolist():
-                monitor.clear_doubt()  # the pose only flickered
+                monitor.clear_doubt()  # the pose was wrong for a moment
             elif waited and now - monitor.doubt_since >= PATIENCE_S:
                 route.requests.want(monitor.doubt)
             return

@@ -36,7 +36,7 @@ class PublishedPath:
 
     Attributes:
         frame: the map frame.
-        reason: why it replaces the previous one.
+        reason: why it replaces the previous path.
         revision: counts the paths of a mission, from 1, including the empty path at its end; 0 if
             there was no mission.
         xy: float64 (n, 2), x, y [m]; n = 0 stops the robot.
@@ -146,7 +146,7 @@ class PathExit:
         Each call tries again until a path is sent.
 
         Args:
-            publish: sends a path; returns whether it did.
+            publish: sends a path; returns whether that succeeded.
         """
         if self._due is None:
             return None

@@ -16,8 +16,8 @@ from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.mission.map.stay import Stay
 from fasaco_edge.mission.path.route import Route
 
-# Minimum time between new plans for a robot that left its path or stands still at its end: a
-# flickering pose must not keep the planner busy.
+# Minimum time between new plans for a robot that left its path or stands still at its end: poses
+# that jump to and fro must not keep the planner busy.
 PATIENCE_S = 1.0
 # A robot that stands on its path, within STANDING_M [m] for STANDING_S [s], gets the path again:
 # the follower may have lost it, or stopped for an obstacle that is gone. A shorter time would
@@ -41,10 +41,10 @@ class Standing:
         self._now = 0.0
         self._cell: Cell | None = None
         self._entered_at = 0.0
-        # The robot's place, and since when it has had a path there, by our clock, and by the
-        # robot's [ns]. A time without a path is added to it.
+        # The robot's place, and the start of its stay there, by our clock and by the robot's [ns].
+        # A time without a path moves the start forward.
         self._stay, self._since_ns = Stay(STANDING_M), 0
-        # The last time that it had a path to drive there, by both clocks.
+        # The last time that the robot had a path to drive there, by both clocks.
         self._had_path = 0.0, 0
         # Number of times that it got its path again there.
         self._tries = 0

@@ -142,7 +142,7 @@ class WayOut:
     def _find(self, leads_on: Callable[[ReachableArea], bool]) -> NDArray[np.float64]:
         """Return the way from the robot back to where it can continue, float64 (n, 2): x, y [m].
 
-        It is empty, (0, 2), if there is none, or if only cells are counted.
+        The way is empty, (0, 2), if there is none, or no map of the floor.
         """
         floor, lattice, stamped = self._map.ground.floor, self._map.ground.lattice, self._map.pose
         if floor is None or lattice is None or stamped is None or self._map.grid is None:

@@ -165,8 +165,8 @@ class FloorSnapshot:
     def as_grid(self, most: int, frame: str, stamp_ns: int) -> OccupancyGrid | None:
         """Return the swept share of each square as a grid, in percent, rounded down.
 
-        The squares are as small as possible, but at most ``most``. None if even the largest are too
-        many.
+        The squares are as small as possible with at most ``most`` squares. None if even the largest
+        squares are too many.
         """
         rows, cols = zip(*(self.tiles or ((0, 0),)), strict=True)
         low, high = (min(rows), min(cols)), (max(rows) + 1, max(cols) + 1)

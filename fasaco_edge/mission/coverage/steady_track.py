@@ -133,7 +133,7 @@ class SteadyTrack:
         return [self._place(index) for index in range(self._done, len(self._poses))]
 
     def box_ahead(self) -> tuple[float, float, float, float] | None:
-        """Return the bounds of these places: least x, y, greatest x, y [m]; None for none."""
+        """Return the bounds of the places of ``ahead``: least x, y, greatest x, y [m], or None."""
         if self._done == len(self._poses):
             return None
         # Places are means of poses, so the poses bound them.

@@ -42,7 +42,7 @@ def lay(
         ahead: the line.
         walk: int32 (n, 2), cells (row, col), each a legal step from the previous one.
         pose: pose of the robot, in or near the first cell.
-        is_cut: whether the walk ends where a map has cut off the previous one.
+        is_cut: whether the walk ends where a map has cut off the previous walk.
         keeps: whether to keep parts of the line; False for a way to a place, as a polished line
             over the same cells is much longer.
         beside: discs that such a way keeps clear of, see ``Route.beside``.
@@ -122,7 +122,7 @@ def _join(ahead: LineAhead, pieces: list[Piece], beyond: Piece, *, skips: bool =
         ahead: the line.
         pieces: in order.
         beyond: the line beyond a cut, which is not joined.
-        skips: whether it may skip the stand of the robot's cell if the floor there is swept.
+        skips: whether the line may skip the stand of the robot's cell if the floor there is swept.
     """
     if not len(ahead.walk):
         ahead.take([])

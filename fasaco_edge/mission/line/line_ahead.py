@@ -39,7 +39,7 @@ from fasaco_edge.mission.line.polyline import (
 from fasaco_edge.mission.line.tally import SweepTally
 from fasaco_edge.mission.line.way import fitting_radius, is_clear_between
 
-# The robot's cell is the first of this many nearest cells with a clear straight way to its stand.
+# The robot's cell is the nearest cell with a clear straight way to its stand, among this many.
 NEAREST_CELLS = 8
 
 
@@ -51,7 +51,7 @@ class LineAhead:
         tally: how often the line sweeps each pixel.
         walk: int32 (n, 2), the walk, with the part that a map has cut off, as the next walk mostly
             leads there again.
-        whole: the line along it.
+        whole: the line along the walk.
         until: number of the walk's cells before the cut.
         cell: index of the robot's cell in the walk.
 
@@ -86,7 +86,7 @@ class LineAhead:
     def follow_floor(self, floor: FloorMap) -> bool:
         """Follow the floor to another raster; return whether the line had to be dropped.
 
-        The line keeps its place on the map, to be checked there, unless the raster is turned.
+        The line keeps its place on the map, to be checked there, unless the raster is rotated.
         """
         is_same, before = floor is self.floor, self._geometry
         self.floor, self._geometry = floor, floor.geometry
@@ -116,7 +116,7 @@ class LineAhead:
         points, before = self.whole.points, self.tally.shape
         self.whole = self.whole.moved(by)
         moved = self.whole.points
-        # Sweeps outside a raster do not count: subtract edges at its rim before, add them after.
+        # Sweeps outside a raster do not count, so edges at the rim are counted anew after the move.
         margin = self._tool + 1.0
         beyond = is_outside(points, before, margin) | is_outside(moved, shape, margin)
         is_edge = beyond[:-1] | beyond[1:]

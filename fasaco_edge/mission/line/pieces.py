@@ -1,7 +1,7 @@
 """Pieces of a line, and the joining of pieces to a line.
 
 A line along a new walk reuses the pieces of the previous line that lead along the same cells,
-forward or backward; between them it goes over stands.
+forward or backward; between these pieces it leads over stands.
 """
 
 from __future__ import annotations

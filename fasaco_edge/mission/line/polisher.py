@@ -161,7 +161,7 @@ class Polisher:
 
 
 def _piece(lengths: NDArray[np.float64], begin: int, piece_m: float, held: int) -> tuple[int, int]:
-    """Return the range of points of the piece that begins at ``begin``; its first one stays."""
+    """Return the range of points of the piece that begins at ``begin``; its first point stays."""
     begin = min(begin, len(lengths) - 1)
     first = max(int(np.searchsorted(lengths, HELD_M)), begin - 2, held - 1)
     last = int(np.searchsorted(lengths, lengths[begin] + piece_m))

@@ -51,8 +51,8 @@ class PublishedLine:
         # that is held.
         self._xy: Points = NONE
         self._next = self._last_held = 0
-        # At the last comparison: the number of points after the line's first one that equal the
-        # published ones, and the distance to the last of these [m]; infinite if all are equal.
+        # At the last comparison: the number of points, after the line's first, that equal published
+        # points, and the distance to the last of them [m]; infinite if all are equal.
         self._common, self.differs_m = 0, 0.0
         self._due_since = math.inf
 
@@ -166,7 +166,7 @@ class Publication:
         Args:
             ahead: the line, as at the last comparison.
             update: the new path, if there is one.
-            reason: why the line changes; "" if it does not, or is polished.
+            reason: why the line changes; "" if it does not change, or only by polishing.
             now: [s].
             is_way: whether the path is only a way: then nothing waits.
         """
@@ -202,7 +202,7 @@ class Publication:
         return replace(update, xy=ahead.xy())
 
     def _is_settled(self, ahead: LineAhead) -> bool:
-        """Whether neither a plan nor polish is under way that changes the next metres."""
+        """Whether no plan and no polishing under way can change the next metres."""
         route = self._route
         is_planned = not route.requests.wanted and (
             route.requests.pending is None or route.requests.is_improving

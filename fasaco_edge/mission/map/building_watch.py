@@ -68,7 +68,7 @@ class Agreement:
 
     @classmethod
     def of(cls, before: CoverageLattice, after: CoverageLattice, motion: Motion = STILL) -> Self:
-        """Compare two lattices, the first one moved by ``motion``; if large, by a sample."""
+        """Compare two lattices, the first one moved by ``motion``; large ones by a sample."""
         places = np.flatnonzero(after.states != UNKNOWN)
         stride = 1 + len(places) // MOST_CELLS
         places = places[::stride]
@@ -130,8 +130,8 @@ class BuildingWatch:
         self._is_blind = False
         # Number of changes of building, and the time of the last one.
         self._changes, self._changed_at = 0, float("-inf")
-        # If the newest map of the same building has changed, until the next pose: the agreement of
-        # the map, and the pose at that time.
+        # If the newest map shows the same building with changes: its agreement with the reference,
+        # and the pose at that time; None after the next pose.
         self._shifted: tuple[Agreement, Pose2D] | None = None
         # Whether a loop closure was found since the last ``pop_closure``.
         self._has_closed = False
@@ -161,7 +161,7 @@ class BuildingWatch:
         self._jump = Motion(start, end), now
 
     def receive_blank_map(self) -> None:
-        """Take in a map without floor: it shows no building, and its time does not count."""
+        """Take in a map without floor: it shows no building, and time with it does not count."""
         self._is_blind = True
 
     def receive_map(
@@ -208,7 +208,7 @@ class BuildingWatch:
         return pose
 
     def receive_pose(self, pose: Pose2D, now: float) -> bool:
-        """Take in a pose; return whether it explains the newest map, perhaps by a loop closure."""
+        """Take in a pose; return whether the newest map shows the building, perhaps moved."""
         shifted, self._shifted = self._shifted, None
         if self._foreign is not None:
             _, seen, before = self._foreign

@@ -46,7 +46,7 @@ class ConfiguredPlaces:
     """Returns the configured places while the map they belong to is in use.
 
     Attributes:
-        note: which map they belong to; kept with the order.
+        note: which map the places belong to; kept with the order.
         mask_frame: frame of the map that the keep-out mask belongs to; "" for any.
     """
 

@@ -58,7 +58,7 @@ class FrameSelector:
         """Apply updates to maps of frames that are not active.
 
         Returns:
-            The updates that were not applied; and the faults of those applied.
+            The updates that were not applied; and the faults of the applied updates.
         """
         others = [frame for frame in self._maps if self.active not in ("", frame)]
         faults: list[FasacoError] = []

@@ -117,14 +117,14 @@ def removed(keep_outs: KeepOuts, unwanted: KeepOut) -> KeepOuts:
 
 
 def name_faults(name: str, key: str = "name") -> Iterator[OrderError]:
-    """Yield unprintable characters and spaces at an end of a place's name; "" has none."""
+    """Yield the fault of a place's name that is not printable, or has a space at an end."""
     if name and not (name.isprintable() and name.strip() == name):
         text = f"must be 1..{LONGEST_NAME} printable characters, got {name!r:.80}"
         yield OrderError(text, key=key)
 
 
 def polygon_faults(polygons: Mapping[str, Polygon]) -> Iterator[OrderError]:
-    """Yield the first fault of each polygon beyond its type; all have too many points, or each."""
+    """Yield the first fault of each polygon, or one fault if they have too many points in all."""
     points = sum(map(len, polygons.values()))
     if points > MOST_POINTS_IN_ALL:
         text = f"polygons must have at most {MOST_POINTS_IN_ALL} points, got {points}"

@@ -271,5 +271,5 @@ class PlanRequests:
         self._has_map = True
 
     def forget_failure(self) -> None:
-        """Forget the failed plan: a command requests one, or one has succeeded since."""
+        """Forget the failed plan: a command requests a new plan, or a plan has succeeded since."""
         self._failure, self._failures = ("", 0.0), 0

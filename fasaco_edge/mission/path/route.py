@@ -87,7 +87,7 @@ class Route:
         return self.path if len(self.path.cells) else self._kept
 
     def abandon(self) -> None:
-        """Cancel the wanted plan, and discard the pending one: it is for another order."""
+        """Cancel the wanted plan, and discard the pending plan: they are for another order."""
         self.requests.abandon()
         self._kept, self.aside = PathProgress(NO_CELLS), None
 
@@ -143,7 +143,7 @@ class Route:
     def move(self, before: NDArray[np.int32], motion: Motion, now: float) -> PathUpdate | None:
         """Move the path with the map, and ask for a plan that repairs it.
 
-        Its drivable part is published at once: the robot must not follow the old position.
+        Its drivable part is published at once: the robot must not follow the path at its old place.
         ``before``: int32 (n, 2), n >= 1, ``path_to_keep`` before the map moved.
         """
         self.requests.discard_pending()

@@ -82,9 +82,9 @@ class OrderReach:
             self._cut_off = window, lost | still
 
     def move(self, before: CellsOn | None, motion: Motion) -> None:
-        """Move the cells with the map; drop cells noted since it moved, as their pose was old.
+        """Move the cells with the map; drop cells recorded since then, as their pose was old.
 
-        ``before``: the cells before it moved.
+        ``before``: the cells before the map moved.
         """
         if before is not None and not motion.is_still:
             lattice = self._map.ground.lattice

@@ -168,7 +168,7 @@ class PlanScope:
 
     @property
     def is_part(self) -> bool:
-        """Whether other cells are left than those planned now."""
+        """Whether cells are left besides those planned now."""
         first, left = self._counts() if self._has_first else (0, 0)
         return left > first
 

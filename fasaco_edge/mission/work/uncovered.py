@@ -41,7 +41,7 @@ REASONS = {
     Cause.KEPT_OUT: "in a keep-out zone",
     Cause.BEHIND_KEEP_OUT: "closed off by a keep-out zone",
     Cause.BEHIND_OBSTACLES: "closed off by obstacles",
-    # The reason may be an obstacle, a wall that has moved, or one drawn thicker by a pixel.
+    # The reason may be an obstacle, a wall that has moved, or a wall drawn a pixel thicker.
     Cause.CLOSED: "no longer free on the map",
     Cause.UNKNOWN: "unknown to the map",
 }
@@ -165,10 +165,10 @@ class UncoveredCells:
         causes = np.full(left.shape, Cause.UNKNOWN, np.uint8)
         causes[lattice.window.slices_in(whole)] = self._causes(order, area)
         counts = np.bincount(causes[left], minlength=len(Cause) + 1)[1:]
-        order_of = np.argsort(-counts, kind="stable")
+        by_size = np.argsort(-counts, kind="stable")
         why = [
             f"{self._reason(Cause(n + 1))} ({counts[n] * cell_m2:.1f} m2)"
-            for n in order_of.tolist()
+            for n in by_size.tolist()
             if counts[n]
         ]
         return f"{ending}: {', '.join(why)}" if why else ending

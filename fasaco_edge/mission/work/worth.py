@@ -70,7 +70,7 @@ class WorthFirst:
         zone: Callable[[], Zone | None],
         frame: Callable[[], str],
     ) -> None:
-        """Start without a limit; ``zone`` returns the zone being covered, ``frame`` the map's."""
+        """Start without a limit; ``zone`` returns the present zone, ``frame`` the map's frame."""
         self.least = 0
         self.may_work_s = float("inf")
         self.given: OccupancyGrid | None = None
