@@ -100,8 +100,8 @@ def command_fleet(args: argparse.Namespace, asked: dict[str, object], shown: Sho
 def _robots(bus: Bus, keys: Keys, fleet: str, timeout_s: float) -> list[str]:
     """Return the sorted names of the robots of a fleet.
 
-    These are the robots that answer, and the robots that their statuses list as received recently:
-    a robot that is frozen, or has lost its network, may still drive.
+    These are the robots that answer, and the robots from which these recently received messages: a
+    robot that is frozen, or has lost its network, may still drive.
     """
     statuses = []
     for reply in bus.get(f"{keys.base}/{VERSION}/*/@rpc/status", timeout_s):

@@ -80,8 +80,8 @@ class FleetArrivals:
         # Time of each key's last message [s], oldest first: robots of this fleet; other publishers.
         self._received_at: dict[str, float] = {}
         self._strange_at: dict[str, float] = {}
-        # Messages with an unreadable fleet are passed to the loop at a limited rate, so that it
-        # reports the fault: time of the last one [s].
+        # Time of the last message with an unreadable fleet that was passed to the loop, which
+        # reports the fault [s].
         self._unreadable_at = float("-inf")
         self._has_refused = False
         self._faults = deque[FasacoError](maxlen=1)
@@ -215,7 +215,7 @@ class FleetReceiver:
         return placed
 
     def take_faults(self) -> list[FasacoError]:
-        """Return the faults since the last call, except those that ``event`` raised."""
+        """Return the faults since the last call, except faults that ``event`` raised."""
         faults, self._faults = self._faults, []
         return faults + self._arrivals.take_faults()
 
@@ -274,11 +274,11 @@ class FleetSender:
         self._publisher.put(encode_json(member))
 
     def _frame_sent(self, mission: Mission) -> str:
-        """Return the fleet's frame; the map's own frame while its pose in the fleet is unknown."""
+        """Return the fleet's frame; the map's own frame while the map's pose is unknown."""
         frame = mission.covered.current.frame
         if not layer_of(mission).others.shared.why_misplaced(frame):
             return self._frame or frame
-        # Other robots must not mistake the map's frame for the fleet's.
+        # Other robots must not mistake the map's frame for the fleet's frame.
         return frame if self._frame not in ("", frame) else f"{frame} of another map"
 
 

@@ -121,7 +121,7 @@ def divide(
 def _divided(
     travel: Travel, robots: Sequence[Robot], before: Division | None, turn_steps: float
 ) -> tuple[list[Cell], list[float]]:
-    """Return seeds and handicaps [s] of robots that have ways to the cells, as ``divide`` does."""
+    """Return seeds and handicaps [s] for robots that can reach the cells, see ``divide``."""
     lattice, cells = travel.lattice, travel.cells
     starts, steps_s = [robot.cell for robot in robots], np.array([one.step_s for one in robots])
     from_starts_s = travel.times_s(starts, steps_s)

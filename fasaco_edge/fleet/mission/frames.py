@@ -46,7 +46,7 @@ class ResampledTiles:
     """Another robot's cells, resampled on this robot's lattice.
 
     Args:
-        lattice: pose of the other lattice in this one [m].
+        lattice: pose of the other lattice in this robot's lattice [m].
         cell_m: edge of a cell of both [m].
     """
 
@@ -61,7 +61,7 @@ class ResampledTiles:
         self._shown: set[tuple[int, int]] = set()
 
     def tiles(self, tiles: Iterable[Placed]) -> tuple[Placed, ...]:
-        """Return all tiles of this robot's lattice that overlap the other's new tiles."""
+        """Return all tiles of this robot's lattice that overlap the other robot's new tiles."""
         wanted: set[tuple[int, int]] = set()
         for place, bits in tiles:
             if place not in self._given and len(self._given) >= MOST_TILES_OF_ONE:
@@ -85,7 +85,7 @@ class ResampledTiles:
         return math.floor(y), math.floor(x)
 
     def _here(self, x: float, y: float) -> Point:
-        """Return a point of the other lattice in this one [cells]."""
+        """Return a point of the other lattice in this robot's lattice [cells]."""
         cos, sin = self._cos, self._sin
         return self._shift[0] + cos * x - sin * y, self._shift[1] + sin * x + cos * y
 
@@ -141,7 +141,7 @@ class FleetFrames:
 
         Args:
             message: the message in the robot's own frames.
-            map_frame, lattice_deg: those of the other robot, see ``FleetFrames``.
+            map_frame, lattice_deg: of the other robot, as in ``FleetFrames``.
         """
         frame = seen_from(map_frame, self._map_frame)
         lattice = seen_from(turned(map_frame, lattice_deg), self._lattice)
@@ -169,7 +169,7 @@ class FleetFrames:
     def _of(
         self, robot: str, epoch: int, lattice: Pose2D
     ) -> tuple[int, ResampledTiles, ResampledTiles]:
-        """Return a robot's entry; an empty one if its frame has moved."""
+        """Return a robot's entry; an empty entry if its frame has moved."""
         known = self._robots.get(robot)
         if known is None and len(self._robots) >= MOST_OTHERS:
             del self._robots[next(iter(self._robots))]

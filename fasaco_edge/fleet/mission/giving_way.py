@@ -250,7 +250,7 @@ class GivingWay(Waiting):
     def _sees(self, area: ReachableArea, a: Points, b: Points) -> bool:
         """Return whether the robot can drive straight between two points, (2,): x, y [m].
 
-        Without a map of the floor, the points must be in one cell, or in two that a step joins.
+        Without a map of the floor, the points must be in one cell, or in two joined by a step.
         """
         if self._map.ground.floor is not None:
             return sees_on(self._map.ground.floor, a, b)
@@ -286,7 +286,7 @@ class GivingWay(Waiting):
     ) -> PathUpdate | None:
         route, neighbours = self._route, self._neighbours
         if found.robot != self.waits_for:
-            # The time of waiting goes on if the robot waits for another one at the same place.
+            # The time of waiting goes on if only the other robot has changed.
             self._since = self._stay.since
         was_waiting = bool(self.waits_for)
         self.waits_for, self._reason = found.robot, found.reason

@@ -28,7 +28,7 @@ from fasaco_edge.mission.events import MemberReceived, Part
 from fasaco_edge.mission.map.map_state import MapState
 from fasaco_edge.planners.cost import CoverageCost
 
-# Period of checks; least age of a division at which a new one replaces it, in general and for
+# Period of checks; least age of a division at which a new division replaces it, in general and for
 # balance [s]. A robot that leaves causes a new division at once.
 LOOK_S, HOLDS_S, EVEN_S = 1.0, 2.0, 10.0
 # Parts are rebalanced only above this ratio and this difference [s].

@@ -35,7 +35,7 @@ class Messages:
         Args:
             mission: mission of the robot.
             most: largest number of tiles of progress, and also of tiles of ground.
-            most_anew: the same for the first message of an epoch.
+            most_anew: ``most`` for the first message of an epoch.
         """
         if mission.pose is None or not mission.covered.current.frame:
             return None

@@ -114,7 +114,7 @@ class SharedProgress(OthersCells):
         self.version += 1
 
     def reset(self) -> None:
-        """Accept the next map as the one that the fleet shares."""
+        """Accept the next map as the map with the configured place."""
         self._left = ""
         self.version += 1
 

@@ -200,7 +200,7 @@ def _joined(
 
 
 def _tiles_of(area: ReachableArea) -> dict[Cell, bytes]:
-    """Return the reachable cells as tiles of bits; no tile where there are none."""
+    """Return the reachable cells as tiles of bits, without empty tiles."""
     window, found = area.lattice.window, {}
     for row in range(window.row0 // TILE, -(-window.row1 // TILE)):
         for col in range(window.col0 // TILE, -(-window.col1 // TILE)):

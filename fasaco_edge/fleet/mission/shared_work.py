@@ -1,4 +1,4 @@
-"""Shared work of a fleet: which robots take part, what is left, and which division is the newest.
+"""Shared work of a fleet: the robots that take part, the cells left, and the newest division.
 
 A robot without a part stands still while the others make progress, so as not to obstruct them. Of
 two divisions, the one with the higher number is newer; between equal numbers the author whose name
@@ -76,7 +76,7 @@ MOST_NUMBER, MOST_AHEAD, MOST_FIRST = 2**31 - 1, 2**16, 2**24
 class DivisionNumbers:
     """Numbers the divisions of one robot, checks the numbers of others, and decides who takes part.
 
-    All robots have to agree on who takes part: each robot makes a new division if the last one
+    All robots have to agree on who takes part: each robot makes a new division if the last division
     leaves out a robot that takes part. If two robots do not receive each other, or a map shows no
     way between them, a third robot decides.
 
@@ -168,7 +168,7 @@ class DivisionNumbers:
         return bool(absence) and not (absence == GONE and self._is_vouched(now))
 
     def _is_vouched(self, now: float) -> bool:
-        """Return whether the division's author is another robot at work that still sends it.
+        """Return whether the division's author is another robot, at work, that still sends it.
 
         The author may receive robots that this robot does not. If this robot left them out, the two
         would replace each other's division endlessly.

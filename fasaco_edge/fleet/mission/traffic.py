@@ -163,7 +163,7 @@ the other | goes on waiting |
 
 
 def _is_over(apart_m: Points, clear_m: float) -> bool:
-    """Return whether the first OVER_M of the other's path lead over this robot."""
+    """Return whether the first OVER_M of the other's path leads over this robot."""
     first = apart_m[0, : int(OVER_M / SPACING_M) + 1]
     return apart_m.shape[1] > 1 and bool((first < clear_m).any())
 
@@ -179,7 +179,7 @@ def _meeting(
     apart_m: Points, clear_m: float, pace_s_m: float, near: Neighbour, slack_s: float
 ) -> tuple[float, float] | None:
     """Return where two driving robots come too near each other at about the same time: the length
-    of each one's path up to there [m], this robot's first."""
+    of each robot's path up to there [m], this robot's first."""
     mine, theirs = apart_m.shape
     at_s = np.arange(mine) * SPACING_M * pace_s_m
     there_s = np.arange(theirs) * SPACING_M * near.pace_s_m - near.age_s

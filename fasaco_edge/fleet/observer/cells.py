@@ -70,7 +70,7 @@ class Seat:
         return GridGeometry(window.rows, window.cols, self.cell_m, Pose2D(x, y, lattice.yaw))
 
     def carried(self, cells: Cells, to: Seat) -> Cells:
-        """Return the cells of another seat that contain the centres of ``cells``, int64 (n, 2)."""
+        """Return the cells of ``to`` that contain the centres of ``cells``, int64 (n, 2)."""
         if to == self or not len(cells):
             return cells
         here = seen_from(self.lattice, to.lattice)

@@ -56,7 +56,7 @@ class FleetRobotFigures(msgspec.Struct, frozen=True):
         messages_s, kb_s: rate of its messages to the fleet [1/s], [kB/s].
         peak_kb_s: the highest rate over five seconds [kB/s].
         plans: number of plans reported.
-        plan_ms_p50, plan_ms_p99: time of a plan [ms]; null without one.
+        plan_ms_p50, plan_ms_p99: time of a plan [ms]; null without plans.
     """
 
     name: str
@@ -181,7 +181,7 @@ def _find_again_of(
 
 
 def _share_again(way: Sequence[Place], known: NDArray[np.bool_], window: Window) -> float:
-    """Return the share of a way in excess of the shortest one between its ends."""
+    """Return the share of a way in excess of the shortest way between its ends."""
     taken = sum(abs(a[0] - b[0]) + abs(a[1] - b[1]) for a, b in pairwise(way))
     start, end = ((row - window.row0, col - window.col0) for row, col in (way[0], way[-1]))
     away = distances(known, start)
@@ -220,7 +220,7 @@ def _figures(fleet: str, tracks: Sequence[RobotTrack], seat: Seat) -> FleetFigur
 def _until_last(tracks: Sequence[RobotTrack], states: Sequence[str] = ()) -> float:
     """Return the time from the beginning, or the first note in ``states``, to the last note [s].
 
-    The clock is that of the robot with the last note.
+    Times are by the clock of the robot with the last note.
     """
     at = [(note.at_ms, track) for track in tracks for note in track.notes
           if not states or note.state in states]  # fmt: skip

@@ -165,7 +165,7 @@ def _stamped(topic: str, sample: Sample) -> Arrival:
 
 
 # Longest wait for the other robots after the first message [s]. A robot sends a message per second:
-# within SENT_S [s] each robot has sent one.
+# within SENT_S [s] each robot has sent a message.
 MOST_WAIT_S, SENT_S = 4.0, 1.3
 # Period of printing JSON [s].
 EVERY_S = 1.0

@@ -26,7 +26,7 @@ NOTED_EVERY_S = 1.0
 LEAST_AGE_S, LEAST_REST = 1.0, 10.0
 # A robot without messages to this watch is named if others received one within this time [s].
 RECENT_S = 600.0
-# Number of robots and topics whose faults are counted separately; of other fleets that are named.
+# Number of robots and topics whose faults are counted separately; number of other fleets named.
 MOST_FAULTS, MOST_FLEETS = 256, 32
 # States of a robot that does something for its mission.
 AT_WORK = ("planning", "covering", "returning", "degraded")
@@ -69,7 +69,7 @@ class FleetRobot:
 
     @property
     def doing(self) -> str:
-        """Its activity in a few words."""
+        """The robot's activity in a few words."""
         if self.silent_s is not None:
             return "gone"
         return f"waits for {self.waits_for}" if self.waits_for else self.state or "no state"
