@@ -1,7 +1,7 @@
 """Check that the base moves as commanded: a base that pushes against an obstacle must stop.
 
 Poses are noisy, so all poses of an interval are fitted to the commanded motion. The fitted share of
-that motion is about 1 for a robot that moves and 0 for one that does not, however it drives and
+that motion is about 1 for a robot that moves and 0 for a robot that does not, whether it drives or
 turns. Noise raises the share as often as it lowers it: if noise hides all motion, every second
 interval ends in a pause.
 

@@ -1,4 +1,4 @@
-"""Legs of a path: straight parts, and the speed at which a robot can turn from each to the next.
+"""Legs of a path: straight parts, and the speed at which a robot can turn from one to the next.
 
 While driving, the robot turns as fast as on the spot, and begins early enough to have done half of
 the turn when it passes the corner. The turn takes the same time at any speed, so the distance from

@@ -1,8 +1,8 @@
 """Nav2's controller as follower: paths, poses, heartbeats and replies in, requests out.
 
 A goal is a piece of the path that begins at the robot. The next goal is sent before the robot
-reaches the end of the last one, so that Nav2 switches without a stop. Where the path returns to
-itself, the next piece begins only shortly before the last one ends: a controller continues at the
+reaches the end of the last goal, so that Nav2 switches without a stop. Where the path returns to
+itself, the next piece begins only shortly before the last goal ends: a controller continues at the
 nearest part of a path, and would skip the rest of the last goal. The last pose of a goal has the
 heading of the path beyond it, so that the robot turns there until the next goal arrives. A robot
 that cannot turn on the spot gets pieces of a curve, each driven forward or backward as a whole.
@@ -30,8 +30,8 @@ from fasaco_edge.grid.geometry import Point, Pose2D
 from fasaco_edge.wire.messages.nav2_goals import ABORTED, CANCELED, ERRORS, SUCCEEDED, Ending
 from fasaco_edge.wire.messages.path_points import PathPoints
 
-# The next goal begins at most this far before the end of the last one [m], plus the distance driven
-# in this time [s].
+# The next goal begins at most this far before the end of the last goal [m], plus the distance
+# driven in this time [s].
 AHEAD_M, AHEAD_S = 0.5, 3.0
 # The next goal is sent when the robot is this near to the goal's start [m].
 EARLY_M = 0.05
@@ -51,7 +51,7 @@ PROGRESS_M, LEADS_M = 0.5, 0.5
 # is given up.
 MOVED_M, STANDS_S, ARRIVED_S, GIVE_UP_S = 0.05, 3.0, 1.0, 20.0
 
-# A server that ends a query for a result sooner, without a reply, is gone [s].
+# A server that ends a query for a result within this time, without a reply, is gone [s].
 GONE_S = 290.0
 # Time constant of the filter of the positions that show whether the robot stands [s].
 STEADY_S = 1.0
@@ -125,7 +125,7 @@ class Nav2Follower(Supervision):
         self._steady: Point = (0.0, 0.0)
         self._moved_last: tuple[Point, float] | None = None
         self._path: PathDriven | None = None
-        # The path that replaces the present one, once Nav2 has answered the pending request.
+        # The path that replaces the present path, once Nav2 has answered the pending request.
         self._next: PathByLength | None = None
         # The goal that Nav2 drives, and the goal sent but not answered yet.
         self._active: SentPiece | None = None
@@ -270,7 +270,7 @@ class Nav2Follower(Supervision):
         self._requests.append(SendPiece(goal.id, points, self.path_frame, yaw, is_back))
 
     def _join(self, line: PathByLength, now: float) -> bool:
-        """Switch to a new path if it begins near the robot; return whether it does.
+        """Switch to a new path if it begins near the robot; return whether it begins there.
 
         If the path does not change up to the end of Nav2's goal, Nav2 keeps the goal.
         """
@@ -287,7 +287,7 @@ class Nav2Follower(Supervision):
         assert before is not None
         shift = before.shift_to(line, way, goal)
         if shift is None:
-            # Nav2 switches from its present goal to this one.
+            # Nav2 switches from its present goal to this goal.
             self._send(path, way)
         else:
             goal.start, goal.end = goal.start + shift, goal.end + shift

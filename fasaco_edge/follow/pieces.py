@@ -60,7 +60,7 @@ class PathByLength:
         return most
 
     def at(self, way: float) -> Point:
-        """Return the point at an arc length [m]; for values beyond, the beginning or end."""
+        """Return the point at an arc length [m]; outside the path, its beginning or end."""
         self.length(way)
         index = bisect_right(self._ways, way)
         if not 0 < index < len(self._ways):
@@ -169,15 +169,15 @@ def end_of_piece(line: PathByLength, start: float, near: float) -> float:
     return stop
 
 
-# The next goal is sent only if it extends the last one by this much [m].
+# The next goal is sent only if it extends the last goal by this much [m].
 GAIN_M = 0.3
-# Where the path returns to itself, the next goal begins this far before the end of the last one
+# Where the path returns to itself, the next goal begins this far before the end of the last goal
 # [m]: the part skipped there is less than half of a tool.
 TIP_M = 0.1
 # Distances before the end of the last goal at which the next goal may begin, in order of
 # preference, as shares of the largest.
 SHARES = (1.0, 0.6, 0.35, 0.2)
-# The earlier a goal begins before the end of the last one, the farther it must extend beyond that
+# The earlier a goal begins before the end of the last goal, the farther it must extend beyond that
 # end: by the same distance, up to this [m].
 AMPLE_M = 2.0
 # Two paths nearer than this to each other are the same [m].
@@ -236,7 +236,7 @@ class PathDriven:
             return math.inf  # the robot has to come to rest there
         for before_m in (*(share * ahead for share in SHARES), TIP_M, 0.0):
             start = max(goal.end - before_m, goal.start)
-            # A goal that begins early also ends early: it must last until the next one arrives.
+            # A goal that begins early also ends early: it must last until the next goal arrives.
             gain_m = max(min(before_m, AMPLE_M), GAIN_M)
             if end_of_piece(self.line, start, near) >= goal.end + gain_m:
                 return start

@@ -24,11 +24,11 @@ JOIN_WITHIN_M = 0.3
 # comes to rest, and drives to the nearest point or the start, if within NEAREST_M or BEGINNING_M.
 BESIDE_M, ALONG_RAD = 0.02, 0.1
 NEAREST_M, BEGINNING_M = 0.15, 0.6
-# A path continues the last one if it begins on it, between these distances ahead [m].
+# A path continues the last path if it begins on that path, between these distances ahead [m].
 LEAST_LEAD_M, LEAD_M = 0.15, 2.0
-# Distance beyond a corner, or beyond the place where a turn begins, at which it is missed [m].
+# Distance at which the robot has missed a corner, or the place where a turn begins [m].
 MISSED_M = 0.03
-# A corner of the new path is the same as one of the old path if they are this near [m].
+# A corner of the new path this near to a corner of the old path is the same corner [m].
 SAME_M = 1e-3
 # Legs of a curve up to this long are chords of an arc [m].
 CHORD_M = 0.06
@@ -49,7 +49,7 @@ class LegRoute:
         # Greatest speed in the corner that the robot rounds to its leg [m/s]; 0 without a corner.
         self.rounds = 0.0
         self._limits = limits
-        # Legs read so far, from the one that the robot is on; legs still to be read.
+        # Legs read so far, from the leg that the robot is on; legs still to be read.
         self._legs: list[Leg] = []
         self._coming = self._legs_along(poses)
         # Distance by which the robot missed the corner that it returns to [m]; infinity if it does
@@ -102,7 +102,7 @@ class LegRoute:
 
     def ends(self, along: float, horizon: float) -> list[tuple[float, float]]:
         """Return the places ahead that limit the speed: distance from ``along`` [m], and greatest
-        speed there [m/s]. The last is the next stop, or the first place beyond ``horizon`` [m]."""
+        speed there [m/s]. The last one is the next stop, or the first place beyond ``horizon``."""
         found: list[tuple[float, float]] = []
         left = -along
         for leg in self._ahead():
@@ -185,7 +185,7 @@ class LegRoute:
             if math.dist(leg.end, target) <= SAME_M:
                 return index, True
             way += leg.length
-        # Else it is the leg where the distance to the robot stops decreasing.
+        # Else the robot is on the leg where the distance to the robot stops decreasing.
         way, index = 0.0, 0
         while (one := self._leg(index)) and (after := self._leg(index + 1)):
             way += one.length
@@ -225,7 +225,7 @@ class LegRoute:
         raise AssertionError("the last leg does not bend")
 
     def _ahead(self) -> Iterator[Leg]:
-        """Yield the legs, from the one that the robot is on."""
+        """Yield the legs, from the leg that the robot is on."""
         index = 0
         while (leg := self._leg(index)) is not None:
             yield leg
@@ -266,7 +266,7 @@ class CurveRoute(LegRoute):
 
     def __init__(self, poses: Iterable[Pose2D], limits: BaseLimits) -> None:
         super().__init__(poses, limits)
-        # The leg before the first one, unless the robot comes to rest between them.
+        # The leg before the first leg, unless the robot comes to rest between them.
         self._behind: Leg | None = None
 
     def next_leg(self, here: Point | None = None) -> None:

@@ -28,7 +28,7 @@ from fasaco_edge.wire.messages.grids import GridOctets, read_grid, with_update
 REACH_M = 3.0
 # Number of sectors; in each only the shortest beam counts.
 SECTORS = 360
-# Least share of valid beams; with fewer the sensor is covered or broken.
+# Least share of valid beams; with fewer valid beams, the sensor is covered or broken.
 LEAST_SHARE = 0.1
 
 
@@ -37,7 +37,7 @@ class Mount:
     """Pose of the lidar on the robot.
 
     Attributes:
-        x, y: ahead of the robot's centre, and to its left [m].
+        x, y: distances ahead of the robot's centre, and to its left [m].
         yaw: direction of the lidar's angle 0, counter-clockwise from ahead [rad].
         upside_down: whether its angles grow clockwise.
     """
@@ -242,7 +242,7 @@ class Sight:
         self._seen: dict[tuple[int, int], tuple[float, float]] = {}
 
     def take_map(self, payload: bytes, *, is_update: bool = False) -> None:
-        """Take in a map, or an update of it; malformed ones are ignored, as by the daemon."""
+        """Take in a map, or an update of it; malformed messages are ignored, as by the daemon."""
         with suppress(MalformedMessage):
             if not is_update:
                 self._grid = read_grid(payload)
@@ -305,7 +305,7 @@ class Sight:
         return Limit(0.0, f"{why} {far:.2f} m away", around)
 
     def _look(self, points: list[Point], pose: Pose2D, now: float) -> None:
-        """Keep the points that count, and separate standing things from those that may move."""
+        """Keep the points that count, and separate standing things from things that may move."""
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
         own = OWN_SHARE * self._radius
         places: dict[tuple[int, int], list[Point]] = {}

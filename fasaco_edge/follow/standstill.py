@@ -108,13 +108,13 @@ class _Direction:
 
 
 class Tries:
-    """Counts failed tries in one place; forgets them once the robot has left it.
+    """Counts failed tries in one place; forgets them once the robot has left the place.
 
     Args:
         far: distance from the place that counts as progress [m].
         pause: first pause, after the first failed try [s].
         longest: the longest pause [s].
-        most: number of tries; after the last one only progress ends the pause.
+        most: number of tries; after the last try only progress ends the pause.
     """
 
     def __init__(self, far: float, pause: float, longest: float, most: float = math.inf) -> None:

@@ -101,7 +101,6 @@ class Supervision:
         self._pose_at = -math.inf
         self._frame, self._stamp_ns, self._repeats = "", 0, False
         self._path_most_m_s = math.inf
-        # Why there is no path.
         self._no_path: Reason = FollowerState.NO_PATH, ""
         self._planner = self._path_of = ""
         self._statuses, self._status_at = 0, -math.inf
@@ -142,7 +141,7 @@ class Supervision:
             self._path_of = ""
 
     def take_heartbeat(self, now: float) -> None:
-        """Take in that a status of the planner arrived; the first one may be old and is ignored."""
+        """Take in that a status of the planner arrived; the first may be old and is ignored."""
         self._statuses += 1
         if self._statuses > 1:
             self._status_at = now
