@@ -114,7 +114,7 @@ def inflated_sample(early: EarlySample) -> Sample:
     """Return a sample that the turn log itself contains.
 
     Raises:
-        MalformedMessage: it cannot be inflated, or is longer than any message.
+        MalformedMessage: the sample cannot be inflated, or is longer than any message.
     """
     inflater = zlib.decompressobj()
     try:
@@ -255,7 +255,7 @@ class CycleReplay:
             del self._samples[next(iter(self._samples))]
 
     def _plans(self, turn: Cycle) -> list[PlanReady]:
-        """Make the plan again that was finished in this cycle; return it, or none."""
+        """Make the plan finished in this cycle again; return a list, empty without a plan."""
         taken, request = turn.plan, self._request
         if taken is None:
             return []
